@@ -1,13 +1,16 @@
 //! The builder, for a `build.rs` and the `dibs` program.
 
 use dibs_nostd::Index;
-use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES, Unit};
+use std::sync::Arc;
+
+use dibs_nostd::format::{MAX_CHILDREN, MAX_LEAF_TRIANGLES, PathKind, Unit};
 
 use crate::array::{BuiltTree, Facts, flatten};
 use crate::construct::{Cluster, Construction, Constructor, Surface, widen};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Topology};
 use crate::mesh::{Mesh, RestSurface};
+use crate::nodes::{Embedding, Volume, least_limit};
 use crate::rest::{LimitRatios, Paths, SHARED, has_area, least_limits};
 use crate::rounding::round_up;
 
@@ -36,6 +39,7 @@ pub enum IndexWidth {
 pub struct Builder<'p> {
     stretch: f32,
     limits: Option<Vec<f32>>,
+    nodes: Option<Arc<Volume>>,
     labels: Option<Vec<u8>>,
     unit: Option<Unit>,
     construction: Construction,
@@ -74,6 +78,7 @@ impl<'p> Builder<'p> {
         Self {
             stretch: 1.5,
             limits: None,
+            nodes: None,
             labels: None,
             unit: None,
             construction: Construction::Geodesic,
@@ -107,6 +112,18 @@ impl<'p> Builder<'p> {
     #[must_use]
     pub fn limits(mut self, limits: Vec<f32>) -> Self {
         self.limits = Some(limits);
+        self
+    }
+
+    /// A volume whose nodes move the surface: a frame is their positions then, and the stretch limit is that of each
+    /// tetrahedron. Radii are lengths of paths through it, [`construction`](Self::construction) and
+    /// [`paths`](Self::paths) have no effect but for the paper's leaves, and the tree carries no metric of triangles.
+    ///
+    /// A vertex is bound to the tetrahedron around it by weights of 16 bits, and the tree's rest shape is the one that they
+    /// give. The distance from there to the mesh's, times the stretch limit, counts in the accuracy of every answer.
+    #[must_use]
+    pub fn nodes(mut self, volume: &Volume) -> Self {
+        self.nodes = Some(Arc::new(volume.clone()));
         self
     }
 
@@ -222,6 +239,9 @@ impl<'p> Builder<'p> {
             let (most, bits) = (I::MAX_VERTICES, 8 * I::BYTES);
             return Err(BuildError::TooManyVertices { vertices, most, bits });
         }
+        if let Some(volume) = &self.nodes {
+            return self.build_embedded::<I>(surface, volume);
+        }
         let paths = self.paths.unwrap_or(match self.construction {
             Construction::Paper => Paths::Edges,
             _ => Paths::default(),
@@ -255,8 +275,51 @@ impl<'p> Builder<'p> {
             with_metric: self.with_metric,
             with_adjacency: self.with_adjacency,
             labels: self.labels.as_deref(),
+            embedding: None,
         };
         let (bytes, order) = flatten::<I>(mesh, &roots, facts)?;
+        Ok(BuiltTree::new::<I>(bytes, order, mesh.origin))
+    }
+
+    fn build_embedded<I: Index>(
+        &self,
+        surface: &(impl RestSurface + ?Sized),
+        volume: &Volume,
+    ) -> Result<BuiltTree, BuildError> {
+        if self.limits.is_some() {
+            return Err(BuildError::LimitsOfTriangles);
+        }
+        let embedding = Embedding::new(volume, surface.mesh())?;
+        let mesh = embedding.mesh(surface.mesh());
+        let stretch = self.stretch.max(round_up(least_limit(&embedding)?));
+        let paths = embedding.paths();
+        // No path along the surface is searched.
+        let none = Mesh::default();
+        let ratios = LimitRatios::default();
+        let graph = Graph::new(&none, &Topology::new(&none), Paths::Edges, &ratios);
+        let roots = self.clusters(Surface {
+            mesh: &mesh,
+            graph: &graph,
+            restricted: false,
+            volume: Some(&paths),
+        })?;
+        let facts = Facts {
+            paths: PathKind::Volume,
+            stretch,
+            ratios: &ratios,
+            position_error: round_up(
+                f64::from(surface.position_error()) + embedding.error * f64::from(stretch),
+            ),
+            unit: self.unit.or(surface.unit()),
+            file_triangles: surface.file_triangles(),
+            with_order: self.with_order,
+            with_rest: self.with_rest,
+            with_metric: false,
+            with_adjacency: self.with_adjacency,
+            labels: self.labels.as_deref(),
+            embedding: Some(&embedding),
+        };
+        let (bytes, order) = flatten::<I>(&mesh, &roots, facts)?;
         Ok(BuiltTree::new::<I>(bytes, order, mesh.origin))
     }
 
@@ -266,14 +329,17 @@ impl<'p> Builder<'p> {
         paths: Paths,
         ratios: &LimitRatios,
     ) -> Result<Vec<Cluster>, BuildError> {
+        let topology = Topology::new(mesh);
+        let graph = Graph::new(mesh, &topology, paths, ratios);
+        let restricted = self.construction == Construction::Paper;
+        self.clusters(Surface { mesh, graph: &graph, restricted, volume: None })
+    }
+
+    fn clusters(&self, surface: Surface<'_>) -> Result<Vec<Cluster>, BuildError> {
         let leaf_triangles = self.leaf_triangles.unwrap_or(match self.construction {
             Construction::Paper => 1,
             _ => DEFAULT_LEAF,
         });
-        let topology = Topology::new(mesh);
-        let graph = Graph::new(mesh, &topology, paths, ratios);
-        let restricted = self.construction == Construction::Paper;
-        let surface = Surface { mesh, graph: &graph, restricted };
         let constructor =
             Constructor::new(surface, self.construction, leaf_triangles, self.progress);
         let children = match self.construction {

@@ -114,6 +114,17 @@ pub enum BuildError {
         /// Triangles of the mesh.
         triangles: usize,
     },
+    /// The volume cannot carry the surface.
+    #[error(transparent)]
+    Volume(#[from] crate::VolumeError),
+    /// The nodes do not pass their own validation: a defect of the builder.
+    #[error("the builder made nodes that its own checker rejects ({0}); please report this mesh")]
+    InvalidNodes(#[from] dibs_nostd::nodes::NodesError),
+    /// Limits of single triangles, where a volume's tetrahedra are limited.
+    #[error(
+        "triangles of a surface that a volume carries have no limits of their own: give one for all, by --stretch"
+    )]
+    LimitsOfTriangles,
     /// The tree does not pass its own validation: a defect of the builder.
     #[error("the builder made a tree that its own checker rejects ({0}); please report this mesh")]
     Invalid(#[from] dibs_nostd::FormatError),

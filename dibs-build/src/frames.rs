@@ -1,6 +1,7 @@
 //! The one check of frames against a tree, wherever they come from: a file, an array, a live source.
 
 use dibs_nostd::format::Unit;
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree, TriangleRow};
 use glam::Vec3;
 
@@ -17,6 +18,17 @@ pub enum FrameError {
     )]
     Vertices {
         /// Vertices of the mesh's file.
+        expected: usize,
+        /// Positions of the frame.
+        found: usize,
+    },
+    /// Too few or too many positions of nodes.
+    #[error(
+        "has {found} points and the tree has {expected} nodes: give the nodes of the volume that the tree was built with, \
+         one for each point of its file"
+    )]
+    Nodes {
+        /// Nodes of the tree.
         expected: usize,
         /// Positions of the frame.
         found: usize,
@@ -73,13 +85,16 @@ const FLAT: f64 = 1.0 / 64.0;
 /// The least volume at rest that has a sign, as a part of the sum of its terms' sizes.
 const LEAST_VOLUME: f64 = 1.0 / 4096.0;
 
-/// Checks frames against a tree, and puts their positions into the order of its rows.
+/// Checks frames against a tree, and puts their positions into the order of its rows. Of a tree with
+/// [nodes](dibs_nostd::nodes) a frame is their positions, in the order of the volume's file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameCheck {
     /// The mesh's vertex of each row.
     order: Vec<u32>,
-    /// Corners of the tree's triangles, by the mesh's numbers.
+    /// Corners of the tree's triangles, by the mesh's numbers; of nodes, those of two faces of each element.
     triangles: Vec<[u32; 3]>,
+    /// Whether frames are of nodes.
+    is_of_nodes: bool,
     /// Vertices of the mesh's file.
     vertices: usize,
     unit: Option<Unit>,
@@ -94,6 +109,9 @@ impl FrameCheck {
     /// The check for frames of this tree.
     #[must_use]
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
+        if let Ok(nodes) = Nodes::of(tree) {
+            return Self::of_nodes(&nodes, tree.unit());
+        }
         let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
         // Without the mesh's numbers, positions come in the order of the rows.
         let has_order = tree.vertex_number(0).is_some();
@@ -108,6 +126,7 @@ impl FrameCheck {
         let has_sign = |&(volume, terms): &(f64, f64)| volume.abs() > LEAST_VOLUME * terms;
         Self {
             triangles: rows.iter().map(|corners| corners.map(number)).collect(),
+            is_of_nodes: false,
             order,
             vertices: if has_order { tree.file_vertex_count() } else { tree.vertex_count() }
                 as usize,
@@ -118,6 +137,29 @@ impl FrameCheck {
         }
     }
 
+    fn of_nodes(nodes: &Nodes<'_>, unit: Option<Unit>) -> Self {
+        let elements = (0..nodes.element_count()).filter_map(|element| nodes.element(element));
+        let triangles: Vec<[u32; 3]> =
+            elements.flat_map(|[a, b, c, d]| [[a, b, c], [b, c, d]]).collect();
+        Self {
+            order: (0..nodes.count()).collect(),
+            rest: squares(&triangles, |node| nodes.rest_position(node)),
+            triangles,
+            is_of_nodes: true,
+            vertices: nodes.count() as usize,
+            unit,
+            most: (2.0 * f64::from(nodes.stretch_limit())).max(MOST),
+            // Each element has a sign of its own.
+            volume: None,
+        }
+    }
+
+    /// The mesh's vertex, or the node, of each row.
+    #[must_use]
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
     /// Positions in the mesh's order (mm), in the order of the tree's rows.
     ///
     /// # Errors
@@ -125,7 +167,11 @@ impl FrameCheck {
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, FrameError> {
         if positions.len() != self.vertices {
             let (expected, found) = (self.vertices, positions.len());
-            return Err(FrameError::Vertices { expected, found });
+            return Err(if self.is_of_nodes {
+                FrameError::Nodes { expected, found }
+            } else {
+                FrameError::Vertices { expected, found }
+            });
         }
         let at = |vertex: u32| positions.get(vertex as usize).copied();
         if let (Some(rest), Some(now)) = (self.rest, squares(&self.triangles, at)) {
@@ -142,11 +188,13 @@ impl FrameCheck {
         self.order.iter().map(|&vertex| at(vertex)).collect::<Option<_>>().ok_or(missing)
     }
 
-    /// Checks that each triangle of the tree is one of these faces, or a part of one. A file without faces passes.
+    /// Checks that each triangle of the tree is one of these faces, or a part of one. A file without faces passes, and so do
+    /// nodes.
     ///
     /// # Errors
     /// [`FrameError::Triangle`] names the first that is not.
     pub fn check_faces(&self, faces: &[Vec<u32>]) -> Result<(), FrameError> {
+        let faces = if self.is_of_nodes { &[] } else { faces };
         check_faces(&self.triangles, self.vertices, faces)
     }
 }

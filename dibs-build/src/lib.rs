@@ -30,6 +30,7 @@ mod mesh;
 #[cfg(feature = "modes")]
 pub mod modes;
 mod motion;
+mod nodes;
 mod orient;
 mod parts;
 mod read;
@@ -37,9 +38,11 @@ mod rest;
 mod rounding;
 mod script;
 mod stretch;
+mod surface_rows;
+mod volume_file;
 mod write;
 
-pub use array::{BuiltTree, ModesSummary, Summary, summarise};
+pub use array::{BuiltTree, ModesSummary, Summary, VolumeSummary, summarise};
 pub use builder::{Builder, IndexWidth};
 pub use construct::Construction;
 pub use crossing::{CrossingParts, crossing_parts};
@@ -48,6 +51,7 @@ pub use frames::{FrameCheck, FrameError};
 pub use labels::{LabelsError, LabelsErrorKind, read_labels};
 pub use mesh::{Mesh, Motion, RestSurface};
 pub use motion::MotionMismatchError;
+pub use nodes::{Volume, VolumeError};
 pub use orient::{WindingError, check_winding, orient};
 pub use parts::files_of;
 pub use read::{
@@ -59,6 +63,7 @@ pub use stretch::{
     Beyond, LimitsError, LimitsErrorKind, MotionStretch, Needed, largest_stretch, read_limits,
     write_limits,
 };
+pub use surface_rows::SurfaceRows;
 pub use write::{WriteError, WriteErrorKind, write_atomically};
 
 pub use dibs_nostd::format::Unit;

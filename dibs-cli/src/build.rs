@@ -1,12 +1,13 @@
 //! `dibs build`: a mesh file becomes a blob or Rust source.
 
 use crate::mesh_file::{self, MeshArgs};
+use crate::nodes::{self, VolumeSpec};
 use crate::{modes, overwrite, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
     Beyond, Builder, BuiltTree, Construction, Group, Import, IndexWidth, Mesh, Needed, Paths,
-    check_winding, crossing_parts, orient, read_labels, read_limits,
+    Volume, check_winding, crossing_parts, orient, read_labels, read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -20,7 +21,9 @@ Examples:
   dibs build scan.obj -o scan.dibs --orient
   dibs build scan.obj -o scan.dibs --labels tissues.txt
   dibs build organs.msh -o organs.dibs --labels-from-groups
-  dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16")]
+  dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16
+  dibs build heart.ply -o heart.dibs --nodes heart-fem.msh --motion nodes.npy
+  dibs build heart.ply -o heart.dibs --nodes lattice:14,12,10")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp, .vtu), glTF (.gltf, .glb), Gmsh (.msh) or 3MF, told apart by content
     mesh: PathBuf,
@@ -33,6 +36,10 @@ pub struct Args {
     /// A limit for each triangle instead, as `dibs stretch` writes them
     #[arg(long, value_name = "FILE", conflicts_with = "stretch")]
     limits: Option<PathBuf>,
+    /// A volume whose nodes move the surface: a file of tetrahedra around it (.msh, .vtk, .vtu), or lattice:NX,NY,NZ, a box
+    /// of so many cells. Frames are the nodes then, and --stretch limits each tetrahedron
+    #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with_all = ["limits", "modes"])]
+    nodes: Option<VolumeSpec>,
     /// A label for each face of the file or triangle of the mesh, say of its tissue: text, one number from 0 to 255 a
     /// line, in the file's order
     #[arg(long, value_name = "FILE")]
@@ -91,8 +98,14 @@ pub fn run(args: &Args) -> Result<()> {
     };
     // A Rust module has its blob beside it.
     let blob = is_source.then(|| args.output.with_extension("dibs"));
-    let inputs =
-        [Some(&args.mesh), args.limits.as_ref(), args.labels.as_ref(), args.motion.as_ref()];
+    let volume = args.nodes.as_ref().and_then(VolumeSpec::file);
+    let inputs = [
+        Some(&args.mesh),
+        args.limits.as_ref(),
+        args.labels.as_ref(),
+        args.motion.as_ref(),
+        volume,
+    ];
     overwrite::check(inputs.into_iter().flatten(), [&args.output].into_iter().chain(&blob))?;
     let mut import = mesh_file::read(&args.mesh, &args.reading, args.labels_from_groups)?;
     let name = args.mesh.display();
@@ -111,7 +124,7 @@ pub fn run(args: &Args) -> Result<()> {
         (None, None) => None,
     };
     let groups = groups.as_ref().map(|groups| &groups.groups);
-    if let Some(path) = &args.motion {
+    if let (Some(path), None) = (&args.motion, &args.nodes) {
         let uniform = || vec![args.stretch; mesh.triangles.len()];
         check_covered(args, mesh, path, &limits.clone().unwrap_or_else(uniform))?;
     }
@@ -120,8 +133,13 @@ pub fn run(args: &Args) -> Result<()> {
         (Some(path), Some(_)) => Some(modes::fit(mesh, path, &args.reading.lengths)?),
         _ => None,
     };
-    let mut tree = build(args, &import, limits, labels)
+    let nodes = args.nodes.as_ref();
+    let volume = nodes.map(|nodes| nodes.volume(mesh, &args.reading.lengths)).transpose()?;
+    let mut tree = build(args, &import, limits, labels, volume.as_ref())
         .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
+    if let (Some(path), Some(_)) = (&args.motion, nodes) {
+        nodes::check_covered(&tree, path, &args.reading.lengths)?;
+    }
     if let (Some(fit), Some(count)) = (&fit, args.modes) {
         tree = fit.add(&tree, count)?;
     }
@@ -192,6 +210,7 @@ fn build(
     import: &Import,
     limits: Option<Vec<f32>>,
     labels: Option<Vec<u8>>,
+    volume: Option<&Volume>,
 ) -> Result<BuiltTree, dibs_build::BuildError> {
     let bar = mesh_file::progress_bar("building", import.mesh.triangles.len());
     let progress = |done: usize| bar.set_position(done as u64);
@@ -201,6 +220,10 @@ fn build(
     };
     let builder = match labels {
         Some(labels) => builder.labels(labels),
+        None => builder,
+    };
+    let builder = match volume {
+        Some(volume) => builder.nodes(volume),
         None => builder,
     };
     let tree = builder

@@ -10,6 +10,7 @@ mod inspect;
 mod manual;
 mod mesh_file;
 mod modes;
+mod nodes;
 mod overwrite;
 mod query;
 mod recorded;

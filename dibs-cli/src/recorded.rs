@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail};
+use dibs_build::SurfaceRows;
 use dibs_build::glam::Vec3;
-use dibs_nostd::{Index, MeasuredStretch, Tree, measure_stretch};
+use dibs_nostd::{Index, MeasuredStretch, PathKind, Tree};
 
 use crate::mesh_file::Lengths;
 use crate::query::{ToolSpec, parse_tool, rows};
@@ -14,7 +15,8 @@ use crate::query::{ToolSpec, parse_tool, rows};
 pub struct Moving {
     /// A tree file that `dibs build` wrote
     pub tree: PathBuf,
-    /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh
+    /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh, or of
+    /// the nodes that move it
     #[arg(long)]
     pub motion: PathBuf,
     /// Frames a second of the motion; by default the number in its file
@@ -64,7 +66,10 @@ pub fn tools<T>(path: &Path, each: impl Fn(ToolSpec) -> Result<T>) -> Result<Vec
 
 /// The frames of a motion, at least one, within the tree's stretch limit.
 pub struct Recorded {
+    /// Positions of the tree's vertices.
     pub frames: Vec<Vec<Vec3>>,
+    /// Positions of its nodes, where these move it.
+    nodes: Option<Vec<Vec<Vec3>>>,
     pub stretches: Vec<MeasuredStretch>,
     /// Frames a second.
     pub rate: f64,
@@ -89,18 +94,34 @@ impl Recorded {
             .zip(&motion.frames)
             .map(|(number, frame)| rows(tree, path, number, frame))
             .collect::<Result<_>>()?;
-        let stretches = (0..)
-            .zip(&frames)
-            .map(|(number, frame)| {
-                measure_stretch(tree, frame.as_slice()).map_err(|error| {
-                    anyhow!(
-                        "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with \
-                         --limits that allow it"
-                    )
-                })
-            })
-            .collect::<Result<_>>()?;
-        Ok(Self { frames, stretches, rate: f64::from(rate) })
+        let nodes = (tree.paths() == PathKind::Volume).then(|| frames.clone());
+        let (mut rows, mut stretches) = (Vec::new(), Vec::new());
+        for (number, frame) in frames.into_iter().enumerate() {
+            let surface = SurfaceRows::of(tree, frame)?;
+            let measured = surface.stretch.map_err(|error| {
+                anyhow!(
+                    "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with \
+                     --limits that allow it"
+                )
+            })?;
+            rows.push(surface.positions().to_vec());
+            stretches.push(measured);
+        }
+        Ok(Self { frames: rows, nodes, stretches, rate: f64::from(rate) })
+    }
+
+    /// The stretch of the surface after a frame, if it goes on as it came from another one; an error beyond the limit.
+    pub fn stretch_beyond<I: Index>(
+        &self,
+        tree: &Tree<'_, I>,
+        [before, after]: [usize; 2],
+        share: f32,
+    ) -> Result<MeasuredStretch> {
+        let frames = self.nodes.as_ref().unwrap_or(&self.frames);
+        let pairs = frames[before].iter().zip(&frames[after]);
+        let beyond: Vec<Vec3> =
+            pairs.map(|(before, after)| before + (after - before) * (1.0 + share)).collect();
+        Ok(SurfaceRows::of(tree, beyond)?.stretch?)
     }
 
     /// The frame that a time (s) falls behind, counted on over all rounds, and the share of the way to the next.

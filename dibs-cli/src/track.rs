@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::{
     Budget, Contacts, Cost, Fallback, Index, MeasuredStretch, MovingSurface, NoSide, Odometer,
-    Options, Proximity, Query, Side, Step, Tool, Tracker, Tree, measure_stretch,
+    Options, Proximity, Query, Side, Step, Tool, Tracker, Tree,
 };
 use serde::Serialize;
 use std::io::Write;
@@ -114,7 +114,8 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
             let share = frame_at(tick).1 as f32;
             let stretch =
                 if args.surface == Surface::Interpolated { both } else { stretches[current] };
-            session.tick(tick, &step, args.surface, share, stretch, tool)?;
+            let beyond = || recorded.stretch_beyond(tree, [last, current], share).ok();
+            session.tick(tick, &step, args.surface, share, (stretch, &beyond), tool)?;
             if session.out.len() >= BUFFER && !session.print() {
                 return Ok(());
             }
@@ -182,16 +183,16 @@ impl<I: Index> Session<'_, I> {
         step: &Step<'_, [Vec3], [Vec3]>,
         surface: Surface,
         share: f32,
-        stretch: MeasuredStretch,
+        (stretch, beyond): (MeasuredStretch, &dyn Fn() -> Option<MeasuredStretch>),
         tool: &LocalTool,
     ) -> Result<()> {
         let answer = match surface {
             Surface::Held => self.ask(&step.after(), stretch, tool)?,
             Surface::Interpolated => self.ask(&step.at(share), stretch, tool)?,
             // An extrapolated surface beyond the tree's stretch limit is not searched: the last frame is held.
-            Surface::Extrapolated => match measure_stretch(self.tree, &step.beyond(share)) {
-                Ok(stretch) => self.ask(&step.beyond(share), stretch, tool)?,
-                Err(_) => self.ask(&step.after(), stretch, tool)?,
+            Surface::Extrapolated => match beyond() {
+                Some(stretch) => self.ask(&step.beyond(share), stretch, tool)?,
+                None => self.ask(&step.after(), stretch, tool)?,
             },
         };
         let Answer { closest, is_kept, fallback } = answer;

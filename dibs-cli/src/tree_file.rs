@@ -68,7 +68,11 @@ pub fn print(summary: &Summary) {
         "tree     triangles {}, vertices {}, nodes {}, stack {}, {}-bit indices",
         s.triangles, s.vertices, s.nodes, s.stack, s.index_bits
     );
-    let paths = if s.surface_paths { "of triangles" } else { "of edges" };
+    let paths = match s.volume {
+        Some(_) => "of tetrahedra",
+        None if s.surface_paths => "of triangles",
+        None => "of edges",
+    };
     let limit = if s.least_stretch_limit < s.stretch {
         format!("limits {} to {}", s.least_stretch_limit, s.stretch)
     } else {
@@ -97,10 +101,17 @@ pub fn print(summary: &Summary) {
         "flash    {} bytes; of these a query reads {} ({:.1} a triangle)",
         s.flash_bytes, s.query_bytes, s.query_bytes_per_triangle
     );
+    let rows = s.volume.map_or(s.ram_bytes, |volume| volume.ram_bytes);
     println!(
-        "RAM      {} bytes for two buffers of positions, {} for a query's stack",
-        s.ram_bytes, s.stack_bytes
+        "RAM      {rows} bytes for two buffers of positions, {} for a query's stack",
+        s.stack_bytes
     );
+    if let Some(v) = s.volume {
+        println!(
+            "nodes    {} of {} tetrahedra, {} bytes of the flash; a frame is their positions",
+            v.nodes, v.tetrahedra, v.flash_bytes
+        );
+    }
     if let Some(m) = s.modes {
         println!(
             "modes    {}, within {} of the motion (rms {}); {} bytes of the flash ({:.1} a vertex), \

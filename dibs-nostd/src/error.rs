@@ -96,4 +96,7 @@ errors! {
     /// The weights are not a surface's.
     #[cfg(feature = "modes")]
     Weights(crate::modes::WeightsError),
+    /// The tree carries no nodes, or damaged ones.
+    #[cfg(feature = "nodes")]
+    Nodes(crate::nodes::NodesError),
 }

@@ -90,3 +90,19 @@ macro_rules! if_modes {
 macro_rules! if_modes {
     ($($item:item)*) => {};
 }
+
+/// Items of the generated module that need the feature `nodes`.
+#[cfg(feature = "nodes")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_nodes {
+    ($($item:item)*) => { $($item)* };
+}
+
+/// Nothing: the feature is off.
+#[cfg(not(feature = "nodes"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! if_nodes {
+    ($($item:item)*) => {};
+}

@@ -47,7 +47,8 @@
 //!
 //! # Features
 //!
-//! - `bus`, `control`, `modes`, on by default: packets and the [`Assembler`]; [`constraint`], [`filter`] and [`failsafe`]; [`modes`].
+//! - `bus`, `control`, `modes`, `nodes`, on by default: packets and the [`Assembler`]; [`constraint`], [`filter`] and
+//!   [`failsafe`]; [`modes`]; [`nodes`].
 //! - `wide`: `Query::closest_wide`, which tests several subtrees at once, for large processors.
 //! - `defmt`: `defmt::Format` for every public value and error.
 //! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver takes only packets with a genuine tag.
@@ -65,6 +66,8 @@ mod include;
 mod math;
 #[cfg(feature = "modes")]
 pub mod modes;
+#[cfg(feature = "nodes")]
+pub mod nodes;
 mod query;
 #[cfg(feature = "bus")]
 mod receive;

@@ -9,6 +9,8 @@ pub mod deform;
 #[cfg(feature = "builder")]
 pub mod dibs;
 #[cfg(feature = "builder")]
+pub mod embedded;
+#[cfg(feature = "builder")]
 pub mod filter;
 #[cfg(feature = "builder")]
 pub mod hand;

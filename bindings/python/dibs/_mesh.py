@@ -133,13 +133,16 @@ def build(
     stretch: float = 1.5,
     limits: Optional[npt.ArrayLike] = None,
     labels: Optional[npt.ArrayLike] = None,
+    nodes: Optional[npt.ArrayLike] = None,
+    tetrahedra: Optional[npt.ArrayLike] = None,
     **reading: Any,
 ) -> Tree:
     """Builds the tree of a mesh: of a file, a `Mesh`, or arrays of vertices and triangles.
 
     `stretch` is the largest factor by which the surface may be stretched along itself; `limits` are one for each
     triangle instead (`MotionStretch.limits`). `labels` are numbers from 0 to 255, one for each triangle, which answers
-    then carry. Other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
+    then carry. With `nodes` and `tetrahedra` of them, a volume around the surface, a surface's positions are those of the
+    nodes, and `stretch` limits each tetrahedron. Other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
     """
     if isinstance(source, Mesh):
         if triangles is not None or reading:
@@ -158,11 +161,30 @@ def build(
     if labels is None:
         labels = mesh.labels
     marks = None if labels is None else _labels(labels, count)
-    native = mesh._native.build(_arrays.number("stretch", stretch), each, marks)
-    tree = Tree._of(native, len(mesh.vertices))
+    if (nodes is None) != (tetrahedra is None):
+        raise TypeError("build: nodes and tetrahedra go together")
+    volume = None
+    # Of nodes the library itself says how many a tree has.
+    rows: Optional[int] = len(mesh.vertices)
+    if nodes is not None and tetrahedra is not None:
+        points = _arrays.points("nodes", nodes)
+        volume, rows = (points.tobytes(), _tetrahedra(tetrahedra, len(points))), None
+    native = mesh._native.build(_arrays.number("stretch", stretch), each, marks, volume)
+    tree = Tree._of(native, rows)
     for sentence in mesh.warnings + native.warnings():
         warnings.warn(sentence, MeshWarning, stacklevel=2)
     return tree
+
+
+def _tetrahedra(tetrahedra: npt.ArrayLike, nodes: int) -> bytes:
+    array = np.asarray(tetrahedra)
+    if array.ndim != 2 or array.shape[1] != 4 or array.dtype.kind not in "iu":
+        raise ValueError(f"tetrahedra: an array of N x 4 integers is needed, not {array.shape} of {array.dtype}")
+    wrong = (array < 0) | (array >= nodes)
+    if wrong.any():
+        row, corner = np.argwhere(wrong)[0]
+        raise ValueError(f"tetrahedra: number {row} has node {array[row, corner]}, and there are {nodes}")
+    return array.astype("<u4").tobytes()
 
 
 def _labels(labels: npt.ArrayLike, triangles: int) -> bytes:

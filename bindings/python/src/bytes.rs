@@ -21,11 +21,11 @@ pub fn floats(bytes: &[u8]) -> Vec<f32> {
     numbers.iter().copied().map(f32::from_le_bytes).collect()
 }
 
-/// Triangles of u32.
-pub fn triangles(bytes: &[u8]) -> Vec<[u32; 3]> {
+/// Triangles of u32, or cells of another number of corners.
+pub fn cells<const CORNERS: usize>(bytes: &[u8]) -> Vec<[u32; CORNERS]> {
     let (numbers, _) = bytes.as_chunks::<4>();
-    let (triangles, _) = numbers.as_chunks::<3>();
-    triangles.iter().map(|corners| corners.map(u32::from_le_bytes)).collect()
+    let (cells, _) = numbers.as_chunks::<CORNERS>();
+    cells.iter().map(|corners| corners.map(u32::from_le_bytes)).collect()
 }
 
 /// The bytes of points.

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use dibs_build::glam::DVec3;
-use dibs_build::{Builder, Import, ReadOptions, Unit, check_winding, crossing_parts, orient};
+use dibs_build::{
+    Builder, Import, ReadOptions, Unit, Volume, check_winding, crossing_parts, orient,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
@@ -32,7 +34,7 @@ impl Mesh {
     #[staticmethod]
     fn of(py: Python<'_>, positions: &[u8], triangles: &[u8], reading: Reading) -> PyResult<Self> {
         let (options, is_to_turn) = options(reading)?;
-        let check = || options.check(&bytes::points(positions), &bytes::triangles(triangles));
+        let check = || options.check(&bytes::points(positions), &bytes::cells(triangles));
         Self::new(py.detach(check).map_err(invalid)?, is_to_turn)
     }
 
@@ -82,6 +84,7 @@ impl Mesh {
         stretch: f32,
         limits: Option<&[u8]>,
         labels: Option<&[u8]>,
+        volume: Option<(&[u8], &[u8])>,
     ) -> PyResult<Tree> {
         let builder = match limits {
             Some(limits) => Builder::new().limits(bytes::floats(limits)),
@@ -89,6 +92,12 @@ impl Mesh {
         };
         let builder = match labels {
             Some(labels) => builder.labels(labels.to_vec()),
+            None => builder,
+        };
+        let volume = volume
+            .map(|(nodes, tetrahedra)| Volume::new(bytes::points(nodes), bytes::cells(tetrahedra)));
+        let builder = match volume.transpose().map_err(invalid)? {
+            Some(volume) => builder.nodes(&volume),
             None => builder,
         };
         let built = py.detach(|| builder.build(&self.import));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dibs_build::glam::Vec3;
-use dibs_build::largest_stretch;
+use dibs_build::{SurfaceRows, largest_stretch};
 use dibs_nostd::{
     Budget, Contact, Contacts, Index, MeasuredStretch, Options, Proximity, Query, QueryError, Tree,
 };
@@ -22,7 +22,7 @@ pub const MOST_CONTACTS: usize = 64;
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Surface {
     pub tree: Arc<Owned>,
-    pub rows: Vec<Vec3>,
+    pub rows: SurfaceRows,
     pub velocities: Option<Vec<Vec3>>,
     /// `None` where the tree has no rest metric to measure with.
     pub stretch: Option<MeasuredStretch>,
@@ -32,7 +32,8 @@ pub struct Surface {
 impl Surface {
     fn stretch(&self) -> Option<f64> {
         let measured = self.stretch?;
-        let largest = of_any_width!(self.tree.view(), tree => largest_stretch(tree, &self.rows));
+        let largest =
+            of_any_width!(self.tree.view(), tree => largest_stretch(tree, self.rows.positions()));
         Some(largest.unwrap_or(measured.sigma().into()))
     }
 }
@@ -53,7 +54,7 @@ impl Surface {
         budget: Budget,
         mut found: impl FnMut(usize, usize, Proximity),
     ) -> Result<(), String> {
-        let (rows, options) = (self.rows.as_slice(), self.options(budget));
+        let (rows, options) = (&self.rows, self.options(budget));
         of_any_width!(self.tree.view(), tree => {
             let mut query = query_of(tree)?;
             for (pose, number, numbers) in chunk.tools() {
@@ -77,7 +78,7 @@ impl Surface {
         (margin, label): (f32, Option<u8>),
         mut found: impl FnMut(usize, usize, &mut dyn Iterator<Item = &Contact>, f32),
     ) -> Result<(), String> {
-        let (rows, mut options) = (self.rows.as_slice(), self.options(budget));
+        let (rows, mut options) = (&self.rows, self.options(budget));
         if let Some(label) = label {
             options = options.contacts_of(label);
         }

@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::SurfaceRows;
+use dibs_build::glam::DVec3;
 use dibs_nostd::filter::{self, FilterError, Motion, MotionRow, Uncertainty};
 use dibs_nostd::{
     Budget, Capsule, Contacts, Cost, Fallback, Index, MovingTable, Odometer, Options, Proximity,
@@ -44,16 +45,16 @@ impl<'t, I: Index> Ticks<'t, I> {
         now: &'s Py<Surface>,
         last: Option<&'s Py<Surface>>,
         tools: usize,
-    ) -> Result<MovingTable<'s, [Vec3]>, String> {
+    ) -> Result<MovingTable<'s, SurfaceRows>, String> {
         if self.trackers.len() != tools {
             let tracker = |_| TheTracker::with_range(self.tree).map(Box::new);
             let trackers = (0..tools).map(tracker).collect::<Result<_, _>>();
             self.trackers = trackers.map_err(|error| error.to_string())?;
         }
-        let rows = now.get().rows.as_slice();
+        let rows = &now.get().rows;
         Ok(match last {
             None => self.odometer.start(rows),
-            Some(last) => self.odometer.step(last.get().rows.as_slice(), rows).after(),
+            Some(last) => self.odometer.step(&last.get().rows, rows).after(),
         })
     }
 }

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_build::{Format, FrameCheck, ReadErrorKind, summarise};
-use dibs_nostd::{FormatError, Index, StretchError, TriangleRow, measure_stretch};
+use dibs_build::{Format, FrameCheck, ReadErrorKind, SurfaceRows, summarise};
+use dibs_nostd::nodes::Nodes;
+use dibs_nostd::{FormatError, StretchError, TriangleRow, VertexTable};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -118,10 +119,12 @@ impl Tree {
                     let check = of_any_width!(self.0.view(), tree => FrameCheck::of(tree));
                     check.to_rows(&positions).map_err(|error| invalid(format!("surface: {error}")))?
                 }
-                None => of_any_width!(self.0.view(), tree => at_rest(tree)?),
+                None => of_any_width!(self.0.view(), tree => SurfaceRows::rest_frame(tree))
+                    .ok_or_else(|| invalid("the tree has no rest shape; give positions"))?,
             };
-            let measured = of_any_width!(self.0.view(), tree => measure_stretch(tree, rows.as_slice()));
-            let stretch = match measured {
+            let rows = of_any_width!(self.0.view(), tree => SurfaceRows::of(tree, rows));
+            let rows = rows.map_err(invalid)?;
+            let stretch = match rows.stretch {
                 Ok(measured) => Some(measured),
                 Err(StretchError::NoMetric) => None,
                 // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
@@ -140,6 +143,18 @@ impl Tree {
     /// Velocities of the mesh's vertices in the order of the rows.
     fn velocities(&self, of_mesh: &[u8]) -> PyResult<Vec<Vec3>> {
         let of_mesh = bytes::points(of_mesh);
+        if let Ok(nodes) = of_any_width!(self.0.view(), tree => Nodes::of(tree)) {
+            // The velocity of a vertex is the mean of its nodes', as its position is.
+            let of_nodes: Vec<Vec3> = of_mesh.iter().map(|velocity| velocity.as_vec3()).collect();
+            let surface = nodes.surface(of_nodes.as_slice());
+            return match surface.len() {
+                0 => {
+                    let (needed, found) = (nodes.count(), of_nodes.len());
+                    Err(invalid(format!("{found} velocities and the tree has {needed} nodes")))
+                }
+                rows => Ok((0..rows as u32).filter_map(|row| surface.position(row)).collect()),
+            };
+        }
         let row = |&vertex: &u32| of_mesh.get(vertex as usize).map(|velocity| velocity.as_vec3());
         self.0.order.iter().map(row).collect::<Option<_>>().ok_or_else(|| {
             let (needed, found) = (self.0.vertices(), of_mesh.len());
@@ -179,9 +194,4 @@ fn view(bytes: &[u8]) -> Result<View<'_>, FormatError> {
         }
         narrow => narrow.map(View::Narrow),
     }
-}
-
-fn at_rest<I: Index>(tree: &dibs_nostd::Tree<'_, I>) -> PyResult<Vec<Vec3>> {
-    let rows = (0..tree.vertex_count()).map(|row| tree.rest_position(row));
-    rows.collect::<Option<_>>().ok_or_else(|| invalid("the tree has no rest shape; give positions"))
 }

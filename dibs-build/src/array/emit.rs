@@ -6,6 +6,7 @@ use std::path::Path;
 use dibs_nostd::format::{PathKind, Unit};
 use dibs_nostd::glam::{DVec3, Vec3};
 use dibs_nostd::modes::Modes;
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{FormatError, Index, Tree, TriangleRow};
 
 use crate::error::BuildError;
@@ -45,7 +46,7 @@ pub struct Summary {
     pub unmeasurable: u32,
     /// The vertices of the first of them, by the mesh's numbers.
     pub first_unmeasurable: Option<[u32; 3]>,
-    /// Whether radii were measured across triangles (else along edges).
+    /// Whether radii were measured across triangles (else along edges, or through a [volume](Self::volume)).
     pub surface_paths: bool,
     /// Roots: surfaces that share no vertex.
     pub roots: u32,
@@ -81,6 +82,22 @@ pub struct Summary {
     pub stack_bytes: usize,
     /// Its displacement modes, if any.
     pub modes: Option<ModesSummary>,
+    /// The volume that carries it, if any.
+    pub volume: Option<VolumeSummary>,
+}
+
+/// The size and cost of the volume that carries a tree's surface.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[non_exhaustive]
+pub struct VolumeSummary {
+    /// Nodes: rows of a frame.
+    pub nodes: u32,
+    /// Tetrahedra.
+    pub tetrahedra: u32,
+    /// Flash of nodes, tetrahedra and weights, part of the tree's.
+    pub flash_bytes: usize,
+    /// RAM of the nodes: `dibs_nostd::Frames`, two buffers of f32 positions, and their labels.
+    pub ram_bytes: usize,
 }
 
 /// The size and cost of a tree's modes. Lengths are in the mesh's unit.
@@ -260,7 +277,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         query_bytes_per_triangle: tree.query_bytes() as f64 / f64::from(tree.triangle_count()),
         adjacency_bytes: tree.adjacency_bytes(),
         flash_bytes: length,
-        ram_bytes: (24 * vertices as usize + 117).next_multiple_of(4),
+        ram_bytes: ram_of(vertices),
         stack_bytes: 8 * tree.stack() as usize,
         modes: Modes::of(tree).ok().map(|modes| ModesSummary {
             count: modes.count(),
@@ -271,7 +288,18 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
             flash_bytes: modes.flash_bytes(),
             flash_bytes_per_vertex: modes.flash_bytes() as f64 / f64::from(vertices),
         }),
+        volume: Nodes::of(tree).ok().map(|nodes| VolumeSummary {
+            nodes: nodes.count(),
+            tetrahedra: nodes.element_count(),
+            flash_bytes: nodes.flash_bytes(),
+            ram_bytes: ram_of(nodes.count()),
+        }),
     }
+}
+
+/// RAM of two buffers of so many rows.
+fn ram_of(rows: u32) -> usize {
+    (24 * rows as usize + 117).next_multiple_of(4)
 }
 
 fn labels<I: Index>(tree: &Tree<'_, I>) -> usize {

@@ -3,6 +3,7 @@
 use dibs_nostd::format::{
     CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, Unit, VERSION, field, section,
 };
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree};
 use glam::DVec3;
 
@@ -14,6 +15,7 @@ use crate::Mesh;
 use crate::construct::{Cluster, Content};
 use crate::error::BuildError;
 use crate::leaf::{self, StoredTriangle};
+use crate::nodes::{Embedding, encode};
 use crate::rest::LimitRatios;
 
 /// A tree in the order of its array.
@@ -87,6 +89,8 @@ pub(crate) struct Facts<'a> {
     pub with_adjacency: bool,
     /// One for each triangle of the mesh.
     pub labels: Option<&'a [u8]>,
+    /// The volume that carries the surface.
+    pub embedding: Option<&'a Embedding>,
 }
 
 /// The bytes of a tree, and the mesh vertex of each row.
@@ -161,6 +165,9 @@ pub(crate) fn flatten<I: Index>(
         let labels = flat.triangles.iter().map(|placed| labels[placed.triangle as usize]);
         sections.push((section::LABELS, labels.collect()));
     }
+    if let Some(embedding) = facts.embedding {
+        sections.push((section::COARSE_NODES, encode(embedding, facts.stretch, &order)?));
+    }
     let mut header = [0; HEADER_BYTES];
     header[..MAGIC.len()].copy_from_slice(&MAGIC);
     header[field::VERSION..][..2].copy_from_slice(&VERSION.to_le_bytes());
@@ -186,7 +193,10 @@ pub(crate) fn flatten<I: Index>(
     let sections: Vec<(u32, &[u8])> =
         sections.iter().map(|(kind, part)| (*kind, &part[..])).collect();
     let bytes = write(header, &sections)?;
-    Tree::<I>::from_bytes(&bytes)?;
+    let tree = Tree::<I>::from_bytes(&bytes)?;
+    if facts.embedding.is_some() {
+        Nodes::of(&tree)?;
+    }
     Ok((bytes, order))
 }
 

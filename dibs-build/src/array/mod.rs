@@ -10,5 +10,5 @@ mod module;
 mod sections;
 mod solids;
 
-pub use emit::{BuiltTree, ModesSummary, Summary, summarise};
+pub use emit::{BuiltTree, ModesSummary, Summary, VolumeSummary, summarise};
 pub(crate) use flatten::{Facts, flatten};

@@ -1,5 +1,6 @@
 //! Top-down construction: the triangles of each component become a tree of sections.
 
+mod embedded;
 mod paper;
 mod pin;
 mod section;
@@ -129,6 +130,9 @@ impl<'a> Constructor<'a> {
         start: u32,
         depth: u32,
     ) -> Result<Cluster, BuildError> {
+        if let Some(paths) = self.surface.volume {
+            return self.embedded(paths, section, depth);
+        }
         self.check_work()?;
         let mut searches = self.take_searches();
         searches.enter(section, around.map(|(around, ..)| around));

@@ -69,7 +69,7 @@ fn peel(surface: &Surface<'_>, section: &Section) -> [Vec<u32>; 2] {
 }
 
 /// Unit eigenvector of the largest eigenvalue of the points' covariance, by power iteration.
-fn main_axis(points: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
+pub(super) fn main_axis(points: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
     let count = points.clone().count() as f64;
     let mean = points.clone().sum::<DVec3>() / count;
     let mut covariance = DMat3::ZERO;

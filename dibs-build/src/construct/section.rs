@@ -2,6 +2,7 @@
 
 use crate::Mesh;
 use crate::geodesic::{Distances, Farthest, Graph};
+use crate::nodes::VolumePaths;
 
 /// The triangles below one node, and their vertices in ascending order.
 #[derive(Debug)]
@@ -21,12 +22,13 @@ impl Section {
 }
 
 /// The surface, shared by all sections of one build.
-#[derive(Debug)]
 pub(crate) struct Surface<'a> {
     pub mesh: &'a Mesh,
     pub graph: &'a Graph,
     /// Whether paths must stay inside the section (the paper) or may leave it.
     pub restricted: bool,
+    /// The paths through the volume that carries the surface, in place of those along it.
+    pub volume: Option<&'a VolumePaths<'a>>,
 }
 
 /// Most arcs, for each vertex of a section, that a search may look at for paths outside the section around it. A section

@@ -23,12 +23,21 @@ pub(crate) fn by_geodesic(
     // Vertices that no seed reached go to neither; an infinite distance must not make a NaN.
     let reached = |distance: f64| distance.min(f64::from(f32::MAX));
     let nearer = |v: u32| reached(first.get(v)) - reached(second.get(v));
-    let key = |t: u32| -> f64 { surface.mesh.triangles[t as usize].into_iter().map(nearer).sum() };
-    let keyed = section.triangles.iter().map(|&t| (key(t), t)).collect();
+    by_key(&surface.mesh.triangles, section, nearer, even)
+}
+
+/// Each triangle goes to the side of its vertices' key, by the sign of their sum.
+pub(super) fn by_key(
+    mesh: &[[u32; 3]],
+    section: &Section,
+    key: impl Fn(u32) -> f64,
+    even: bool,
+) -> [Vec<u32>; 2] {
+    let of = |t: u32| -> f64 { mesh[t as usize].into_iter().map(&key).sum() };
+    let keyed = section.triangles.iter().map(|&t| (of(t), t)).collect();
     let share = if even { 0.5 } else { LEAST_SHARE };
     let sides = at_zero(keyed, share);
     if section.triangles.len() <= MEND_BELOW && !even {
-        let mesh = &surface.mesh.triangles;
         let [left, right] = sides.map(|side| mainland(mesh, &side));
         [[left.0, right.1], [right.0, left.1]].map(|parts| {
             let mut side = parts.concat();

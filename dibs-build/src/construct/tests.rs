@@ -15,7 +15,7 @@ fn work(mesh: &Mesh, construction: Construction) -> (usize, bool) {
     let (paths, leaf) = if is_paper { (Paths::Edges, 1) } else { (Paths::default(), 8) };
     let graph = Graph::new(mesh, &topology, paths, &LimitRatios::default());
     let arcs: usize = (0..mesh.positions.len() as u32).map(|vertex| graph.arcs(vertex).len()).sum();
-    let surface = Surface { mesh, graph: &graph, restricted: is_paper };
+    let surface = Surface { mesh, graph: &graph, restricted: is_paper, volume: None };
     let constructor = Constructor::new(surface, construction, leaf, &|_| ());
     let is_refused = match constructor.run() {
         Ok(_) => false,

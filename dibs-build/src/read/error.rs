@@ -315,6 +315,22 @@ pub enum ReadErrorKind {
         /// Labels that there are.
         most: usize,
     },
+    /// A file that should hold a volume holds no tetrahedra, or other cells too.
+    #[error(
+        "{format} with {tetrahedra} tetrahedra and {others} other volume cells, where a volume of tetrahedra is needed: \
+         give a Gmsh (.msh) or VTK (.vtk, .vtu) file of straight tetrahedra alone, or --nodes lattice:NX,NY,NZ"
+    )]
+    NoVolume {
+        /// The file's format.
+        format: Format,
+        /// Its tetrahedra.
+        tetrahedra: usize,
+        /// Its other volume cells.
+        others: usize,
+    },
+    /// A volume that cannot carry a surface.
+    #[error(transparent)]
+    Volume(#[from] crate::nodes::VolumeError),
     /// The weld tolerance is not a length.
     #[error("the weld tolerance is {tolerance}; give a finite length of at least 0")]
     Tolerance {

@@ -232,6 +232,21 @@ pub(crate) fn frame(
     Ok((positions, raw.faces().map(<[u32]>::to_vec).collect()))
 }
 
+/// The nodes (mm) and tetrahedra of a volume file.
+pub(crate) fn volume(
+    path: &Path,
+    unit: Option<Unit>,
+) -> Result<(Vec<DVec3>, Vec<[u32; 4]>), ReadErrorKind> {
+    let (format, raw) = elements(file::whole(path)?, path, false)?;
+    if raw.other_cells > 0 || raw.tetrahedra.is_empty() {
+        let (tetrahedra, others) = (raw.tetrahedra.len(), raw.other_cells);
+        return Err(ReadErrorKind::NoVolume { format, tetrahedra, others });
+    }
+    let place = Place { unit: unit_of(format, raw.unit, unit)?, origin: DVec3::ZERO };
+    let nodes = raw.positions.iter().map(|&position| place.of(position)).collect();
+    Ok((nodes, raw.tetrahedra))
+}
+
 /// The format of a file, and its vertices and polygons, with their groups if asked for.
 pub(crate) fn elements(
     bytes: Vec<u8>,

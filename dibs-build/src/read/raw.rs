@@ -20,6 +20,9 @@ pub(crate) struct Raw {
     pub groups: Option<FaceGroups>,
     /// The unit of its lengths, where the file states it.
     pub unit: Option<Unit>,
+    /// Volume cells: the corners of tetrahedra, and the number of others.
+    pub tetrahedra: Vec<[u32; 4]>,
+    pub other_cells: usize,
     /// What was left out or interpreted: warnings.
     pub remarks: Vec<String>,
 }

@@ -98,6 +98,8 @@ impl Volumes {
         remedy: &str,
     ) -> Result<(), ReadErrorKind> {
         let count = self.cells.len() + self.curved;
+        raw.tetrahedra = self.tetrahedra();
+        raw.other_cells = count - raw.tetrahedra.len();
         if !raw.ends.is_empty() {
             raw.remark(
                 count,
@@ -119,6 +121,16 @@ impl Volumes {
             "volume cells and no triangles: the surface is their skin",
         );
         Ok(())
+    }
+
+    fn tetrahedra(&self) -> Vec<[u32; 4]> {
+        let mut rest = &self.corners[..];
+        let of = |&(shape, _): &(Shape, f64)| {
+            let (corners, after) = rest.split_at_checked(shape.corners())?;
+            rest = after;
+            <[u32; 4]>::try_from(corners).ok().filter(|_| shape == Shape::Tetrahedron)
+        };
+        self.cells.iter().filter_map(of).collect()
     }
 
     /// Adds the faces of one cell alone: each turned outwards, in the order of the cells.

@@ -157,12 +157,15 @@ impl MotionStretch {
 }
 
 /// The largest stretch of any triangle of a surface whose vertices stand in the order of the tree's rows, in f64; `None`
-/// where the tree has no rest shape, or a position is missing. [`MeasuredStretch`](dibs_nostd::MeasuredStretch) is a factor
+/// where the tree has no rest shape, a position is missing, or elements are stretched instead. [`MeasuredStretch`](dibs_nostd::MeasuredStretch) is a factor
 /// for the tree's radii instead: where triangles have their own limits, a triangle's stretch is divided by its limit there,
 /// and multiplied by the tree's.
 #[must_use]
 pub fn largest_stretch<I: Index>(tree: &Tree<'_, I>, rows: &[Vec3]) -> Option<f64> {
     let kind = tree.paths();
+    if kind == PathKind::Volume {
+        return None;
+    }
     let paths = if kind == PathKind::EdgePath { Paths::Edges } else { Paths::default() };
     let mut largest = 0.0;
     for row in 0..tree.triangle_count() {

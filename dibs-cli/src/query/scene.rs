@@ -6,10 +6,10 @@ use crate::mesh_file::Lengths;
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::Vec3;
-use dibs_build::{FrameCheck, largest_stretch};
+use dibs_build::{FrameCheck, SurfaceRows, largest_stretch};
 use dibs_nostd::{
     Contact, Contacts, Coverage, Index, MeasuredStretch, Options, Proximity, Query, StretchError,
-    Tool, Tree, measure_stretch,
+    Tool, Tree,
 };
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,7 @@ pub struct Surface<'a> {
     pub name: String,
     tree: AnyTree<'a>,
     /// In the order of the tree's rows.
-    positions: Vec<Vec3>,
+    rows: SurfaceRows,
     /// `None` where the tree has no rest metric to measure with.
     stretch: Option<f64>,
     options: Options,
@@ -38,13 +38,13 @@ impl<'a> Surface<'a> {
         limit: Option<f32>,
     ) -> Result<Self> {
         let tree = tree_file::validate(bytes, path)?;
-        let (positions, measured) = match &tree {
+        let (rows, measured) = match &tree {
             AnyTree::Narrow(tree) => measured(tree, path, vertices, frame, lengths)?,
             AnyTree::Wide(tree) => measured(tree, path, vertices, frame, lengths)?,
         };
         let largest = match &tree {
-            AnyTree::Narrow(tree) => largest_stretch(tree, &positions),
-            AnyTree::Wide(tree) => largest_stretch(tree, &positions),
+            AnyTree::Narrow(tree) => largest_stretch(tree, rows.positions()),
+            AnyTree::Wide(tree) => largest_stretch(tree, rows.positions()),
         };
         // Without a rest shape only the factor for radii is known, which is no smaller.
         let stretch = measured.map(|measured| largest.unwrap_or(measured.sigma().into()));
@@ -62,7 +62,7 @@ impl<'a> Surface<'a> {
             }
             options = options.stretch(measured);
         }
-        Ok(Self { name: name.to_string(), tree, positions, stretch, options })
+        Ok(Self { name: name.to_string(), tree, rows, stretch, options })
     }
 
     fn ask(&self, tool: &ToolSpec, margin: Option<f32>, room: &mut Room) -> Result<Found> {
@@ -103,7 +103,7 @@ impl<'a> Surface<'a> {
         margin: Option<f32>,
         room: &mut Room,
     ) -> Result<Found> {
-        let positions = self.positions.as_slice();
+        let positions = &self.rows;
         let mut query = Query::<I, STACK>::new(tree)?;
         let Some(margin) = margin else {
             return Ok(Found::new(query.closest(positions, tool, &self.options)?));
@@ -220,19 +220,18 @@ fn measured<I: Index>(
     vertices: Option<&PathBuf>,
     frame: Option<usize>,
     lengths: &Lengths,
-) -> Result<(Vec<Vec3>, Option<MeasuredStretch>)> {
+) -> Result<(SurfaceRows, Option<MeasuredStretch>)> {
     let name = path.display();
-    let positions = match vertices {
-        None => (0..tree.vertex_count())
-            .map(|row| tree.rest_position(row))
-            .collect::<Option<Vec<Vec3>>>()
+    let frame = match vertices {
+        None => SurfaceRows::rest_frame(tree)
             .ok_or_else(|| anyhow!("{name}: the tree has no rest shape, give --vertices"))?,
         Some(path) => current(tree, path, frame, lengths)?,
     };
     // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
-    match measure_stretch(tree, positions.as_slice()) {
-        Ok(measured) => Ok((positions, Some(measured))),
-        Err(StretchError::NoMetric) => Ok((positions, None)),
+    let rows = SurfaceRows::of(tree, frame).map_err(|error| anyhow!("{name}: {error}"))?;
+    match rows.stretch {
+        Ok(measured) => Ok((rows, Some(measured))),
+        Err(StretchError::NoMetric) => Ok((rows, None)),
         Err(error) => bail!(
             "{name}: {error}; build the tree with a larger --stretch, or with --limits that allow it"
         ),

@@ -9,7 +9,7 @@ use crate::{overwrite, recorded::tools};
 use anyhow::{Context, Result, bail, ensure};
 use dibs_build::glam::Vec3;
 use dibs_build::write_atomically;
-use dibs_nostd::{Index, Tree, measure_stretch};
+use dibs_nostd::{Index, PathKind, Tree, measure_stretch};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -96,6 +96,12 @@ fn read_page(path: &Path) -> Result<String> {
 
 /// The elements with the tree, the motion and the facts about them.
 fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<String> {
+    if tree.paths() == PathKind::Volume {
+        bail!(
+            "{}: a surface that nodes move cannot be shown; build it without --nodes",
+            args.tree.display()
+        );
+    }
     let (frames, rate) = match &args.motion {
         Some(path) => motion(args, tree, path)?,
         None => (Vec::new(), 1.0),

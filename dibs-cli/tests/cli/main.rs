@@ -12,6 +12,7 @@ mod formats;
 mod groups;
 mod labels;
 mod manners;
+mod nodes;
 mod overwrite;
 mod pace;
 mod program;

@@ -39,7 +39,7 @@ pub use surface::ModalSurface;
 use glam::Vec3;
 
 use crate::surface::MotionUnit;
-use crate::tree::{Index, Tree, format};
+use crate::tree::{Index, PathKind, Tree, format};
 
 /// Most modes of a surface.
 #[doc(hidden)]
@@ -106,14 +106,15 @@ impl<'a> Modes<'a> {
     /// [`ModesError`] names the first defect and its value.
     pub const fn of<I: Index>(tree: &Tree<'a, I>) -> Result<Self, ModesError> {
         let sections = tree.sections();
-        if sections.modes.is_empty() {
+        // A volume's section holds nodes.
+        if sections.coarse.is_empty() || matches!(tree.paths(), PathKind::Volume) {
             return Err(ModesError::Absent);
         }
         if sections.rest.is_empty() {
             return Err(ModesError::NoRestShape);
         }
         let vertices = tree.vertex_count();
-        match layout::parts(sections.modes, vertices, tree.triangle_count()) {
+        match layout::parts(sections.coarse, vertices, tree.triangle_count()) {
             Ok((header, [records, anchors, rows])) => Ok(Self {
                 header,
                 records,

@@ -165,7 +165,9 @@ impl ReceiveError {
             Self::TooFar { .. } => Event::TooFar,
             Self::Digest { .. } => Event::Digest,
             Self::Throttled { .. } => Event::Throttled,
-            Self::Stretch(StretchError::Shrunk { .. }) => Event::Shrunk,
+            Self::Stretch(StretchError::Shrunk { .. } | StretchError::ElementsShrunk { .. }) => {
+                Event::Shrunk
+            }
             Self::Stretch(StretchError::TooFast { .. }) => Event::TooFast,
             Self::Stretch(_) => Event::Stretch,
         }

@@ -31,7 +31,7 @@ pub(super) const U: f32 = 1.0 / 16_777_216.0;
 
 /// The least square that is measured, that of a half: more shrinking makes no search faster, and products do not
 /// underflow.
-pub(super) const LEAST: f32 = 0.25;
+pub(crate) const LEAST: f32 = 0.25;
 
 /// The largest squared stretch so far, relative to each triangle's limit, and its triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -181,12 +181,12 @@ pub(super) fn squared_stretch<M: Measure>(rest: &Squares, now: Edges, limit: f32
 }
 
 /// The square of a stretch limit, rounded down.
-pub(super) fn squared_limit(limit: f32) -> f32 {
+pub(crate) fn squared_limit(limit: f32) -> f32 {
     limit * limit * (1.0 - 2.0 * U)
 }
 
 /// The root of a square, rounded up.
-pub(super) fn root_up(squared: f32) -> f32 {
+pub(crate) fn root_up(squared: f32) -> f32 {
     sqrt(squared) * (1.0 + 4.0 * U)
 }
 

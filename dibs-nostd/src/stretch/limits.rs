@@ -19,9 +19,9 @@
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SurfaceLimits {
     pub(crate) reach: f32,
-    pub(super) speed: f32,
-    pub(super) recovery: f32,
-    pub(super) shrinkage: f32,
+    pub(crate) speed: f32,
+    pub(crate) recovery: f32,
+    pub(crate) shrinkage: f32,
 }
 
 impl SurfaceLimits {

@@ -17,10 +17,16 @@ use crate::tree::{Index, Tree, TriangleRow};
 
 pub use gate::{Admission, Compared, FrameExtent, Gate, IncomingSurface, NoGate};
 use kernel::Worst;
+#[cfg(feature = "nodes")]
+pub(crate) use kernel::{LEAST, root_up, squared_limit};
 pub use limits::SurfaceLimits;
 pub use monitor::StretchMonitor;
 #[cfg(feature = "bus")]
-pub(crate) use motion::{largest_change, largest_step};
+pub(crate) use motion::largest_change;
+#[cfg(any(feature = "bus", feature = "nodes"))]
+pub(crate) use motion::largest_step;
+#[cfg(feature = "nodes")]
+pub(crate) use motion::{farthest, too_fast};
 use regions::{of_regions, region_rows};
 
 /// Why a stretch could not be measured, or the limit that it exceeds.
@@ -30,7 +36,7 @@ use regions::{of_regions, region_rows};
 pub enum StretchError {
     /// The tree was emitted without its metric section.
     NoMetric,
-    /// The vertex table does not have one row for each of the tree's vertices.
+    /// The table does not have one row for each of the tree's vertices, or nodes.
     VertexCount {
         /// Rows that the tree needs.
         expected: u32,
@@ -44,6 +50,27 @@ pub enum StretchError {
         /// Its stretch; NaN or infinite if a position is, or if the triangle is too small at rest to be measured.
         stretch: f32,
         /// Its limit.
+        limit: f32,
+    },
+    /// An element is stretched beyond its limit: distances on this frame would be wrong.
+    ElementExceeded {
+        /// The element.
+        element: u32,
+        /// Its stretch; infinite if a node is not finite.
+        stretch: f32,
+        /// Its limit.
+        limit: f32,
+    },
+    /// An element is turned inside out, or flat.
+    Inverted {
+        /// The element.
+        element: u32,
+    },
+    /// A run of elements has shrunk below its limit: collapsed, or in another unit.
+    ElementsShrunk {
+        /// The first of them.
+        element: u32,
+        /// The least size allowed.
         limit: f32,
     },
     /// A region of the surface has shrunk below its limit: collapsed, or in another unit.
@@ -81,10 +108,17 @@ impl fmt::Display for StretchError {
         match *self {
             Self::NoMetric => write!(f, "the tree was emitted without its rest metric"),
             Self::VertexCount { expected, found } => {
-                write!(f, "the tree has {expected} vertices, the table {found}")
+                write!(f, "the tree needs a table of {expected} rows, this one has {found}")
             }
             Self::Exceeded { triangle, stretch, limit } => {
                 write!(f, "triangle {triangle} is stretched by {stretch}, the tree allows {limit}")
+            }
+            Self::ElementExceeded { element, stretch, limit } => {
+                write!(f, "element {element} is stretched by {stretch}, the tree allows {limit}")
+            }
+            Self::Inverted { element } => write!(f, "element {element} is inverted or flat"),
+            Self::ElementsShrunk { element, limit } => {
+                write!(f, "the elements from {element} on shrank below {limit} of their size")
             }
             Self::Shrunk { triangle, limit } => {
                 write!(f, "the region of triangle {triangle} shrank below {limit} of its size")

@@ -11,7 +11,7 @@ use crate::surface::{Millis, VertexTable};
 
 /// Most that a vertex may move in this time (mm), at this speed and never farther than `recovery`; infinite without
 /// either.
-pub(super) const fn farthest(speed: f32, recovery: f32, elapsed: Millis) -> f32 {
+pub(crate) const fn farthest(speed: f32, recovery: f32, elapsed: Millis) -> f32 {
     // One millisecond more than the time, because the clock counts whole ones.
     let way = speed * (elapsed.0 as f32 + 1.0);
     // A speed or distance of NaN refuses every frame.
@@ -70,7 +70,7 @@ pub(crate) fn largest_change<V: VertexTable + ?Sized>(
 
 /// Names the first of these rows that moved farther than `limit`.
 #[cold]
-pub(super) fn too_fast<V: VertexTable + ?Sized>(
+pub(crate) fn too_fast<V: VertexTable + ?Sized>(
     now: &V,
     before: &V,
     rows: Range<u32>,

@@ -43,6 +43,8 @@ pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
         (PathKind::EdgePath, _) => {
             run::<I, V, LongestEdge, 12>(tree, surface, rows, ready, worst, size)
         }
+        // Its elements are measured.
+        (PathKind::Volume, _) => Err(StretchError::NoMetric),
     }
 }
 
@@ -65,6 +67,7 @@ pub(super) fn look<I: Index, V: VertexTable + ?Sized>(
     let squared = match tree.paths() {
         PathKind::Surface => squared_stretch::<SingularValue>(&metric.squares, now, limit),
         PathKind::EdgePath => squared_stretch::<LongestEdge>(&metric.squares, now, limit),
+        PathKind::Volume => return true,
     };
     if squared > worst.squared && squared <= limit {
         *worst = Worst { squared, triangle: row };

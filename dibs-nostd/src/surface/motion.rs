@@ -327,6 +327,13 @@ impl Odometer {
         }
     }
 
+    /// An odometer for tables of other rows than the tree's vertices, which move at least as far as those.
+    #[cfg(feature = "nodes")]
+    pub(crate) const fn of_rows(unit: MotionUnit, rows: usize) -> Self {
+        let MotionUnit { unit, tree } = unit;
+        Self { unit, tree, vertices: rows, motion: None, digest: 0 }
+    }
+
     /// Starts anew with a frame.
     ///
     /// Cost: one pass over the vertices.

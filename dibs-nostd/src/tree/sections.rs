@@ -3,8 +3,8 @@
 //! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`] and of its `all`.
 
 use crate::tree::format::{
-    self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, ORIGIN_BYTES, SECTION_ALIGN, SECTION_BYTES,
-    SOLID_BYTES, node_bytes, section, triangle_bytes,
+    self, HEADER_BYTES, LIMIT_BYTES, METRIC_BYTES, ORIGIN_BYTES, PathKind, SECTION_ALIGN,
+    SECTION_BYTES, SOLID_BYTES, node_bytes, section, triangle_bytes,
 };
 use crate::tree::header::Header;
 use crate::tree::{FormatError, Index};
@@ -18,7 +18,8 @@ pub(crate) struct Sections<'a> {
     pub rest: &'a [u8],
     pub metric: &'a [u8],
     pub limits: &'a [u8],
-    pub modes: &'a [u8],
+    /// What moves the surface: modes, or the nodes of a tree with volume paths.
+    pub coarse: &'a [u8],
     pub adjacency: &'a [u8],
     pub origin: &'a [u8],
     pub labels: &'a [u8],
@@ -49,15 +50,21 @@ const COUNT: usize = 11;
 /// In the order of [`Sections`]' fields.
 const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
     let Header { vertices, triangles, nodes, origin, other_roots, .. } = *header;
+    let is_volume = matches!(header.paths, PathKind::Volume);
     [
         Rule::required(section::NODES, nodes, node_bytes::<I>()),
         Rule::required(section::TRIANGLES, triangles, triangle_bytes::<I>()),
         Rule::optional(section::VERTEX_ORDER, vertices, I::BYTES),
         Rule::optional(section::REST, vertices, 12),
-        Rule::optional(section::METRIC, triangles, METRIC_BYTES),
-        Rule::optional(section::LIMITS, triangles, LIMIT_BYTES),
-        // `Modes::of` checks it.
-        Rule { kind: section::MODES, length: None, required: false },
+        // Volumes have elements instead.
+        Rule::optional(section::METRIC, if is_volume { 0 } else { triangles }, METRIC_BYTES),
+        Rule::optional(section::LIMITS, if is_volume { 0 } else { triangles }, LIMIT_BYTES),
+        // `Modes::of` and `Nodes::of` check it.
+        Rule {
+            kind: if is_volume { section::COARSE_NODES } else { section::MODES },
+            length: None,
+            required: is_volume,
+        },
         Rule::optional(section::ADJACENCY, triangles, triangle_bytes::<I>()),
         // Where the header has none, the section must be absent or empty.
         Rule { required: origin == 1, ..Rule::optional(section::ORIGIN, origin, ORIGIN_BYTES) },
@@ -124,7 +131,7 @@ pub(crate) const fn find<'a, I: Index>(
         }
         slot += 1;
     }
-    let [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels, solids] =
+    let [nodes, triangles, order, rest, metric, limits, coarse, adjacency, origin, labels, solids] =
         parts;
     Ok(Sections {
         nodes,
@@ -133,7 +140,7 @@ pub(crate) const fn find<'a, I: Index>(
         rest,
         metric,
         limits,
-        modes,
+        coarse,
         adjacency,
         origin,
         labels,
@@ -151,13 +158,13 @@ impl<'a> Sections<'a> {
             rest,
             metric,
             limits,
-            modes,
+            coarse,
             adjacency,
             origin,
             labels,
             solids,
         } = *self;
-        [nodes, triangles, order, rest, metric, limits, modes, adjacency, origin, labels, solids]
+        [nodes, triangles, order, rest, metric, limits, coarse, adjacency, origin, labels, solids]
     }
 
     /// Checks that each section is still at its place in the bytes.

@@ -1,4 +1,4 @@
-//! The mesh's vertex of each row of the receiver's table.
+//! The mesh's vertex, or the volume's node, of each row of the receiver's table.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Index, SurfaceFacts, Tree};
@@ -18,13 +18,15 @@ pub struct SurfaceOrder {
 }
 
 impl SurfaceOrder {
-    /// The order of a tree: the receiver's, or one built from the same mesh in the same way.
+    /// The order of a tree: the receiver's, or one built from the same mesh in the same way. A tree with nodes is sent
+    /// these, in the order of the volume's file.
     #[must_use]
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
-        let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
-        let order = (0..tree.vertex_count()).map(number);
-        let (mesh_id, facts) = (tree.mesh_id(), tree.surface_facts());
-        Self { mesh_id, facts, order: order.collect(), check: Some(FrameCheck::of(tree)) }
+        let check = FrameCheck::of(tree);
+        let order = check.order().to_vec();
+        // Rows of a frame: the tree's vertices, or its nodes.
+        let facts = SurfaceFacts { vertices: order.len() as u32, ..tree.surface_facts() };
+        Self { mesh_id: tree.mesh_id(), facts, order, check: Some(check) }
     }
 
     /// An order from the mesh's vertex of each row of the vertex table. Unit and triangles are not known.

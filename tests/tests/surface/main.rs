@@ -1,6 +1,8 @@
 //! Surfaces that move: frames, stretch, modes, and the frames that are refused.
 
 mod as_configured;
+mod embedded;
+mod embedded_damaged;
 mod facts;
 mod frames;
 mod memory;

@@ -263,6 +263,7 @@ mod tests {
         match tree.paths() {
             PathKind::Surface => same_by::<I, SingularValue, CORNERS>(&tree, surface, range, worst),
             PathKind::EdgePath => same_by::<I, LongestEdge, CORNERS>(&tree, surface, range, worst),
+            PathKind::Volume => unreachable!("has no metric"),
         }
     }
 

@@ -135,7 +135,7 @@ pub mod section {
     pub const ORIGIN: u32 = 9;
     /// A label of every triangle, one byte (optional).
     pub const LABELS: u32 = 10;
-    /// Reserved: coarse nodes that carry the vertices, of an embedded surface.
+    /// Coarse nodes, their elements, and the vertices that they carry (of a tree with volume paths).
     pub const COARSE_NODES: u32 = 11;
     /// The first triangle and the solid of every root (of a tree with several roots and adjacency).
     pub const SOLIDS: u32 = 12;
@@ -154,6 +154,9 @@ pub enum PathKind {
     /// (deformation gradient against the rest shape, which counts as higher where a triangle is flat:
     /// see [`measure_stretch`](crate::measure_stretch)) exceeds `s`.
     Surface,
+    /// Through the elements of a volume that carries the surface: coverage holds while no element's largest singular
+    /// value exceeds `s`.
+    Volume,
 }
 
 impl PathKind {
@@ -163,6 +166,7 @@ impl PathKind {
         match self {
             Self::EdgePath => 0,
             Self::Surface => 1,
+            Self::Volume => 2,
         }
     }
 
@@ -170,6 +174,7 @@ impl PathKind {
         match code {
             0 => Some(Self::EdgePath),
             1 => Some(Self::Surface),
+            2 => Some(Self::Volume),
             _ => None,
         }
     }

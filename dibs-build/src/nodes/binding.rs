@@ -1,0 +1,240 @@
+//! The binding of a surface's vertices to the tetrahedra of a volume.
+
+use dibs_nostd::nodes::WHOLE;
+use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::paths::VolumePaths;
+use super::{Volume, VolumeError};
+use crate::Mesh;
+
+/// A surface bound to a volume: for each vertex its tetrahedron, and the weights of its nodes.
+#[derive(Debug)]
+pub(crate) struct Embedding {
+    /// The nodes as a tree stores them.
+    pub nodes: Vec<Vec3>,
+    /// The tetrahedra in the order of their latest nodes, which is that in which frames arrive.
+    pub tetrahedra: Vec<[u32; 4]>,
+    pub is_box: bool,
+    pub vertices: Vec<Bound>,
+    /// Largest distance of a vertex from its position in the mesh (mm): that of the weights' rounding.
+    pub error: f64,
+}
+
+/// A bound vertex.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bound {
+    pub tetrahedron: u32,
+    /// They sum up to [`WHOLE`]; the first three are below it.
+    pub weights: [u32; 4],
+}
+
+impl Bound {
+    /// Of a vertex that nothing reads.
+    const NONE: Self = Self { tetrahedron: 0, weights: [0, 0, 0, WHOLE] };
+}
+
+impl Embedding {
+    /// Binds each vertex of the mesh.
+    pub fn new(volume: &Volume, mesh: &Mesh) -> Result<Self, VolumeError> {
+        let nodes: Vec<Vec3> =
+            volume.nodes().iter().map(|&node| (node - mesh.origin).as_vec3()).collect();
+        let mut tetrahedra = volume.tetrahedra().to_vec();
+        tetrahedra.sort_by_key(|corners| corners.iter().copied().max());
+        let cells: Vec<Cell> =
+            tetrahedra.iter().map(|&corners| Cell::new(&nodes, corners)).collect();
+        let grid = Grid::new(&cells);
+        // A vertex of no triangle may be anywhere.
+        let mut is_used = vec![false; mesh.positions.len()];
+        mesh.triangles.iter().flatten().for_each(|&vertex| is_used[vertex as usize] = true);
+        let bind = |(position, is_used): (&Vec3, &bool)| match is_used {
+            true => grid.bind(&cells, position.as_dvec3()),
+            false => Ok(Bound::NONE),
+        };
+        let bound: Vec<Result<Bound, f64>> =
+            mesh.positions.par_iter().zip(&is_used).map(bind).collect();
+        if let Some(first) = bound.iter().position(Result::is_err) {
+            let outside = bound.iter().filter_map(|bound| bound.err());
+            let (count, distance) =
+                outside.fold((0, 0.0), |(count, far), at| (count + 1, f64::max(far, at)));
+            return Err(VolumeError::Outside { count, first, distance });
+        }
+        let vertices: Vec<Bound> = bound.into_iter().flatten().collect();
+        let mut embedding =
+            Self { nodes, tetrahedra, is_box: volume.is_box(), vertices, error: 0.0 };
+        let moved = mesh.positions.iter().zip(embedding.positions());
+        let moved = moved.map(|(position, at)| position.as_dvec3().distance(at));
+        let moved = moved.zip(is_used).filter(|(_, is_used)| *is_used);
+        embedding.error = moved.map(|(moved, _)| moved).fold(0.0, f64::max);
+        Ok(embedding)
+    }
+
+    /// The vertices at rest as the weights give them.
+    pub fn positions(&self) -> impl Iterator<Item = DVec3> {
+        self.vertices.iter().map(|bound| {
+            let corners = self.tetrahedra[bound.tetrahedron as usize];
+            let terms = corners.into_iter().zip(bound.weights);
+            let sum: DVec3 = terms
+                .map(|(node, weight)| self.nodes[node as usize].as_dvec3() * f64::from(weight))
+                .sum();
+            sum / f64::from(WHOLE)
+        })
+    }
+
+    /// The same surface with these rest positions.
+    pub fn mesh(&self, mesh: &Mesh) -> Mesh {
+        let positions = self.positions().map(DVec3::as_vec3).collect();
+        Mesh { origin: mesh.origin, positions, triangles: mesh.triangles.clone() }
+    }
+
+    /// The distances through the volume.
+    pub fn paths(&self) -> VolumePaths<'_> {
+        VolumePaths::new(self)
+    }
+}
+
+/// A tetrahedron for the location of points.
+#[derive(Debug)]
+pub(super) struct Cell {
+    pub corners: [DVec3; 4],
+    /// From a position less the first corner to the weights of the others.
+    inverse: DMat3,
+}
+
+impl Cell {
+    pub fn new(nodes: &[Vec3], corners: [u32; 4]) -> Self {
+        let corners = corners.map(|node| nodes[node as usize].as_dvec3());
+        let [a, b, c, d] = corners;
+        Self { corners, inverse: DMat3::from_cols(b - a, c - a, d - a).inverse() }
+    }
+
+    /// The barycentric coordinates of a position.
+    pub fn weights(&self, position: DVec3) -> [f64; 4] {
+        let DVec3 { x, y, z } = self.inverse * (position - self.corners[0]);
+        [1.0 - x - y - z, x, y, z]
+    }
+
+    fn bounds(&self) -> [DVec3; 2] {
+        let [a, b, c, d] = self.corners;
+        [a.min(b).min(c).min(d), a.max(b).max(c).max(d)]
+    }
+
+    /// The distance of a position outside.
+    fn distance(&self, position: DVec3) -> f64 {
+        let [a, b, c, d] = self.corners;
+        let faces = [[a, b, c], [a, b, d], [a, c, d], [b, c, d]];
+        faces.iter().map(|face| to_triangle(position, *face)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The tetrahedra near each place.
+struct Grid {
+    low: DVec3,
+    /// Cells a millimetre.
+    per_mm: DVec3,
+    size: [usize; 3],
+    /// The tetrahedra whose box meets each cell.
+    cells: Vec<Vec<u32>>,
+}
+
+impl Grid {
+    fn new(tetrahedra: &[Cell]) -> Self {
+        let bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let [low, high] = tetrahedra
+            .iter()
+            .map(Cell::bounds)
+            .fold(bounds, |[low, high], [a, b]| [low.min(a), high.max(b)]);
+        let side = (tetrahedra.len() as f64).cbrt().ceil().max(1.0);
+        let per_mm = DVec3::splat(side) / (high - low);
+        let size = [side as usize; 3];
+        let mut grid = Self { low, per_mm, size, cells: vec![Vec::new(); size.iter().product()] };
+        for (number, cell) in (0..).zip(tetrahedra) {
+            let [from, to] = cell.bounds().map(|corner| grid.place(corner));
+            for z in from[2]..=to[2] {
+                for y in from[1]..=to[1] {
+                    for x in from[0]..=to[0] {
+                        let at = grid.row([x, y, z]);
+                        grid.cells[at].push(number);
+                    }
+                }
+            }
+        }
+        grid
+    }
+
+    fn place(&self, position: DVec3) -> [usize; 3] {
+        let at = ((position - self.low) * self.per_mm).to_array();
+        let mut place = [0; 3];
+        for (axis, place) in place.iter_mut().enumerate() {
+            *place = (at[axis].max(0.0) as usize).min(self.size[axis] - 1);
+        }
+        place
+    }
+
+    const fn row(&self, [x, y, z]: [usize; 3]) -> usize {
+        x + self.size[0] * (y + self.size[1] * z)
+    }
+
+    /// The binding of a position, or its distance from the volume.
+    fn bind(&self, tetrahedra: &[Cell], position: DVec3) -> Result<Bound, f64> {
+        let near = &self.cells[self.row(self.place(position))];
+        let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
+        let weights = near.iter().map(|&at| (at, tetrahedra[at as usize].weights(position)));
+        let inner = weights.max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)).then(b.0.cmp(&a.0)));
+        match inner {
+            Some((tetrahedron, weights)) if least(&weights) >= -OUTSIDE => {
+                Ok(Bound { tetrahedron, weights: rounded(weights) })
+            }
+            _ => {
+                let nearer = |nearest: f64, cell: &Cell| {
+                    let [low, high] = cell.bounds();
+                    let is_far = position.clamp(low, high).distance(position) >= nearest;
+                    if is_far { nearest } else { nearest.min(cell.distance(position)) }
+                };
+                Err(tetrahedra.iter().fold(f64::INFINITY, nearer))
+            }
+        }
+    }
+}
+
+/// A vertex is not outside by less than a weight's unit.
+const OUTSIDE: f64 = 1.0 / WHOLE as f64;
+
+/// Barycentric coordinates as integers with an exact sum, each off by one at most.
+fn rounded(weights: [f64; 4]) -> [u32; 4] {
+    let exact = weights.map(|weight| weight.clamp(0.0, 1.0) * f64::from(WHOLE));
+    let mut rounded = exact.map(|weight| weight as u32);
+    let mut order = [0, 1, 2, 3];
+    order.sort_by(|&i, &j| exact[j].fract().total_cmp(&exact[i].fract()));
+    for at in order.into_iter().cycle().take(16) {
+        let sum: u32 = rounded.iter().sum();
+        match sum.cmp(&WHOLE) {
+            std::cmp::Ordering::Less => rounded[at] += 1,
+            std::cmp::Ordering::Equal => break,
+            std::cmp::Ordering::Greater => rounded[at] = rounded[at].saturating_sub(1),
+        }
+    }
+    // A stored weight has 16 bits.
+    for at in 0..3 {
+        if rounded[at] == WHOLE {
+            (rounded[at], rounded[3]) = (WHOLE - 1, 1);
+        }
+    }
+    rounded
+}
+
+/// The distance of a point from a triangle.
+fn to_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let to_edge = |a: DVec3, b: DVec3| {
+        let along = (b - a).dot(p - a) / (b - a).length_squared();
+        p.distance(a + (b - a) * along.clamp(0.0, 1.0))
+    };
+    let normal = (b - a).cross(c - a);
+    let is_over = [[a, b], [b, c], [c, a]]
+        .iter()
+        .all(|[from, to]| (*to - *from).cross(p - *from).dot(normal) >= 0.0);
+    if is_over && normal != DVec3::ZERO {
+        return (p - a).dot(normal).abs() / normal.length();
+    }
+    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+}

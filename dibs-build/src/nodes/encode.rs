@@ -1,0 +1,139 @@
+//! The nodes of a tree as bytes: section 11 of `dibs-nostd`'s `docs/format.md`.
+
+use dibs_nostd::nodes::{LEAST_VOLUME, MARGIN};
+use glam::{DMat3, DVec3};
+
+use super::VolumeError;
+use super::binding::Embedding;
+use super::volume::edges;
+use crate::rounding::{round_down, round_up};
+
+/// The section of a tree with this stretch limit, whose rows hold the mesh vertices `order`.
+pub(crate) fn encode(
+    embedding: &Embedding,
+    stretch: f32,
+    order: &[u32],
+) -> Result<Vec<u8>, VolumeError> {
+    let shapes = shapes(embedding, stretch)?;
+    let longest = shapes.iter().map(Shape::longest).fold(0.0, f64::max);
+    let mut bytes = Vec::new();
+    bytes.extend((embedding.nodes.len() as u32).to_le_bytes());
+    bytes.extend((shapes.len() as u32).to_le_bytes());
+    bytes.extend(round_up(embedding.paths().extent(shapes[0].corners[0])).to_le_bytes());
+    bytes.extend(round_up(longest).to_le_bytes());
+    bytes.resize(32, 0);
+    for node in &embedding.nodes {
+        node.to_array().into_iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    }
+    for shape in &shapes {
+        shape.corners.into_iter().for_each(|node| bytes.extend((node as u16).to_le_bytes()));
+        shape.numbers(stretch).into_iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    }
+    for &vertex in order {
+        let bound = &embedding.vertices[vertex as usize];
+        bytes.extend((bound.tetrahedron as u16).to_le_bytes());
+        // The weights of the corners in the order in which the check has them.
+        let corners = embedding.tetrahedra[bound.tetrahedron as usize];
+        let of =
+            |node: u32| (0..4).find(|&at| corners[at] == node).map_or(0, |at| bound.weights[at]);
+        let [a, b, c, _] = shapes[bound.tetrahedron as usize].corners;
+        [a, b, c].into_iter().for_each(|node| bytes.extend((of(node) as u16).to_le_bytes()));
+    }
+    Ok(bytes)
+}
+
+/// The least stretch limit that the controller's check tells from the rest shape.
+pub(crate) fn least_limit(embedding: &Embedding) -> Result<f64, VolumeError> {
+    let shapes = shapes(embedding, 1.0)?;
+    let least = |shape: &Shape| (1.0 + 3.0 * MARGIN / shape.openness).sqrt();
+    Ok(shapes.iter().map(least).fold(1.0, f64::max) * (1.0 + 1.0 / 65_536.0))
+}
+
+/// A tetrahedron at rest.
+struct Shape {
+    corners: [u32; 4],
+    /// Its edges along the path through the corners.
+    edges: DMat3,
+    /// The least eigenvalue of the edges' products, scaled to a diagonal of ones.
+    openness: f64,
+}
+
+/// The path through the corners is the one whose edges are nearest to orthogonal.
+fn shapes(embedding: &Embedding, stretch: f32) -> Result<Vec<Shape>, VolumeError> {
+    let possible = LEAST_SQUARED..=LARGEST_SQUARED / f64::from(stretch).powi(2);
+    let shape = |(tetrahedron, &corners): (usize, &[u32; 4])| {
+        let at = |order: [usize; 4]| {
+            let corners = order.map(|at| corners[at]);
+            let edges = edges(corners.map(|node| embedding.nodes[node as usize].as_dvec3()));
+            Shape { corners, edges, openness: openness(edges) }
+        };
+        let shape =
+            PATHS.map(at).into_iter().reduce(|a, b| if b.openness > a.openness { b } else { a });
+        let shape = shape.filter(|shape| {
+            let volume = f64::from(shape.numbers(stretch)[6]) * 2.0;
+            shape.openness >= FLAT
+                && shape.edges.determinant() > volume
+                && shape.squares().iter().all(|square| possible.contains(square))
+        });
+        shape.ok_or(VolumeError::Shape { tetrahedron })
+    };
+    embedding.tetrahedra.iter().enumerate().map(shape).collect()
+}
+
+/// Even orders of the corners, of the two directions of each path one.
+const PATHS: [[usize; 4]; 6] =
+    [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 0, 3, 2], [1, 2, 0, 3], [2, 0, 1, 3]];
+
+/// Squares of edges within which the check's products neither overflow nor underflow.
+const LEAST_SQUARED: f64 = 1e-4;
+const LARGEST_SQUARED: f64 = 1e8;
+
+/// The least openness of a tetrahedron: the check overestimates the stretch by one or two parts in a hundred there.
+const FLAT: f64 = 1e-4;
+
+impl Shape {
+    fn squares(&self) -> [f64; 3] {
+        self.columns().map(DVec3::length_squared)
+    }
+
+    const fn columns(&self) -> [DVec3; 3] {
+        [self.edges.x_axis, self.edges.y_axis, self.edges.z_axis]
+    }
+
+    /// The longest of its six edges.
+    fn longest(&self) -> f64 {
+        let [a, b, c] = self.columns();
+        [a, b, c, a + b, b + c, a + b + c].map(DVec3::length).into_iter().fold(0.0, f64::max)
+    }
+
+    /// What the check compares: the edges' products, made smaller by its largest rounding, and the least volume.
+    fn numbers(&self, stretch: f32) -> [f32; 7] {
+        let scale = 1.0 / (1.0 + MARGIN / self.openness);
+        let [a, b, c] = self.columns();
+        let own = |edge: DVec3| round_down(edge.length_squared() * scale);
+        let of = |one: DVec3, other: DVec3| (one.dot(other) * scale) as f32;
+        let lengths = a.length() * b.length() * c.length();
+        let least = LEAST_VOLUME * f64::from(stretch).powi(3) * lengths;
+        [own(a), of(a, b), of(a, c), own(b), of(b, c), own(c), round_up(least)]
+    }
+}
+
+/// The least eigenvalue of the products of edges scaled to unit length: the square of their least singular value.
+fn openness(edges: DMat3) -> f64 {
+    let unit = DMat3::from_cols(
+        edges.x_axis.normalize_or_zero(),
+        edges.y_axis.normalize_or_zero(),
+        edges.z_axis.normalize_or_zero(),
+    );
+    // The largest eigenvalue of the inverse by squaring it; its Frobenius norm is not below that.
+    let mut inverse = (unit.transpose() * unit).inverse();
+    let mut scale = 0.0;
+    for power in 0..6 {
+        let size = inverse.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+        scale += size.ln() / f64::from(1 << power);
+        inverse *= 1.0 / size;
+        inverse = inverse * inverse;
+    }
+    let least = (-scale).exp();
+    if least.is_finite() { least } else { 0.0 }
+}

@@ -1,0 +1,11 @@
+//! Volumes of tetrahedra whose nodes move a surface: [`Builder::nodes`](crate::Builder::nodes).
+
+mod binding;
+mod encode;
+mod paths;
+mod volume;
+
+pub(crate) use binding::Embedding;
+pub(crate) use encode::{encode, least_limit};
+pub(crate) use paths::VolumePaths;
+pub use volume::{Volume, VolumeError};

@@ -1,0 +1,199 @@
+//! Lengths of paths through a volume: no vertex is farther from a pin than the largest stretch times such a length.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+
+use glam::DVec3;
+
+use super::binding::{Cell, Embedding};
+
+/// The distances between vertices, straight where a line stays in the volume, else along its edges.
+///
+/// Both are upper bounds on the shortest path: each part of a path lies in one tetrahedron.
+pub(crate) struct VolumePaths<'e> {
+    embedding: &'e Embedding,
+    /// The vertices at rest.
+    positions: Vec<DVec3>,
+    cells: Vec<Cell>,
+    /// The tetrahedron across the face that lacks each corner.
+    across: Vec<[Option<u32>; 4]>,
+    /// The nodes at the other ends of each node's edges.
+    neighbours: Vec<Vec<u32>>,
+}
+
+/// Far more than the rounding of a length in f64.
+const ROUNDED_UP: f64 = 1.0 + 1e-9;
+
+/// More than the rounding of a point's place on a line, and far less than a length that matters.
+const ASTRAY: f64 = 1e-12;
+
+/// Most tetrahedra of a straight line: a line that runs along a face may turn back.
+const MOST_CROSSED: usize = 256;
+
+impl<'e> VolumePaths<'e> {
+    pub fn new(embedding: &'e Embedding) -> Self {
+        let (nodes, tetrahedra) = (&embedding.nodes, &embedding.tetrahedra);
+        let positions = embedding.positions().collect();
+        if embedding.is_box {
+            let (cells, across, neighbours) = Default::default();
+            return Self { embedding, positions, cells, across, neighbours };
+        }
+        let mut neighbours = vec![Vec::new(); nodes.len()];
+        for corners in tetrahedra {
+            for &node in corners {
+                neighbours[node as usize].extend(corners.iter().filter(|&&other| other != node));
+            }
+        }
+        for neighbours in &mut neighbours {
+            neighbours.sort_unstable();
+            neighbours.dedup();
+        }
+        let cells = tetrahedra.iter().map(|&corners| Cell::new(nodes, corners)).collect();
+        Self { embedding, positions, cells, across: across(tetrahedra), neighbours }
+    }
+
+    /// Whether every straight line is a path.
+    pub const fn is_straight_everywhere(&self) -> bool {
+        self.embedding.is_box
+    }
+
+    /// Position of a vertex at rest.
+    pub fn position(&self, vertex: u32) -> DVec3 {
+        self.positions[vertex as usize]
+    }
+
+    /// The distance of each of these vertices from another one.
+    pub fn distances(&self, from: u32, to: &[u32]) -> Vec<f64> {
+        let start = self.position(from);
+        let straight = |&vertex: &u32| self.position(vertex).distance(start) * ROUNDED_UP;
+        if self.embedding.is_box {
+            return to.iter().map(straight).collect();
+        }
+        let mut distances: Vec<f64> = to
+            .iter()
+            .map(|vertex| if self.is_straight(from, *vertex) { straight(vertex) } else { f64::NAN })
+            .collect();
+        let around = to.iter().zip(&distances).filter(|(_, distance)| distance.is_nan());
+        let mut wanted: Vec<u32> = around.flat_map(|(&vertex, _)| self.corners(vertex)).collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        if wanted.is_empty() {
+            return distances;
+        }
+        let starts = self.corners(from).map(|node| (node, self.node(node).distance(start)));
+        let along = self.along_edges(&starts, &wanted);
+        for (&vertex, distance) in to.iter().zip(&mut distances) {
+            if distance.is_nan() {
+                let end = self.position(vertex);
+                let ways =
+                    self.corners(vertex).map(|node| along[&node] + self.node(node).distance(end));
+                *distance = ways.into_iter().fold(f64::INFINITY, f64::min) * ROUNDED_UP;
+            }
+        }
+        distances
+    }
+
+    /// The length of a path from a node of a tetrahedron to the farthest of another one.
+    pub fn extent(&self, from: u32) -> f64 {
+        let nodes = &self.embedding.nodes;
+        let first = self.node(from);
+        if self.embedding.is_box {
+            return nodes.iter().map(|node| node.as_dvec3().distance(first)).fold(0.0, f64::max)
+                * ROUNDED_UP;
+        }
+        // Of nodes that tetrahedra have; others carry nothing.
+        let used = (0..).zip(&self.neighbours).filter(|(_, at)| !at.is_empty());
+        let used: Vec<u32> = used.map(|(node, _)| node).collect();
+        let along = self.along_edges(&[(from, 0.0)], &used);
+        along.values().copied().fold(0.0, f64::max) * ROUNDED_UP
+    }
+
+    fn corners(&self, vertex: u32) -> [u32; 4] {
+        let bound = &self.embedding.vertices[vertex as usize];
+        self.embedding.tetrahedra[bound.tetrahedron as usize]
+    }
+
+    fn node(&self, node: u32) -> DVec3 {
+        self.embedding.nodes[node as usize].as_dvec3()
+    }
+
+    /// Whether the straight line between two vertices is known to stay in the volume.
+    fn is_straight(&self, from: u32, to: u32) -> bool {
+        let [start, end] =
+            [from, to].map(|vertex| self.embedding.vertices[vertex as usize].tetrahedron);
+        let [a, b] = [from, to].map(|vertex| self.position(vertex));
+        let (mut at, mut before, mut passed) = (start, None, 0.0);
+        for _ in 0..MOST_CROSSED {
+            if at == end {
+                return true;
+            }
+            let cell = &self.cells[at as usize];
+            let (here, there) = (cell.weights(a), cell.weights(b));
+            // The first face that the line leaves through.
+            let leaves = (0..4).filter(|&corner| {
+                there[corner] < 0.0 && self.across[at as usize][corner] != before.or(Some(u32::MAX))
+            });
+            let part = |corner: usize| here[corner] / (here[corner] - there[corner]);
+            let Some(out) = leaves.min_by(|&i, &j| part(i).total_cmp(&part(j))) else {
+                // The end is in this tetrahedron, too.
+                return there.iter().all(|&weight| weight >= 0.0);
+            };
+            // A line through an edge or a corner may go astray by rounding.
+            let is_ahead = part(out) >= passed - ASTRAY && here[out] >= -ASTRAY;
+            let (true, Some(next)) = (is_ahead, self.across[at as usize][out]) else {
+                return false;
+            };
+            (at, before, passed) = (next, Some(at), part(out));
+        }
+        false
+    }
+
+    /// Dijkstra's distances of nodes along the volume's edges, until all `wanted` are known.
+    fn along_edges(&self, starts: &[(u32, f64)], wanted: &[u32]) -> HashMap<u32, f64> {
+        let mut found: HashMap<u32, f64> =
+            wanted.iter().map(|&node| (node, f64::INFINITY)).collect();
+        let mut left = wanted.len();
+        let mut known: HashMap<u32, f64> = HashMap::new();
+        // Lengths are not negative, so their bits are in their order.
+        let mut heap: BinaryHeap<Reverse<(u64, u32)>> =
+            starts.iter().map(|&(node, length)| Reverse((length.to_bits(), node))).collect();
+        while let Some(Reverse((bits, node))) = heap.pop() {
+            if known.contains_key(&node) {
+                continue;
+            }
+            let length = f64::from_bits(bits);
+            known.insert(node, length);
+            if let Some(found) = found.get_mut(&node) {
+                *found = length;
+                left -= 1;
+                if left == 0 {
+                    break;
+                }
+            }
+            for &next in &self.neighbours[node as usize] {
+                if !known.contains_key(&next) {
+                    let length = length + self.node(node).distance(self.node(next));
+                    heap.push(Reverse((length.to_bits(), next)));
+                }
+            }
+        }
+        found
+    }
+}
+
+/// The tetrahedron across the face that lacks each corner.
+fn across(tetrahedra: &[[u32; 4]]) -> Vec<[Option<u32>; 4]> {
+    let mut sides: HashMap<[u32; 3], (u32, usize)> = HashMap::new();
+    let mut across = vec![[None; 4]; tetrahedra.len()];
+    for (number, corners) in (0..).zip(tetrahedra) {
+        for lacking in 0..4 {
+            let mut face = [0, 1, 2].map(|at| corners[(lacking + 1 + at) % 4]);
+            face.sort_unstable();
+            if let Some((other, corner)) = sides.insert(face, (number, lacking)) {
+                across[number as usize][lacking] = Some(other);
+                across[other as usize][corner] = Some(number);
+            }
+        }
+    }
+    across
+}

@@ -1,0 +1,237 @@
+//! A volume of tetrahedra, checked.
+
+use dibs_nostd::nodes::{MAX_ELEMENTS, MAX_NODES};
+use glam::{DMat3, DVec3, UVec3};
+
+use crate::Mesh;
+
+/// A coarse model: nodes, and tetrahedra that carry a surface. The nodes of its frames are in the order of these.
+///
+/// ```
+/// use dibs_build::{Volume, generate};
+/// let heart = generate::heart(320)?.mesh;
+/// let lattice = Volume::lattice(&heart, [3, 3, 3])?;
+/// assert_eq!((lattice.nodes().len(), lattice.tetrahedra().len()), (64, 162));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Volume {
+    nodes: Vec<DVec3>,
+    tetrahedra: Vec<[u32; 4]>,
+    /// Whether the tetrahedra fill a box, so that every straight line in it is a path through them.
+    is_box: bool,
+}
+
+/// Why a volume cannot carry a surface.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum VolumeError {
+    /// Too many or no tetrahedra or nodes.
+    #[error(
+        "the volume has {nodes} nodes and {tetrahedra} tetrahedra: a tree holds 4 to {MAX_NODES} and 1 to {MAX_ELEMENTS}; \
+         mesh it coarser"
+    )]
+    Size {
+        /// Nodes.
+        nodes: usize,
+        /// Tetrahedra.
+        tetrahedra: usize,
+    },
+    /// A tetrahedron names a node that does not exist.
+    #[error("tetrahedron {tetrahedron} uses node {node}, the volume has {nodes} nodes")]
+    Corner {
+        /// The tetrahedron.
+        tetrahedron: usize,
+        /// The node it names.
+        node: u32,
+        /// Nodes of the volume.
+        nodes: usize,
+    },
+    /// A node has a coordinate that is not finite.
+    #[error("node {node} has a coordinate that is not a finite number")]
+    Coordinate {
+        /// The node.
+        node: usize,
+    },
+    /// Tetrahedra whose nodes are numbered inside out, or which are mirrored.
+    #[error(
+        "{count} tetrahedra are inverted at rest (the first is {first}): exchange two nodes of each, or mend the mesh"
+    )]
+    Inverted {
+        /// Their number.
+        count: usize,
+        /// The first of them.
+        first: usize,
+    },
+    /// A tetrahedron so flat, small or large that its stretch cannot be measured in f32.
+    #[error(
+        "tetrahedron {tetrahedron} is too flat, small or large for the controller's stretch check: mesh the volume again, \
+         with edges of 0.01 mm to 10 m"
+    )]
+    Shape {
+        /// The tetrahedron.
+        tetrahedron: usize,
+    },
+    /// Parts that no face, edge or node joins.
+    #[error("the volume has {parts} parts that share no node: join them, or build a tree for each")]
+    Apart {
+        /// Their number.
+        parts: usize,
+    },
+    /// Vertices of the surface that are in no tetrahedron.
+    #[error(
+        "{count} vertices of the surface are outside the volume (the first is {first}), the farthest by {distance:.3} mm: \
+         give a volume that holds the surface, in its unit and coordinates"
+    )]
+    Outside {
+        /// Their number.
+        count: usize,
+        /// The first of them.
+        first: usize,
+        /// The largest distance from the volume (mm).
+        distance: f64,
+    },
+    /// A lattice without cells, or with too many.
+    #[error(
+        "a lattice of {0} x {1} x {2} cells cannot be stored: 1 to 10,922 cells in all are possible", cells[0], cells[1],
+        cells[2]
+    )]
+    Cells {
+        /// Cells along each axis.
+        cells: [u32; 3],
+    },
+}
+
+impl Volume {
+    /// A volume of these nodes, in millimetres and the coordinates of the surface's file, and tetrahedra of them. Seen from
+    /// the fourth node of each, the first three run counterclockwise backwards: as VTK and Gmsh number them.
+    ///
+    /// # Errors
+    /// [`VolumeError`] names the first defect.
+    pub fn new(nodes: Vec<DVec3>, tetrahedra: Vec<[u32; 4]>) -> Result<Self, VolumeError> {
+        let volume = Self { nodes, tetrahedra, is_box: false };
+        volume.check().map(|()| volume)
+    }
+
+    /// A lattice of cells around a mesh, cut in six tetrahedra each, with a margin of a thousandth of its size.
+    ///
+    /// # Errors
+    /// [`VolumeError::Cells`] for no cells, or too many; [`VolumeError::Shape`] for cells too small.
+    pub fn lattice(mesh: &Mesh, cells: [u32; 3]) -> Result<Self, VolumeError> {
+        let bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        // Vertices of no triangle may be anywhere.
+        let corners = mesh.triangles.iter().flatten();
+        let positions = corners.filter_map(|&vertex| mesh.positions.get(vertex as usize));
+        let [low, high] = positions.fold(bounds, |[low, high], position| {
+            let position = position.as_dvec3();
+            [low.min(position), high.max(position)]
+        });
+        let product = |added: u64| {
+            let along = cells.iter().map(|&cells| u64::from(cells) + added);
+            along.fold(1, u64::saturating_mul)
+        };
+        let (count, nodes) = (product(0), product(1));
+        let is_possible = (1..=u64::from(MAX_ELEMENTS / 6)).contains(&count);
+        if !is_possible || nodes > u64::from(MAX_NODES) || !(low.is_finite() && high.is_finite()) {
+            return Err(VolumeError::Cells { cells });
+        }
+        let margin = DVec3::splat((high - low).max_element() / 1_000.0);
+        let (low, high) = (mesh.origin + low - margin, mesh.origin + high + margin);
+        let cells = UVec3::from(cells);
+        let points = cells + 1;
+        let at = |point: UVec3| {
+            let part = point.as_dvec3() / cells.as_dvec3();
+            low + (high - low) * part
+        };
+        let nodes = grid(points).map(at).collect();
+        let number = |p: UVec3| p.x + points.x * (p.y + points.y * p.z);
+        // Each cell's diagonal is in all six, so that faces of neighbours meet.
+        let tetrahedra = grid(cells).flat_map(|cell| {
+            ORDERS.map(|order| {
+                let mut corner = cell;
+                let [b, c, d] = order.map(|axis| {
+                    corner[axis] += 1;
+                    number(corner)
+                });
+                let is_even = matches!(order, [0, 1, 2] | [1, 2, 0] | [2, 0, 1]);
+                if is_even { [number(cell), b, c, d] } else { [number(cell), c, b, d] }
+            })
+        });
+        let tetrahedra = tetrahedra.collect();
+        let volume = Self { nodes, tetrahedra, is_box: true };
+        volume.check().map(|()| volume)
+    }
+
+    /// Its nodes.
+    #[must_use]
+    pub fn nodes(&self) -> &[DVec3] {
+        &self.nodes
+    }
+
+    /// The nodes of its tetrahedra.
+    #[must_use]
+    pub fn tetrahedra(&self) -> &[[u32; 4]] {
+        &self.tetrahedra
+    }
+
+    pub(super) const fn is_box(&self) -> bool {
+        self.is_box
+    }
+
+    fn check(&self) -> Result<(), VolumeError> {
+        let (nodes, tetrahedra) = (self.nodes.len(), self.tetrahedra.len());
+        let is_possible = (4..=MAX_NODES as usize).contains(&nodes)
+            && (1..=MAX_ELEMENTS as usize).contains(&tetrahedra);
+        if !is_possible {
+            return Err(VolumeError::Size { nodes, tetrahedra });
+        }
+        if let Some(node) = self.nodes.iter().position(|node| !node.is_finite()) {
+            return Err(VolumeError::Coordinate { node });
+        }
+        for (tetrahedron, corners) in self.tetrahedra.iter().enumerate() {
+            if let Some(&node) = corners.iter().find(|&&node| node as usize >= nodes) {
+                return Err(VolumeError::Corner { tetrahedron, node, nodes });
+            }
+        }
+        let shape = |corners: &[u32; 4]| edges(corners.map(|node| self.nodes[node as usize]));
+        let is_inverted = |corners: &[u32; 4]| shape(corners).determinant() < 0.0;
+        let mut inverted = (0..tetrahedra).filter(|&at| is_inverted(&self.tetrahedra[at]));
+        if let Some(first) = inverted.next() {
+            return Err(VolumeError::Inverted { count: 1 + inverted.count(), first });
+        }
+        let parts = self.parts();
+        if parts > 1 {
+            return Err(VolumeError::Apart { parts });
+        }
+        Ok(())
+    }
+
+    /// Sets of tetrahedra that share nodes.
+    fn parts(&self) -> usize {
+        let mut sets = petgraph::unionfind::UnionFind::<u32>::new(self.nodes.len());
+        for &[a, b, c, d] in &self.tetrahedra {
+            [b, c, d].into_iter().for_each(|other| {
+                sets.union(a, other);
+            });
+        }
+        let mut parts: Vec<u32> = self.tetrahedra.iter().map(|&[a, ..]| sets.find(a)).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        parts.len()
+    }
+}
+
+/// The axes in the six orders in which a path from a cell's first corner to its last can go.
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+
+/// The points of a grid, x first.
+fn grid(size: UVec3) -> impl Iterator<Item = UVec3> {
+    let layer =
+        move |z| (0..size.y).flat_map(move |y| (0..size.x).map(move |x| UVec3::new(x, y, z)));
+    (0..size.z).flat_map(layer)
+}
+
+/// The edges along the path through four nodes.
+pub(super) fn edges([a, b, c, d]: [DVec3; 4]) -> DMat3 {
+    DMat3::from_cols(b - a, c - b, d - c)
+}

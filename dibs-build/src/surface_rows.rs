@@ -1,0 +1,65 @@
+//! A frame as the vertices that a query reads, whatever moves them.
+
+use dibs_nostd::nodes::{Nodes, NodesError};
+use dibs_nostd::{
+    Index, MeasuredStretch, PathKind, StretchError, Tree, VertexTable, measure_stretch,
+};
+use glam::Vec3;
+
+/// The vertices of a tree's surface in one frame, in the order of its rows, and how far it is stretched. Of a tree with
+/// [nodes](dibs_nostd::nodes) the frame is theirs, and every vertex is computed.
+#[derive(Clone, Debug)]
+pub struct SurfaceRows {
+    positions: Vec<Vec3>,
+    error: f32,
+    /// The measured stretch, or why there is none.
+    pub stretch: Result<MeasuredStretch, StretchError>,
+}
+
+impl SurfaceRows {
+    /// The surface of a frame, in the order in which [`FrameCheck`](crate::FrameCheck) puts it.
+    ///
+    /// # Errors
+    /// [`NodesError`] where the tree's nodes are damaged.
+    pub fn of<I: Index>(tree: &Tree<'_, I>, frame: Vec<Vec3>) -> Result<Self, NodesError> {
+        if tree.paths() != PathKind::Volume {
+            let stretch = measure_stretch(tree, frame.as_slice());
+            return Ok(Self { positions: frame, error: 0.0, stretch });
+        }
+        let nodes = Nodes::of(tree)?;
+        let surface = nodes.surface(frame.as_slice());
+        let positions = (0..surface.len() as u32).filter_map(|row| surface.position(row)).collect();
+        let error = surface.position_error();
+        Ok(Self { positions, error, stretch: nodes.measure(frame.as_slice()) })
+    }
+
+    /// The rest shape as a frame; `None` where the tree has none.
+    #[must_use]
+    pub fn rest_frame<I: Index>(tree: &Tree<'_, I>) -> Option<Vec<Vec3>> {
+        match Nodes::of(tree) {
+            Ok(nodes) => (0..nodes.count()).map(|node| nodes.rest_position(node)).collect(),
+            Err(_) => (0..tree.vertex_count()).map(|row| tree.rest_position(row)).collect(),
+        }
+    }
+
+    /// The positions of the vertices.
+    #[must_use]
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+}
+
+impl VertexTable for SurfaceRows {
+    fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    #[inline]
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.positions.get(vertex as usize).copied()
+    }
+
+    fn position_error(&self) -> f32 {
+        self.error
+    }
+}

@@ -1,0 +1,69 @@
+//! Volumes whose nodes move a surface, on the command line.
+
+use crate::mesh_file::Lengths;
+use anyhow::{Result, anyhow, bail};
+use dibs_build::glam::Vec3;
+use dibs_build::{BuiltTree, FrameCheck, Mesh, Volume};
+use dibs_nostd::nodes::Nodes;
+use dibs_nostd::{Index, Tree};
+use std::path::{Path, PathBuf};
+
+/// `VOLUME`, a file, or `lattice:NX,NY,NZ`.
+#[derive(Clone, Debug)]
+pub enum VolumeSpec {
+    File(PathBuf),
+    Lattice([u32; 3]),
+}
+
+/// Reads what `--nodes` takes.
+pub fn parse(text: &str) -> Result<VolumeSpec> {
+    let Some(cells) = text.strip_prefix("lattice:") else {
+        return Ok(VolumeSpec::File(text.into()));
+    };
+    let numbers = cells.split(',').map(|number| number.trim().parse::<u32>());
+    match numbers.collect::<Result<Vec<_>, _>>().as_deref() {
+        Ok(&[x, y, z]) => Ok(VolumeSpec::Lattice([x, y, z])),
+        _ => Err(anyhow!("expected lattice:NX,NY,NZ, the cells along each axis")),
+    }
+}
+
+impl VolumeSpec {
+    /// Its file.
+    pub fn file(&self) -> Option<&PathBuf> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Lattice(_) => None,
+        }
+    }
+
+    /// The volume for a mesh.
+    pub fn volume(&self, mesh: &Mesh, lengths: &Lengths) -> Result<Volume> {
+        match self {
+            Self::File(path) => Ok(Volume::read(path, lengths.unit())?),
+            Self::Lattice(cells) => {
+                Volume::lattice(mesh, *cells).map_err(|error| anyhow!("--nodes: {error}"))
+            }
+        }
+    }
+}
+
+/// An error unless the tree's stretch limit covers a recorded motion of its nodes.
+pub fn check_covered(tree: &BuiltTree, path: &Path, lengths: &Lengths) -> Result<()> {
+    let motion = lengths.motion(path, tree.origin())?;
+    match tree.index_bits() {
+        16 => check_frames(&tree.tree::<u16>()?, path, &motion.frames),
+        _ => check_frames(&tree.tree::<u32>()?, path, &motion.frames),
+    }
+}
+
+fn check_frames<I: Index>(tree: &Tree<'_, I>, path: &Path, frames: &[Vec<Vec3>]) -> Result<()> {
+    let check = FrameCheck::of(tree);
+    for (number, frame) in frames.iter().enumerate() {
+        let at = || format!("{}, frame {number}", path.display());
+        let rows = check.to_rows(frame).map_err(|error| anyhow!("{}: {error}", at()))?;
+        if let Err(error) = Nodes::of(tree)?.measure(rows.as_slice()) {
+            bail!("{}: {error}; build with a larger --stretch", at());
+        }
+    }
+    Ok(())
+}

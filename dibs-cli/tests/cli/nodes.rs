@@ -1,0 +1,186 @@
+//! The `dibs` program and surfaces that the nodes of a volume move.
+
+use std::fmt::Write as _;
+use std::net::UdpSocket;
+use std::path::Path;
+use std::time::Duration;
+
+use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::{Motion, Volume};
+use dibs_nostd::nodes::{NodeMonitor, Nodes};
+use dibs_nostd::{Advance, Assembler, Frames, Millis, SurfaceLimits, Tree, VertexTable};
+
+use crate::program::{fails, json, succeeds};
+
+/// Nodes of the lattice below.
+const NODES: usize = 36;
+
+/// A volume as a legacy VTK file.
+fn vtk(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
+    let mut text =
+        "# vtk DataFile Version 3.0\nvolume\nASCII\nDATASET UNSTRUCTURED_GRID\n".to_owned();
+    let _ = writeln!(text, "POINTS {} double", nodes.len());
+    for at in nodes {
+        let _ = writeln!(text, "{} {} {}", at.x, at.y, at.z);
+    }
+    let _ = writeln!(text, "CELLS {} {}", tetrahedra.len(), 5 * tetrahedra.len());
+    for [a, b, c, d] in tetrahedra {
+        let _ = writeln!(text, "4 {a} {b} {c} {d}");
+    }
+    let _ = writeln!(text, "CELL_TYPES {}", tetrahedra.len());
+    tetrahedra.iter().for_each(|_| text.push_str("10\n"));
+    text
+}
+
+/// The same as a Gmsh file of version 2.2.
+fn msh(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
+    let mut text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n".to_owned();
+    let _ = writeln!(text, "{}", nodes.len());
+    for (number, at) in (1..).zip(nodes) {
+        let _ = writeln!(text, "{number} {} {} {}", at.x, at.y, at.z);
+    }
+    let _ = writeln!(text, "$EndNodes\n$Elements\n{}", tetrahedra.len());
+    for (number, [a, b, c, d]) in (1..).zip(tetrahedra) {
+        let _ = writeln!(text, "{number} 4 2 0 1 {} {} {} {}", a + 1, b + 1, c + 1, d + 1);
+    }
+    text + "$EndElements\n"
+}
+
+/// A heart, a volume around it in two formats, and a motion of its nodes.
+fn heart(folder: &Path) -> Volume {
+    succeeds(folder, "generate heart --triangles 1000 -o heart.ply");
+    let mesh = dibs_build::read(folder.join("heart.ply")).unwrap().mesh;
+    let volume = Volume::lattice(&mesh, [2, 2, 3]).unwrap();
+    let (nodes, tetrahedra) = (volume.nodes(), volume.tetrahedra());
+    std::fs::write(folder.join("volume.vtk"), vtk(nodes, tetrahedra)).unwrap();
+    std::fs::write(folder.join("volume.msh"), msh(nodes, tetrahedra)).unwrap();
+    let frame = |number: usize| {
+        let by = 4.0 * (number as f64 * 0.4).sin();
+        let at = |node: &DVec3| (*node + DVec3::Z * by * node.x / 60.0).as_vec3();
+        nodes.iter().map(at).collect::<Vec<Vec3>>()
+    };
+    let motion = Motion { frames: (0..12).map(frame).collect(), rate: 30.0, ..Motion::default() };
+    motion.write_pc2(folder.join("nodes.pc2")).unwrap();
+    volume
+}
+
+#[test]
+fn trees_with_nodes_are_built_asked_and_tracked() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let volume = heart(folder);
+    let mut answers = Vec::new();
+    for nodes in ["volume.vtk", "volume.msh", "lattice:2,2,3"] {
+        let line =
+            format!("build heart.ply -o heart.dibs --nodes {nodes} --motion nodes.pc2 --json");
+        let built = json(folder, &line);
+        assert_eq!(built["tree"]["volume"]["nodes"], NODES);
+        assert_eq!(built["tree"]["volume"]["tetrahedra"], 72);
+        assert_eq!(json(folder, "inspect heart.dibs --json"), built["tree"]);
+        assert!(succeeds(folder, "inspect heart.dibs").contains("nodes    36 of 72 tetrahedra"));
+        let ask = "query heart.dibs --tool sphere:0,0,150,5 --json";
+        let at_rest = json(folder, ask);
+        let moved = json(folder, &format!("{ask} --vertices nodes.pc2 --frame 4"));
+        assert_eq!(
+            (&at_rest["coverage"], &moved["coverage"]),
+            (&"measured".into(), &"measured".into())
+        );
+        assert!(at_rest["stretch"].as_f64().unwrap() < 1.001);
+        assert!(moved["stretch"].as_f64().unwrap() > 1.01);
+        // The volume's own file is a frame, too.
+        let file = json(folder, &format!("{ask} --vertices volume.vtk"));
+        assert_eq!(file["separation"], at_rest["separation"]);
+        answers.push((at_rest["separation"].clone(), moved["separation"].clone()));
+    }
+    assert!(answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
+
+    std::fs::write(folder.join("tools.csv"), "sphere:0,0,120,5\n".repeat(200)).unwrap();
+    for surface in ["held", "interpolated", "extrapolated"] {
+        let line =
+            format!("track heart.dibs --motion nodes.pc2 --path tools.csv --surface {surface}");
+        let kept = succeeds(folder, &line);
+        let full = succeeds(folder, &format!("{line} --full"));
+        let separations = |text: &str| -> Vec<f64> {
+            text.lines()
+                .map(|line| line.split_whitespace().nth(1).unwrap().parse().unwrap())
+                .collect()
+        };
+        let (kept, full) = (separations(&kept), separations(&full));
+        assert!(kept.len() == 200 && kept.iter().any(|at| (at - kept[0]).abs() > 0.1));
+        assert!(kept.iter().zip(&full).all(|(a, b)| (a - b).abs() < 1e-3), "{surface}");
+    }
+
+    // What does not fit is refused in one sentence, and the tree stays as it was.
+    let before = std::fs::read(folder.join("heart.dibs")).unwrap();
+    let shifted: Vec<DVec3> = volume.nodes().iter().map(|at| *at + DVec3::X * 30.0).collect();
+    std::fs::write(folder.join("shifted.vtk"), vtk(&shifted, volume.tetrahedra())).unwrap();
+    let mut inverted = volume.tetrahedra().to_vec();
+    inverted[5].swap(0, 1);
+    std::fs::write(folder.join("inverted.msh"), msh(volume.nodes(), &inverted)).unwrap();
+    std::fs::write(folder.join("wrong.vtk"), vtk(volume.nodes(), &[[0, 1, 2, 99]])).unwrap();
+    for (nodes, part) in [
+        ("shifted.vtk", "vertices of the surface are outside the volume (the first is"),
+        ("inverted.msh", "inverted.msh: 1 tetrahedra are inverted at rest (the first is 5)"),
+        ("wrong.vtk", "wrong.vtk"),
+        ("heart.ply", "with 0 tetrahedra and 0 other volume cells"),
+        ("absent.msh", "absent.msh: cannot be read"),
+        ("lattice:0,1,1", "a lattice of 0 x 1 x 1 cells cannot be stored"),
+        ("lattice:2,2,3 --stretch 1.01 --motion nodes.pc2", "nodes.pc2, frame 1: element"),
+        ("lattice:3,2,3 --motion nodes.pc2", "frame 0: has 36 points and the tree has 48 nodes"),
+    ] {
+        let error = fails(folder, &format!("build heart.ply -o heart.dibs --nodes {nodes}"));
+        assert!(error.contains(part), "{nodes}: {error}");
+    }
+    let ask = "query heart.dibs --tool sphere:0,0,150,5 --vertices";
+    for (vertices, part) in [
+        ("heart.ply", "has 502 points and the tree has 36 nodes"),
+        ("nodes.pc2 --frame 12", "no frame 12, the motion has 12"),
+    ] {
+        let error = fails(folder, &format!("{ask} {vertices}"));
+        assert!(error.contains(part), "{vertices}: {error}");
+    }
+    std::fs::write(folder.join("page.html"), "<!--data-->").unwrap();
+    let error = fails(folder, "view heart.dibs -o heart.html --page page.html");
+    assert!(error.contains("build it without --nodes"), "{error}");
+    assert_eq!(std::fs::read(folder.join("heart.dibs")).unwrap(), before);
+}
+
+/// From the program, over UDP, to the surface that a controller searches.
+#[test]
+fn nodes_are_streamed() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    heart(folder);
+    succeeds(folder, "build heart.ply -o heart.dibs --nodes volume.vtk");
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
+    let to = format!("--to udp:{}", socket.local_addr().unwrap());
+    let sent = json(folder, &format!("stream heart.dibs nodes.pc2 {to} --rate 500 --json"));
+    assert_eq!(sent["frames"], 12);
+
+    let blob: &'static [u8] = std::fs::read(folder.join("heart.dibs")).unwrap().leak();
+    let tree = Tree::<u16>::from_bytes(blob).unwrap();
+    let nodes = Nodes::of(&tree).unwrap();
+    let frames: &'static Frames<NODES> = Box::leak(Box::new(Frames::new()));
+    let (writer, mut reader) = frames.split().unwrap();
+    let gate = NodeMonitor::new(&nodes).limits(SurfaceLimits::reach_mm(500.0));
+    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 500.0);
+    let (mut published, mut packet) = (0, [0; 2048]);
+    while let Ok(length) = socket.recv(&mut packet) {
+        let _ = assembler.accept(&packet[..length], Millis(0));
+        for _ in 0..4 {
+            if let Ok(Advance::Published { .. }) = assembler.advance(1_000) {
+                published += 1;
+            }
+        }
+    }
+    assert!(published > 6, "{published}");
+    let motion = Motion::read(folder.join("nodes.pc2")).unwrap();
+    let frame = reader.read().unwrap();
+    let last = &motion.frames[11];
+    let error = frame.position_error();
+    for (row, at) in (0..).zip(last) {
+        assert!(frame.position(row).unwrap().distance(*at) <= error + 1e-4);
+    }
+    assert_eq!(nodes.surface(&frame).len(), tree.vertex_count() as usize);
+}

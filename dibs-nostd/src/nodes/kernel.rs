@@ -1,0 +1,118 @@
+//! The check of one element.
+//!
+//! Let `e1`, `e2`, `e3` be the edges along the path through an element's four nodes, as they are now, and `G` the matrix
+//! of their products; `M` is the same at rest. The largest singular value of the deformation gradient is below `sigma`
+//! exactly if `L M - G` is positive definite for `L = sigma^2`, because `G = E0^T F^T F E0` and `M = E0^T E0`. That is so
+//! if its leading minors are positive. So the comparison with the largest `L` so far takes neither a root nor a division,
+//! and no gradient. Comparisons are strict: with `>=` the minors of diag(0, 0, -1) would pass, and NaN fails.
+//!
+//! # Rounding
+//!
+//! Let `u = 2^-24`, and `X` be `L M - G` as computed. The entries of `G` come from differences of coordinates: those on
+//! the diagonal are off by at most `5 u` of themselves, others by `5 u |ei| |ej|`; a difference `L m - g` adds two
+//! roundings. So, for `X` positive definite, `X` is off by at most `6.1 u L m_ii` on the diagonal and by `12.1 u L
+//! sqrt(m_ii m_jj)` elsewhere. The minors are those of a matrix near `X`, as in an error analysis of Cholesky's
+//! factorisation: `x11 x22 - x12^2` is exact for an `x22` changed by `2 u` of itself, `x11 x23 - x12 x13` for an `x23` so
+//! changed, and the comparison of the products for an `x33` changed by `9 u`. In all `F^T F` is at most `L` for an `M`
+//! larger by at most `44 u` of its diagonal; storing the entries adds `3 u`. With the least eigenvalue `c` of `M` scaled
+//! to a diagonal of ones, its diagonal is at most `M / c`. So the builder divides `M` by `1 + 50 u / c`
+//! ([`MARGIN`](super::MARGIN)), and an element that passes is not stretched beyond `sqrt(L)`.
+//!
+//! The volume `e1 . (e2 x e3)` is off by at most `8 u sqrt(2) |e1| |e2| |e3|`, and no edge is longer than the stretch limit
+//! times its rest length, so the builder stores `12 u s^3` times the product of the rest lengths: a volume above it is
+//! positive.
+
+use glam::Vec3;
+
+use super::layout::Element;
+use crate::math::sqrt::sqrt;
+
+/// An element as it is now.
+#[derive(Clone, Copy)]
+pub(super) struct Now {
+    /// The products of its edges, in the order of [`Element::products`].
+    products: [f32; 6],
+    volume: f32,
+}
+
+impl Now {
+    #[inline(always)]
+    pub fn of([a, b, c, d]: [Vec3; 4]) -> Self {
+        let (first, second, third) = (b - a, c - b, d - c);
+        let products = [
+            first.length_squared(),
+            first.dot(second),
+            first.dot(third),
+            second.length_squared(),
+            second.dot(third),
+            third.length_squared(),
+        ];
+        Self { products, volume: first.dot(second.cross(third)) }
+    }
+
+    /// Whether its volume is positive; false for NaN.
+    #[inline(always)]
+    pub fn is_upright(&self, element: &Element) -> bool {
+        self.volume > element.least
+    }
+
+    /// Whether its stretch is certainly below `sqrt(limit)`; false for NaN.
+    #[inline(always)]
+    pub fn is_within(&self, element: &Element, limit: f32) -> bool {
+        let [m11, m12, m13, m22, m23, m33] = element.products;
+        let [g11, g12, g13, g22, g23, g33] = self.products;
+        let (x11, x12, x13) = (limit * m11 - g11, limit * m12 - g12, limit * m13 - g13);
+        let (x22, x23, x33) = (limit * m22 - g22, limit * m23 - g23, limit * m33 - g33);
+        let second = x11 * x22 - x12 * x12;
+        let third = x11 * x33 - x13 * x13;
+        let between = x11 * x23 - x12 * x13;
+        // `&`, not `&&`: three comparisons cost less than branches.
+        (x11 > 0.0) & (second > 0.0) & (second * third > between * between)
+    }
+
+    /// The sum of the squares of its edges, and that at rest.
+    #[inline(always)]
+    pub fn sizes(&self, element: &Element) -> [f32; 2] {
+        let sum = |[first, _, _, second, _, third]: [f32; 6]| first + second + third;
+        [sum(self.products), sum(element.products)]
+    }
+
+    /// The squared stretch of an element that is not within `from` but within `limit`, rounded up by at most
+    /// [`HEADROOM`].
+    #[cold]
+    #[inline(never)]
+    pub fn squared_stretch(&self, element: &Element, from: f32, limit: f32) -> f32 {
+        let (mut low, mut high) = (from, limit);
+        // Enough for a limit of a million.
+        for _ in 0..64 {
+            let middle = low + (high - low) * 0.5;
+            if high - low <= high * HEADROOM || middle <= low || middle >= high {
+                break;
+            }
+            if self.is_within(element, middle) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        high
+    }
+
+    /// The stretch of an element beyond the square `limit`, to within a part in a thousand; infinite for one that is not
+    /// finite.
+    #[cold]
+    pub fn stretch_beyond(&self, element: &Element, limit: f32) -> f32 {
+        let (mut from, mut to) = (limit, limit * 2.0);
+        for _ in 0..40 {
+            if self.is_within(element, to) {
+                return sqrt(self.squared_stretch(element, from, to));
+            }
+            (from, to) = (to, to * 2.0);
+        }
+        f32::INFINITY
+    }
+}
+
+/// Relative rounding up of a squared stretch. Elements stretched nearly as much as the one stretched most pass the check
+/// with it: failing takes twenty times as long.
+const HEADROOM: f32 = 1.0 / 65_536.0;

@@ -1,0 +1,175 @@
+//! The nodes' bytes: section 11 of `docs/format.md`, and its checker.
+
+use glam::Vec3;
+
+use super::{MAX_ELEMENTS, MAX_NODES, NodesError};
+use crate::tree::format::u32_at;
+
+/// Bytes of the section's header.
+pub const HEADER_BYTES: usize = 32;
+/// Bytes of one node's rest position.
+pub const NODE_BYTES: usize = 12;
+/// Bytes of one element's record.
+pub const ELEMENT_BYTES: usize = 36;
+/// Bytes of one vertex's binding.
+pub const BINDING_BYTES: usize = 8;
+/// The sum of a vertex's four weights.
+pub const WHOLE: u32 = 1 << 16;
+
+/// The header, and the tables of nodes, elements and bindings.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Parts<'a> {
+    /// Longest path of elements from the first element's first node to another, at rest (mm).
+    pub extent: f32,
+    /// Longest edge at rest (mm).
+    pub edge: f32,
+    pub nodes: &'a [[u8; NODE_BYTES]],
+    pub elements: &'a [[u8; ELEMENT_BYTES]],
+    pub bindings: &'a [[u8; BINDING_BYTES]],
+}
+
+/// An element: its nodes, and what its check compares.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Element {
+    pub corners: [u32; 4],
+    /// The products of the edges along the path through the four nodes, at rest: 11, 12, 13, 22, 23, 33.
+    pub products: [f32; 6],
+    /// The least volume of the edges that is certainly positive (mm³).
+    pub least: f32,
+}
+
+/// A vertex's element, and the weights of its first three nodes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Binding {
+    pub element: u32,
+    pub weights: [u32; 3],
+}
+
+/// Finds and checks the tables of a surface of so many vertices.
+pub(super) fn parts(bytes: &[u8], vertices: u32) -> Result<Parts<'_>, NodesError> {
+    let wrong_length = |expected| NodesError::Length { expected, found: bytes.len() as u64 };
+    let Some((header, tables)) = bytes.split_first_chunk::<HEADER_BYTES>() else {
+        return Err(wrong_length(HEADER_BYTES as u64));
+    };
+    let word = |at| u32_at(header, at).unwrap_or(u32::MAX);
+    let (nodes, elements) = (word(0), word(4));
+    let (extent, edge) = (f32::from_bits(word(8)), f32::from_bits(word(12)));
+    // Written so that NaN is wrong.
+    let is_length = |length: f32| length > 0.0 && length <= 1e18;
+    let is_wrong = |offset: u8| match offset {
+        0 => !(4..=MAX_NODES).contains(&nodes),
+        4 => !(1..=MAX_ELEMENTS).contains(&elements),
+        8 => !is_length(extent),
+        12 => !is_length(edge),
+        _ => word(offset.into()) != 0,
+    };
+    let mut fields = [0, 4, 8, 12, 16, 20, 24, 28].into_iter();
+    if let Some(offset) = fields.find(|&offset| is_wrong(offset)) {
+        return Err(NodesError::Field { offset, value: word(offset.into()) });
+    }
+    let sizes = [(nodes, NODE_BYTES), (elements, ELEMENT_BYTES), (vertices, BINDING_BYTES)];
+    let lengths = sizes.map(|(rows, stride)| u64::from(rows) * stride as u64);
+    let expected = HEADER_BYTES as u64 + lengths.iter().sum::<u64>();
+    if bytes.len() as u64 != expected {
+        return Err(wrong_length(expected));
+    }
+    let [of_nodes, of_elements, _] = lengths.map(|length| length as usize);
+    let (nodes, tables) = tables.split_at_checked(of_nodes).unwrap_or_default();
+    let (elements, bindings) = tables.split_at_checked(of_elements).unwrap_or_default();
+    let parts = Parts {
+        extent,
+        edge,
+        nodes: nodes.as_chunks().0,
+        elements: elements.as_chunks().0,
+        bindings: bindings.as_chunks().0,
+    };
+    check(&parts).map(|()| parts)
+}
+
+/// Checks every row.
+fn check(parts: &Parts<'_>) -> Result<(), NodesError> {
+    for (node, row) in (0..).zip(parts.nodes) {
+        let Vec3 { x, y, z } = position(row).abs();
+        // So that products of lengths do not overflow. Written so that NaN is wrong.
+        if !((x <= 1e9) & (y <= 1e9) & (z <= 1e9)) {
+            return Err(NodesError::Node { node });
+        }
+    }
+    let nodes = parts.nodes.len() as u32;
+    let mut last = 0;
+    for (row, record) in (0..).zip(parts.elements) {
+        let element = element(record);
+        if let Some(&node) = element.corners.iter().find(|&&node| node >= nodes) {
+            return Err(NodesError::Corner { element: row, node, nodes });
+        }
+        let is_number = |x: &f32| x.abs() < 1e18;
+        let [first, .., third] = element.products;
+        let is_sound = element.products.iter().all(is_number)
+            && first > 0.0
+            && third > 0.0
+            && element.least > 0.0
+            && element.least < 1e27;
+        let latest = element.corners.into_iter().fold(0, u32::max);
+        if !is_sound || latest < last {
+            return Err(NodesError::Element { element: row });
+        }
+        last = latest;
+        let at = |node: u32| parts.nodes.get(node as usize).map_or(Vec3::NAN, position);
+        let [a, b, c, d] = element.corners.map(at);
+        // Written so that NaN is wrong.
+        if !((b - a).dot((c - b).cross(d - c)) > element.least) {
+            return Err(NodesError::Inverted { element: row });
+        }
+    }
+    let elements = parts.elements.len() as u32;
+    for (vertex, row) in (0..).zip(parts.bindings) {
+        let binding = binding(row);
+        if binding.element >= elements {
+            return Err(NodesError::Binding { vertex, element: binding.element, elements });
+        }
+        let sum = binding.weights.iter().sum();
+        if sum > WHOLE {
+            return Err(NodesError::Weights { vertex, sum });
+        }
+    }
+    Ok(())
+}
+
+/// The position of a node.
+#[inline(always)]
+pub(super) fn position(
+    &[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3]: &[u8; NODE_BYTES],
+) -> Vec3 {
+    Vec3::new(
+        f32::from_le_bytes([x0, x1, x2, x3]),
+        f32::from_le_bytes([y0, y1, y2, y3]),
+        f32::from_le_bytes([z0, z1, z2, z3]),
+    )
+}
+
+/// The record of an element.
+#[inline(always)]
+pub(super) fn element(record: &[u8; ELEMENT_BYTES]) -> Element {
+    let (words, _) = record.as_chunks::<4>();
+    let &[ab, cd, m11, m12, m13, m22, m23, m33, least] = words else {
+        return Element { corners: [u32::MAX; 4], products: [0.0; 6], least: f32::NAN };
+    };
+    let products = [m11, m12, m13, m22, m23, m33].map(f32::from_le_bytes);
+    let [ab, cd] = [ab, cd].map(u32::from_le_bytes);
+    let corners = [ab & 0xFFFF, ab >> 16, cd & 0xFFFF, cd >> 16];
+    Element { corners, products, least: f32::from_le_bytes(least) }
+}
+
+/// The nodes of an element.
+#[inline(always)]
+pub(super) fn corners(record: &[u8; ELEMENT_BYTES]) -> [u32; 4] {
+    element(record).corners
+}
+
+/// The binding of a vertex.
+#[inline(always)]
+pub(super) fn binding(row: &[u8; BINDING_BYTES]) -> Binding {
+    let low = u64::from_le_bytes(*row);
+    let half = |at: u32| (low >> at) as u32 & 0xFFFF;
+    Binding { element: half(0), weights: [half(16), half(32), half(48)] }
+}

@@ -1,0 +1,468 @@
+//! Surfaces that a volume's nodes move: coverage, stretch, answers, motion and cost.
+//!
+//! One file, because all tests need the same trees.
+
+use dibs_build::{Builder, BuiltTree, Mesh, Volume, generate};
+use dibs_nostd::format::{Link, MAX_STACK};
+use dibs_nostd::nodes::{NodeMonitor, Nodes};
+use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
+use dibs_nostd::{
+    Admission, Advance, Assembler, Coverage, Fallback, FrameExtent, Frames, Gate, IncomingSurface,
+    Millis, MovingSurface, Options, Query, ReceiveError, Sphere, StretchError, SurfaceLimits,
+    Tracker, Tree, TriangleRow, VertexTable,
+};
+use dibs_tests::bus::collect;
+use dibs_tests::embedded::{NodeMotion, exact, gradient, hull, largest_stretch, rows, stretch_of};
+use dibs_tests::oracle::{Instrument, exhaustive};
+use dibs_tests::poses::pose;
+use dibs_tests::{ask, sample, surfaces};
+use fastrand::Rng;
+use glam::{DVec3, Vec3};
+
+/// A heart and a brain in lattices and in volumes that are no box.
+fn built(rng: &mut Rng) -> Vec<(Mesh, BuiltTree)> {
+    let heart = generate::heart(1_000).expect("a valid size").mesh;
+    let brain = generate::brain(2_000).expect("a valid size");
+    let mut trees = Vec::new();
+    for (mesh, stretch) in [(heart, 1.3), (brain, 1.6)] {
+        let volumes = [
+            Volume::lattice(&mesh, [3, 4, 5]).expect("a lattice"),
+            hull(&mesh, [9, 8, 7], rng),
+            Volume::lattice(&mesh, [1, 1, 1]).expect("a lattice"),
+        ];
+        for volume in volumes {
+            let built = Builder::new().stretch(stretch).nodes(&volume).build(&mesh);
+            trees.push((mesh.clone(), built.expect("the volume holds the surface")));
+        }
+    }
+    trees
+}
+
+/// A node's pin, its radius, and the rows of its section.
+fn sections(tree: &Tree<'_, u16>) -> Vec<(u32, f64, Vec<u32>)> {
+    let section = |row: u32| {
+        let (pin, radius, _) = tree.node(row).expect("in the tree");
+        let (mut below, mut covered) = (vec![row], Vec::new());
+        while let Some(row) = below.pop() {
+            match tree.node(row).expect("in the tree").2 {
+                Link::Leaf { first, count } => covered.extend(
+                    (first..first + count)
+                        .filter_map(|row| tree.corners(TriangleRow(row)))
+                        .flatten(),
+                ),
+                Link::Children { first, count } => below.extend(first..first + count),
+            }
+        }
+        covered.sort_unstable();
+        covered.dedup();
+        (pin, f64::from(radius), covered)
+    };
+    (0..tree.node_count()).map(section).collect()
+}
+
+/// Every vertex lies within its spheres' measured stretch times radius, in f64, whatever the motion; and the radius is
+/// needed: where all elements are pulled by the limit along the line from a pin to a vertex, straight through a box, it is
+/// reached.
+#[test]
+fn coverage_holds_in_every_admitted_frame() {
+    let mut rng = Rng::with_seed(1);
+    let mut closest = 0.0_f64;
+    for (_, built) in built(&mut rng) {
+        let tree = built.tree::<u16>().expect("valid");
+        let nodes = Nodes::of(&tree).expect("valid");
+        let sections = sections(&tree);
+        for trial in 0..sample(60) {
+            let kind = NodeMotion::ALL[trial % 6];
+            let frame = kind.apply(&nodes, &mut rng);
+            let sigma = f64::from(nodes.measure(frame.as_slice()).expect("weakened").sigma());
+            let now: Vec<DVec3> =
+                (0..nodes.vertex_count()).map(|row| exact(&nodes, &frame, row)).collect();
+            for (pin, radius, covered) in &sections {
+                let away =
+                    covered.iter().map(|&row| now[row as usize].distance(now[*pin as usize]));
+                let away = away.fold(0.0, f64::max);
+                assert!(away <= sigma * radius + 1e-9, "{kind:?}: {away} {sigma} {radius}");
+            }
+        }
+        // Along the line from a pin to a vertex.
+        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+        for _ in 0..sample(400) {
+            let (pin, radius, covered) = &sections[rng.usize(..sections.len())];
+            let at = |row| exact(&nodes, &rest, row);
+            let far = |row: &&u32| at(**row).distance(at(*pin));
+            let far = covered.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+            let along = (at(*far.expect("not empty")) - at(*pin)).normalize_or_zero().as_vec3();
+            let strain = (tree.stretch() - 1.0) * 0.9999;
+            let frame: Vec<Vec3> =
+                rest.iter().map(|&at| at + along * along.dot(at - rest[0]) * strain).collect();
+            let measured = nodes.measure(frame.as_slice()).expect("within the limit");
+            let now = |row| exact(&nodes, &frame, row);
+            let away = covered.iter().map(|&row| now(row).distance(now(*pin))).fold(0.0, f64::max);
+            let most = f64::from(measured.sigma()) * radius;
+            assert!(away <= most + 1e-9, "{away} {most}");
+            if *radius > 1.0 {
+                closest = closest.max(away / most);
+            }
+        }
+    }
+    assert!(closest > 0.999, "{closest}");
+}
+
+/// Climbs, over the shape of an element and its deformation, towards a stretch above the measured one: there is none.
+/// Shapes are needles, plates and slivers, too; a measured stretch is hardly above the true one.
+#[test]
+fn no_admitted_element_is_stretched_further_than_measured() {
+    let mut rng = Rng::with_seed(2);
+    let (mut tested, mut highest, mut loosest) = (0, 0.0_f64, 0.0_f64);
+    while tested < sample(400) {
+        let scale = 10.0_f32.powf(rng.f32() * 3.0 - 1.0);
+        let squash = Vec3::from([(); 3].map(|()| 10.0_f32.powf(-2.0 * rng.f32()))) * scale;
+        let far = Vec3::splat(if rng.bool() { 0.0 } else { 300.0 });
+        let mut corners = [(); 4].map(|()| Vec3::from([(); 3].map(|()| rng.f32())) * squash + far);
+        let volume = |[a, b, c, d]: [Vec3; 4]| (b - a).dot((c - a).cross(d - a));
+        if volume(corners) < 0.0 {
+            corners.swap(0, 1);
+        }
+        let middle = corners.iter().sum::<Vec3>() / 4.0;
+        let triangle: Vec<Vec3> =
+            corners[..3].iter().map(|&corner| corner + (middle - corner) * 0.3).collect();
+        let mesh = Mesh { positions: triangle, triangles: vec![[0, 1, 2]], origin: DVec3::ZERO };
+        let nodes = corners.map(Vec3::as_dvec3).to_vec();
+        let Ok(volume) = Volume::new(nodes, vec![[0, 1, 2, 3]]) else { continue };
+        let limit = 1.0 + rng.f32();
+        let Ok(built) = Builder::new().stretch(limit).nodes(&volume).build(&mesh) else { continue };
+        tested += 1;
+        let tree = built.tree::<u16>().expect("valid");
+        let nodes = Nodes::of(&tree).expect("valid");
+        let now = |frame: &[Vec3]| {
+            let order = nodes.element(0).expect("one");
+            let rest = order.map(|node| nodes.rest_position(node).expect("of it"));
+            stretch_of(rest, order.map(|node| frame[node as usize]))
+        };
+        let excess = |frame: &[Vec3]| {
+            let measured = nodes.measure(frame).ok()?;
+            Some((now(frame).0 / f64::from(measured.sigma()), now(frame)))
+        };
+        let mut frame = corners.to_vec();
+        let mut best = excess(&frame).map_or(0.0, |(part, _)| part);
+        for step in 0..600 {
+            let mut next = frame.clone();
+            if step % 3 == 0 {
+                let by = gradient(&mut rng, if step < 100 { 0.4 } else { 0.01 });
+                next.iter_mut().for_each(|at| *at = by * (*at - middle) + middle);
+            } else {
+                let node = rng.usize(..4);
+                let by = Vec3::from([(); 3].map(|()| rng.f32() - 0.5));
+                next[node] += by * scale * 10.0_f32.powf(-1.0 - 5.0 * rng.f32());
+            }
+            if let Some((part, (stretch, determinant))) = excess(&next) {
+                assert!(part <= 1.0 && stretch <= f64::from(tree.stretch()), "{part} {stretch}");
+                assert!(determinant > 0.0, "{determinant}");
+                if part > best {
+                    (best, frame) = (part, next);
+                }
+            }
+        }
+        highest = highest.max(best);
+        loosest = loosest.max(1.0 / best - 1.0);
+    }
+    assert!(highest > 1.0 - 3e-5 && loosest < 0.02, "{highest} {loosest}");
+}
+
+/// Frames beyond the limit, turned inside out, flat or not finite are refused, by the number of the element.
+#[test]
+fn frames_beyond_the_limit_are_refused() {
+    let mut rng = Rng::with_seed(3);
+    let (_, built) = &built(&mut rng)[1];
+    let tree = built.tree::<u16>().expect("valid");
+    let nodes = Nodes::of(&tree).expect("valid");
+    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let refusal = |change: &dyn Fn(Vec3) -> Vec3| {
+        let frame: Vec<Vec3> = rest.iter().map(|&at| change(at)).collect();
+        nodes.measure(frame.as_slice()).err()
+    };
+    assert_eq!(refusal(&|at| at), None);
+    let long = refusal(&|at| at * Vec3::new(1.0, 1.0, 1.31));
+    let Some(StretchError::ElementExceeded { stretch, limit, .. }) = long else {
+        panic!("{long:?}");
+    };
+    assert!((stretch - 1.31).abs() < 1e-3 && limit == tree.stretch());
+    let inverted = Some(StretchError::Inverted { element: 0 });
+    assert_eq!(refusal(&|at| at * Vec3::new(1.0, 1.0, -1.0)), inverted);
+    assert_eq!(refusal(&|at| at * Vec3::new(1.0, 1.0, 0.0)), inverted);
+    assert_eq!(refusal(&|_| Vec3::ZERO), inverted);
+    for wrong in [f32::NAN, f32::INFINITY, -f32::INFINITY] {
+        let beyond = refusal(&|at| Vec3::new(at.x, wrong, at.z));
+        assert!(matches!(beyond, Some(StretchError::ElementExceeded { element: 0, .. })));
+    }
+    for found in [0, 4, nodes.count() - 1, nodes.count() + 1] {
+        let table = vec![Vec3::ZERO; found as usize];
+        let expected = nodes.count();
+        let error = nodes.measure(table.as_slice()).err();
+        assert_eq!(error, Some(StretchError::VertexCount { expected, found }));
+        assert_eq!(nodes.surface(table.as_slice()).len(), 0);
+    }
+}
+
+/// Answers on embedded surfaces agree with exhaustive search, in f64 on vertices blended in f64, within the accuracy that
+/// they state.
+#[test]
+fn answers_are_right() {
+    let mut rng = Rng::with_seed(4);
+    for (_, built) in built(&mut rng) {
+        let tree = built.tree::<u16>().expect("valid");
+        let nodes = Nodes::of(&tree).expect("valid");
+        let triangles = surfaces::triangles(&tree);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        for trial in 0..sample(120) {
+            let frame = NodeMotion::ALL[trial % 6].apply(&nodes, &mut rng);
+            let measured = nodes.measure(frame.as_slice()).expect("weakened");
+            let surface = nodes.surface(frame.as_slice());
+            let positions = rows(&surface);
+            let tool = pose(&positions, &triangles, &mut rng);
+            for options in [Options::cold(), Options::cold().stretch(measured)] {
+                let answer = ask::closest(&mut query, &surface, &tool, &options).expect("sound");
+                let truth = exhaustive(&positions, &triangles, &tool).expect("has triangles");
+                let error = (truth.separation - f64::from(answer.separation)).abs();
+                assert!(error <= f64::from(answer.accuracy), "{error} {}", answer.accuracy);
+                let stated = surface.position_error();
+                for (row, position) in (0..).zip(&positions) {
+                    let away = exact(&nodes, &frame, row).distance(position.as_dvec3());
+                    assert!(away <= f64::from(stated) / 2.0, "{away} {stated}");
+                }
+            }
+        }
+    }
+}
+
+/// The wide query, the side and a tracker answer as they do on the same vertices in a table.
+#[test]
+fn every_query_takes_embedded_surfaces() {
+    let mut rng = Rng::with_seed(5);
+    for (_, built) in built(&mut rng) {
+        let tree = built.tree::<u16>().expect("valid");
+        let nodes = Nodes::of(&tree).expect("valid");
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let mut tracker = Tracker::<u16, MAX_STACK, 96>::new(&tree).expect("deep enough");
+        let mut odometer = nodes.odometer();
+        let mut before = NodeMotion::Waves.apply(&nodes, &mut rng);
+        let _ = odometer.start(before.as_slice());
+        let mut centre = tree.rest_position(0).expect("there") + Vec3::splat(10.0);
+        for _ in 0..sample(200) {
+            let mut after = before.clone();
+            after.iter_mut().for_each(|at| *at += Vec3::from([(); 3].map(|()| 0.02 * rng.f32())));
+            let Ok(measured) = nodes.measure(after.as_slice()) else { continue };
+            let step = odometer.step(before.as_slice(), after.as_slice());
+            let moved = step.after();
+            let surface = nodes.surface(&moved);
+            assert!(surface.motion().is_some());
+            centre += Vec3::from([(); 3].map(|()| rng.f32() - 0.5));
+            let tool = Sphere::new(centre, 2.0).expect("finite");
+            let options = Options::new().stretch(measured);
+            let tracked = tracker.closest(&surface, &tool, &options).expect("sound");
+            let table = rows(&surface);
+            let plain = query.closest(table.as_slice(), &tool, &options).expect("sound");
+            let wide = query.closest_wide(&surface, &tool, &options).expect("sound");
+            assert_eq!(wide.separation.to_bits(), plain.separation.to_bits());
+            let tracked = tracked.closest;
+            let error = (tracked.separation - plain.separation).abs();
+            assert!(error <= tracked.accuracy + plain.accuracy, "{tracked:?} {plain:?}");
+            assert_eq!(tracked.side, plain.side);
+            before = after;
+        }
+    }
+}
+
+/// Most nodes of the frames below.
+const NODES: usize = 120;
+
+/// Frames of nodes over the bus: published with the stretch of a whole measurement whatever the slices of work, refused
+/// where they must be while the last good one stays, and moving between their times and beyond. The tracker's answers on
+/// all of these surfaces are those of exhaustive search.
+#[test]
+fn nodes_come_over_the_bus() {
+    let mut rng = Rng::with_seed(6);
+    let mesh = generate::heart(1_000).expect("a valid size").mesh;
+    let lattice = Volume::lattice(&mesh, [3, 4, 5]).expect("a lattice");
+    assert_eq!(lattice.nodes().len(), NODES);
+    let built = Builder::new().stretch(1.2).nodes(&lattice).build(&mesh).expect("held");
+    let tree = built.tree::<u16>().expect("valid");
+    let nodes = Nodes::of(&tree).expect("valid");
+    let triangles = surfaces::triangles(&tree);
+    let frames: &'static Frames<NODES, 3> = Box::leak(Box::new(Frames::new()));
+    let (writer, mut reader) = frames.split().expect("once");
+    let limits = SurfaceLimits::reach_mm(500.0).speed(4.0).recovery_mm(150.0);
+    let gate = NodeMonitor::continuous(&nodes).limits(limits);
+    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 500.0);
+    let mut tracker = Tracker::<u16, MAX_STACK, 96>::new(&tree).expect("deep enough");
+    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let (mut good, mut held) = (rest.clone(), rest.clone());
+    let (mut published, mut refused, mut unknown, mut moving) = (0, [0; 4], 0, 0);
+    for epoch in 1..sample(600) as u32 {
+        let time = epoch as f32 * 0.1;
+        let mut next: Vec<Vec3> = rest
+            .iter()
+            .map(|&at| {
+                at + 3.0
+                    * Vec3::new((time + at.y / 30.0).sin(), (time * 0.7 + at.z / 25.0).cos(), 0.0)
+            })
+            .collect();
+        let wrong = if epoch > 3 { rng.usize(..12) } else { 12 };
+        match wrong {
+            0 => next[rng.usize(..NODES)] += Vec3::X * 9.0,
+            1 => next.iter_mut().for_each(|at| *at += Vec3::Y * 200.0),
+            2 => next.iter_mut().for_each(|at| at.x = good[0].x),
+            3 => next.iter_mut().for_each(|at| *at *= 0.2),
+            _ => (),
+        }
+        let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch };
+        let grid = QuantisedBox::covering(&next).expect("finite");
+        let encoding = if rng.bool() { Encoding::Quantised(grid) } else { Encoding::Float };
+        let sender = FrameEncoder::<_, 256>::new(id, encoding, &next[..]).expect("valid");
+        let mut outcome = None;
+        let work = rng.u32(1..200);
+        for packet in collect(sender) {
+            let _ = assembler.accept(&packet, Millis(40 * epoch)).expect("taken");
+            match assembler.advance(work) {
+                Ok(Advance::Published { .. }) => outcome = Some(Ok(())),
+                Ok(_) => (),
+                Err(error) => {
+                    outcome = Some(Err(error));
+                    break;
+                }
+            }
+        }
+        while outcome.is_none() {
+            outcome = match assembler.advance(work) {
+                Ok(Advance::Published { .. }) => Some(Ok(())),
+                Ok(_) => None,
+                Err(error) => Some(Err(error)),
+            };
+        }
+        match outcome.expect("decided") {
+            Ok(()) => {
+                assert!(wrong > 3, "{wrong}");
+                published += 1;
+                held = (0..NODES as u32)
+                    .filter_map(|row| assembler.surface().and_then(|now| now.position(row)))
+                    .collect();
+                good.clone_from(&next);
+            }
+            Err(ReceiveError::Stretch(error)) => {
+                assert!(wrong <= 3, "{error}");
+                let of = match error {
+                    StretchError::ElementExceeded { .. } => 0,
+                    StretchError::TooFast { .. } => 1,
+                    StretchError::Inverted { .. } => 2,
+                    StretchError::ElementsShrunk { .. } => 3,
+                    other => panic!("{other}"),
+                };
+                refused[of] += 1;
+            }
+            Err(other) => panic!("{other}"),
+        }
+        let frame = reader.latest(Millis(40 * epoch + rng.u32(..90)));
+        let frame = frame.within(Millis(1_000)).expect("published");
+        let label = frame.label().stretch.expect("measured");
+        let whole = nodes.measure(held.as_slice()).expect("admitted");
+        assert_eq!(label.sigma().to_bits(), whole.sigma().to_bits());
+        assert_eq!(nodes.surface(&frame).stretch().map(|s| s.coverage()), Some(Coverage::Measured));
+        let tool = Sphere::new(Vec3::new(60.0 + 5.0 * time.sin(), 0.0, 20.0), 2.5).expect("finite");
+        let (between, beyond) = (frame.interpolated(), frame.extrapolated());
+        for table in [&between, &beyond] {
+            let surface = nodes.surface(table);
+            let at: Vec<Vec3> = (0..nodes.count()).filter_map(|row| table.position(row)).collect();
+            let sigma = surface.stretch().expect("bounded").sigma();
+            assert!(largest_stretch(&nodes, &at) <= f64::from(sigma) * (1.0 + 1e-6));
+            let answer = tracker.closest(&surface, &tool, &Options::new()).expect("sound");
+            unknown += u32::from(answer.fallback == Some(Fallback::Surface));
+            moving += u32::from(table.residual().is_some());
+            let truth =
+                exhaustive(&rows(&surface), &triangles, &Instrument::sphere(tool.centre(), 2.5));
+            let truth = truth.expect("has triangles").separation;
+            let error = (truth - f64::from(answer.closest.separation)).abs();
+            assert!(error <= f64::from(answer.closest.accuracy), "{error}");
+        }
+    }
+    println!(
+        "published {published}, refused {refused:?}, unknown {unknown}, extrapolated {moving}"
+    );
+    assert!(published > 90 && refused.iter().all(|&count| count > 3) && moving > 60);
+    assert!(unknown < 3, "{unknown}");
+}
+
+/// In slices the monitor decides as a whole measurement does, without the assembler, too; and names a node that moves too
+/// fast.
+#[test]
+fn the_monitor_compares_frames_itself() {
+    let mut rng = Rng::with_seed(7);
+    let (_, built) = &built(&mut rng)[0];
+    let tree = built.tree::<u16>().expect("valid");
+    let nodes = Nodes::of(&tree).expect("valid");
+    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let limits = SurfaceLimits::reach_mm(500.0).speed(0.1);
+    let mut monitor = NodeMonitor::new(&nodes).limits(limits);
+    let mut moved = rest.clone();
+    moved[57] += Vec3::Z;
+    let mut decide = |now: &[Vec3], elapsed| {
+        monitor.begin(FrameExtent::Whole);
+        let mut slices = 0;
+        loop {
+            slices += 1;
+            let incoming = IncomingSurface::new(now, nodes.count());
+            let incoming = IncomingSurface { before: Some((&rest[..], elapsed)), ..incoming };
+            match monitor.advance(incoming, 25) {
+                Ok(Admission::Pending) => (),
+                Ok(Admission::Admitted(stretch)) => return Ok((stretch, slices)),
+                Err(error) => return Err(error),
+            }
+        }
+    };
+    let (stretch, slices) = decide(&moved, Millis(20)).expect("slow enough");
+    assert_eq!(stretch, nodes.measure(moved.as_slice()).ok());
+    let work = nodes.count() + nodes.element_count();
+    assert!(slices >= work / 25 && slices <= work / 25 + 2, "{slices} {work}");
+    let too_fast = decide(&moved, Millis(2));
+    assert!(matches!(too_fast, Err(StretchError::TooFast { vertex: 57, .. })), "{too_fast:?}");
+}
+
+/// A tool at some distance outside of the surface.
+fn beside(at: &[Vec3], rng: &mut Rng) -> Instrument {
+    let middle = at.iter().sum::<Vec3>() / at.len() as f32;
+    let near = at[rng.usize(..at.len())];
+    let random = |rng: &mut Rng| Vec3::from([(); 3].map(|()| rng.f32() - 0.5));
+    let start = near + (near - middle).normalize() * 30.0 * rng.f32() + random(rng) * 10.0;
+    let end = if rng.bool() { start } else { start + random(rng) * 40.0 };
+    Instrument::capsule(start, end, 2.5)
+}
+
+/// Node tests on meshes in lattices of two thousand nodes, beside those of geodesics along the surface at the same
+/// stretch: fewer, because straight lines are shorter than ways along the surface.
+#[test]
+fn straight_radii_take_fewer_node_tests() {
+    let mut rng = Rng::with_seed(8);
+    let heart = generate::heart(5_000).expect("a valid size").mesh;
+    let brain = generate::brain(5_000).expect("a valid size");
+    let mut found = Vec::new();
+    for (name, mesh, most) in [("brain", brain, 0.85), ("heart", heart, 0.95)] {
+        let lattice = Volume::lattice(&mesh, [14, 12, 10]).expect("a lattice");
+        let embedded = Builder::new().stretch(1.1).nodes(&lattice).build(&mesh).expect("held");
+        let plain = Builder::new().stretch(1.1).build(&mesh).expect("valid");
+        let at_rest = [&embedded, &plain].map(|built| built.to_rows(&mesh.positions));
+        let trees = [&embedded, &plain].map(|built| built.tree::<u16>().expect("valid"));
+        let mut counts = [0_u64; 2];
+        for _ in 0..400 {
+            let tool = beside(&at_rest[0], &mut rng);
+            for ((tree, rest), count) in trees.iter().zip(&at_rest).zip(&mut counts) {
+                let mut query = Query::<u16, MAX_STACK>::new(tree).expect("deep enough");
+                let options = Options::cold().unsigned();
+                let answer = ask::closest(&mut query, &rest[..], &tool, &options).expect("sound");
+                *count += u64::from(answer.node_tests);
+            }
+        }
+        let part = counts[0] as f64 / counts[1] as f64;
+        println!("{name}: {counts:?} {part:.3}");
+        found.push((name, part, most));
+    }
+    assert!(found.iter().all(|(_, part, most)| part <= most), "{found:?}");
+}
