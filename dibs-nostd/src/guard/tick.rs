@@ -112,7 +112,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
     ) -> (Answer, Result<Admitted, FilterError>) {
         let (period, speed) = (1.0 / self.rate, self.speed * 1_000.0);
         let (answer, admitted) = self.on_latest(tool, now, |tracker, surface, trust| {
-            if let Verdict { state: State::Safe, cause: Some(cause), .. } = *trust {
+            if trust.state == State::Safe {
+                let cause = trust.cause.unwrap_or(Unavailable::NoSurface);
                 return Err(FilterError::Untrusted(cause));
             }
             let tissue = Uncertainty::new(speed).error(trust.margin);

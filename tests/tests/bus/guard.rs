@@ -284,4 +284,11 @@ fn an_admitted_motion_keeps_off_the_tissue_as_it_is() {
     let push = Motion::translation(Vec3::X);
     let (_, admitted) = world.ends.1.admit(&filter, &tool, &push, Millis(1_001));
     assert_eq!(admitted, Err(FilterError::Untrusted(Unavailable::NoSurface)));
+    // Nor at the first tick of all, whose frame came before it.
+    let mut world = World::new(&built, &heart.positions, limits);
+    world.frame();
+    world.now += 1;
+    let (answer, admitted) = world.ends.1.admit(&filter, &tool, &push, Millis(world.now));
+    assert_eq!(answer.trust.state, State::Safe);
+    assert!(matches!(admitted, Err(FilterError::Untrusted(_))), "{admitted:?}");
 }
