@@ -444,7 +444,7 @@ fn straight_radii_take_fewer_node_tests() {
     let heart = generate::heart(5_000).expect("a valid size").mesh;
     let brain = generate::brain(5_000).expect("a valid size");
     let mut found = Vec::new();
-    for (name, mesh, most) in [("brain", brain, 0.85), ("heart", heart, 0.95)] {
+    for (name, mesh, most) in [("brain", brain, 0.85), ("heart", heart, 0.87)] {
         let lattice = Volume::lattice(&mesh, [14, 12, 10]).expect("a lattice");
         let embedded = Builder::new().stretch(1.1).nodes(&lattice).build(&mesh).expect("held");
         let plain = Builder::new().stretch(1.1).build(&mesh).expect("valid");
