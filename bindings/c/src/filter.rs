@@ -1,14 +1,12 @@
 //! The filter of commands: the motion nearest to a commanded one that keeps a chain of tools out of the tissue.
 
-use core::slice::Iter;
-
 use bytemuck::AnyBitPattern;
 use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, MovingSurface, Options};
 use heapless::Vec;
 
-use crate::border::{Handle, Handles, Input, Open, Output, some_of};
+use crate::border::{Handle, Handles, Input, Output, some_of};
 use crate::code::dibs_code;
 use crate::frame::{Table, dibs_frame};
 use crate::query::{cost_of, dibs_cost};
@@ -183,17 +181,12 @@ struct Command<'r> {
 }
 
 impl Command<'_> {
-    fn admit<'p, S: MovingSurface + 'p>(
+    fn admit<S: MovingSurface>(
         &self,
-        pairs: impl Iterator<Item = (&'p mut TheTracker, &'p S)>,
-        tools: Iter<'p, Capsule>,
+        tools: &mut [(&mut TheTracker, &S, &Capsule)],
     ) -> Result<Admitted, dibs_code> {
-        let mut all = Vec::<_, DIBS_FILTER_TOOLS>::new();
-        for ((tracker, surface), tool) in pairs.zip(tools) {
-            all.push((tracker, surface, tool)).map_err(|_| dibs_code::Argument)?;
-        }
         let Self { filter, motion, period, uncertainty, rows } = self;
-        Ok(filter.admit(&mut all, motion, *period, uncertainty, rows)?)
+        Ok(filter.admit(tools, motion, *period, uncertainty, rows)?)
     }
 }
 
@@ -250,11 +243,12 @@ pub extern "C" fn dibs_filter_admit(
         let tools = chain(tools, count)?;
         let mut trackers = trackers.open_all::<DIBS_FILTER_TOOLS>(count)?;
         let found = if frame.is_null() {
-            let mut pairs = Vec::<_, DIBS_FILTER_TOOLS>::new();
-            for tracker in &mut trackers {
-                pairs.push(tracker.parts()?).map_err(|_| dibs_code::Argument)?;
+            let mut all = Vec::<_, DIBS_FILTER_TOOLS>::new();
+            for (tracker, tool) in trackers.iter_mut().zip(&tools) {
+                let (tracker, surface) = tracker.parts()?;
+                all.push((tracker, surface, tool)).map_err(|_| dibs_code::Argument)?;
             }
-            command.admit(pairs.into_iter(), tools.iter())
+            command.admit(&mut all)
         } else {
             let frame = frame.open()?;
             let surface = match &frame.table {
@@ -263,8 +257,11 @@ pub extern "C" fn dibs_filter_admit(
                 Table::Vertices(_) => return Err(dibs_code::Argument),
                 Table::Held(held) => held.moving(),
             };
-            let pairs = trackers.iter_mut().map(|tracker: &mut Open<_>| (tracker.core(), surface));
-            command.admit(pairs, tools.iter())
+            let mut all = Vec::<_, DIBS_FILTER_TOOLS>::new();
+            for (tracker, tool) in trackers.iter_mut().zip(&tools) {
+                all.push((tracker.core(), surface, tool)).map_err(|_| dibs_code::Argument)?;
+            }
+            command.admit(&mut all)
         };
         admitted.set(found?.into());
         Ok(())
