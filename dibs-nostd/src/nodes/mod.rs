@@ -7,7 +7,7 @@
 //! | | |
 //! |---|---|
 //! | [`Nodes`] | the builder's elements and bindings, read from the tree's bytes and validated once |
-//! | [`EmbeddedSurface`] | the surface at some nodes: a [`VertexTable`](crate::VertexTable) |
+//! | [`EmbeddedSurface`] | the surface at some nodes: a [`VertexTable`] |
 //! | [`Nodes::measure`] | the elements' stretch |
 //! | [`NodeMonitor`] | the check of frames of nodes, in slices, for an [`Assembler`](crate::Assembler) |
 //!
