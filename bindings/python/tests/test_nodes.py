@@ -1,9 +1,9 @@
 """Surfaces that the nodes of a volume move."""
 
 import itertools
+import unittest
 
 import numpy as np
-import pytest
 
 import dibs
 
@@ -30,49 +30,58 @@ def lattice(low, high, cells):
     return nodes, np.array(tetrahedra)
 
 
-@pytest.fixture(scope="module")
-def heart():
-    mesh, _ = dibs.generate("heart", 1_000)
-    nodes, tetrahedra = lattice(mesh.vertices.min(0) - 1, mesh.vertices.max(0) + 1, (3, 3, 4))
-    return mesh, nodes, tetrahedra
+class Nodes(unittest.TestCase):
+    """A heart in a box of cells."""
 
+    def setUp(self):
+        self.mesh, _ = dibs.generate("heart", 1_000)
+        vertices = self.mesh.vertices
+        self.nodes, self.tetrahedra = lattice(vertices.min(0) - 1, vertices.max(0) + 1, (3, 3, 4))
 
-def test_nodes_move_the_surface(heart):
-    mesh, nodes, tetrahedra = heart
-    tree = dibs.build(mesh, nodes=nodes, tetrahedra=tetrahedra, stretch=1.3)
-    assert tree.summary["volume"]["nodes"] == len(nodes)
-    plain = dibs.build(mesh, stretch=1.3)
-    matrix = np.array([[1.05, 0.0, 0.1], [0.0, 0.98, 0.0], [0.0, 0.05, 1.0]])
-    for change in (np.eye(3), matrix):
-        surface = tree.surface(nodes @ change.T)
-        assert surface.stretch == pytest.approx(np.linalg.svd(change)[1].max(), abs=1e-4)
-        beside = plain.surface(mesh.vertices @ change.T)
+    def build(self, **how):
+        how = {"nodes": self.nodes, "tetrahedra": self.tetrahedra, **how}
+        return dibs.build(self.mesh, **how)
+
+    def test_nodes_move_the_surface(self):
+        tree = self.build(stretch=1.3)
+        self.assertEqual(tree.summary["volume"]["nodes"], len(self.nodes))
+        plain = dibs.build(self.mesh, stretch=1.3)
+        matrix = np.array([[1.05, 0.0, 0.1], [0.0, 0.98, 0.0], [0.0, 0.05, 1.0]])
         tools = [dibs.spheres((90.0, 10.0, 20.0), 5.0), dibs.spheres((0.0, 0.0, 150.0), 5.0)]
-        for tool in tools:
-            one, other = surface.query(tool), beside.query(tool)
-            assert one["separation"] == pytest.approx(other["separation"], abs=2e-3)
-            assert one["coverage"] == dibs.Coverage.MEASURED
-    assert dibs.Tree(tree.blob).rest.query(tools[0])["separation"] == tree.query(tools[0])["separation"]
+        for change in (np.eye(3), matrix):
+            surface = tree.surface(self.nodes @ change.T)
+            self.assertAlmostEqual(surface.stretch, np.linalg.svd(change)[1].max(), delta=1e-4)
+            beside = plain.surface(self.mesh.vertices @ change.T)
+            for tool in tools:
+                one, other = surface.query(tool), beside.query(tool)
+                np.testing.assert_allclose(one["separation"], other["separation"], atol=2e-3)
+                self.assertTrue(np.all(one["coverage"] == dibs.Coverage.MEASURED))
+        again = dibs.Tree(tree.blob).rest.query(tools[0])["separation"]
+        np.testing.assert_array_equal(again, tree.query(tools[0])["separation"])
+
+    def test_what_is_no_volume_is_refused(self):
+        tree = self.build()
+        for scale, why in [
+            ([1, 1, 1.6], "is stretched by"),
+            ([1, 1, -1], "inverted or flat"),
+        ]:
+            with self.assertRaisesRegex(ValueError, why):
+                tree.surface(self.nodes * scale)
+        with self.assertRaisesRegex(ValueError, "has 5 points and the tree has 80 nodes"):
+            tree.surface(self.nodes[:5])
+        with self.assertRaisesRegex(TypeError, "go together"):
+            dibs.build(self.mesh, nodes=self.nodes)
+        missing = self.tetrahedra.copy()
+        missing[2, 1] = 80
+        for wrong, why in [
+            ({"tetrahedra": self.tetrahedra[:, :3]}, "N x 4 integers"),
+            ({"tetrahedra": missing}, "number 2 has node 80, and there are 80"),
+            ({"tetrahedra": self.tetrahedra[:, [1, 0, 2, 3]]}, "inverted at rest"),
+            ({"nodes": self.nodes + 50.0}, "outside the volume"),
+        ]:
+            with self.assertRaisesRegex(ValueError, why):
+                self.build(**wrong)
 
 
-def test_what_is_no_volume_is_refused(heart):
-    mesh, nodes, tetrahedra = heart
-    tree = dibs.build(mesh, nodes=nodes, tetrahedra=tetrahedra)
-    with pytest.raises(ValueError, match="has 5 points and the tree has 80 nodes"):
-        tree.surface(nodes[:5])
-    with pytest.raises(ValueError, match="is stretched by"):
-        tree.surface(nodes * [1, 1, 1.6])
-    with pytest.raises(ValueError, match="inverted or flat"):
-        tree.surface(nodes * [1, 1, -1])
-    with pytest.raises(TypeError, match="go together"):
-        dibs.build(mesh, nodes=nodes)
-    with pytest.raises(ValueError, match="N x 4 integers"):
-        dibs.build(mesh, nodes=nodes, tetrahedra=tetrahedra[:, :3])
-    with pytest.raises(ValueError, match="number 2 has node 80, and there are 80"):
-        wrong = tetrahedra.copy()
-        wrong[2, 1] = 80
-        dibs.build(mesh, nodes=nodes, tetrahedra=wrong)
-    with pytest.raises(ValueError, match="inverted at rest"):
-        dibs.build(mesh, nodes=nodes, tetrahedra=tetrahedra[:, [1, 0, 2, 3]])
-    with pytest.raises(ValueError, match="outside the volume"):
-        dibs.build(mesh, nodes=nodes + 50.0, tetrahedra=tetrahedra)
+if __name__ == "__main__":
+    unittest.main()
