@@ -49,4 +49,7 @@ pub trait Layout: Method {
 
     /// The positions loaded last. A change counts from the next `update`.
     fn positions_mut(&mut self) -> &mut [Self::Position];
+
+    /// The mesh's vertex that a position is of.
+    fn vertex(&self, row: usize) -> u32;
 }

@@ -27,6 +27,7 @@ pub fn of(experiment: &str, plan: &Plan, options: &Options, records: &mut Record
         command += &format!(" --queries {queries}");
     }
     match options.only {
+        Some(Only::Embedded) => command += " --only embedded",
         Some(Only::Imaging) => command += " --only imaging",
         Some(Only::Contacts) => command += " --only contacts",
         Some(Only::Tracker) => command += " --only tracker",

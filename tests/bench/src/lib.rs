@@ -6,6 +6,7 @@ mod ablation;
 mod brain;
 mod claims;
 pub mod contacts;
+pub mod embedded;
 mod facts;
 mod figures;
 mod heart;
@@ -47,6 +48,7 @@ pub fn bench(options: &Options) -> Result<()> {
         let plan = Plan::of(options);
         match only {
             Only::Imaging => imaging::run(&plan, options, &mut records)?,
+            Only::Embedded => embedded::run(&plan, options, &mut records)?,
             Only::Contacts => contacts::run(&plan, options, &mut records)?,
             Only::Tracker => tracker::run(&plan, options, &mut records)?,
         }
@@ -90,6 +92,7 @@ pub fn run(plan: &Plan, options: &Options) -> Result<Records> {
     ablation::run(plan, &mut records)?;
     search::run(plan, &mut records)?;
     imaging::run(plan, options, &mut records)?;
+    embedded::run(plan, options, &mut records)?;
     contacts::run(plan, options, &mut records)?;
     Ok(records)
 }

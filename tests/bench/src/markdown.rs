@@ -7,7 +7,7 @@ use std::fmt::Write;
 use super::brain::TOOLS;
 use super::names::*;
 use super::record::{Cell, Record, Records};
-use super::{contacts, imaging, tracker};
+use super::{contacts, embedded, imaging, tracker};
 
 /// The page.
 pub fn benchmarks(records: &Records) -> String {
@@ -26,6 +26,7 @@ pub fn benchmarks(records: &Records) -> String {
     control_loop(&mut page, records);
     contacts::table(&mut page, records);
     tracker::table(&mut page, records);
+    embedded::table(&mut page, records);
     ratios(&mut page, records);
     crossovers(&mut page, records);
     page.push_str(FIGURE_6);
@@ -466,7 +467,7 @@ fn mean_sd(r: &Record) -> String {
     if r.sd == 0.0 { number(r.mean) } else { format!("{} ± {}", number(r.mean), number(r.sd)) }
 }
 
-fn median(r: &Record) -> String {
+pub fn median(r: &Record) -> String {
     format!("{} [{}, {}]", number(r.median), number(r.median_low), number(r.median_high))
 }
 

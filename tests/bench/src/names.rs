@@ -10,6 +10,11 @@ pub const MEASURED_WARM: &str = "dibs-measured-warm";
 pub const TRACKER: &str = "dibs-tracker";
 /// The tracker without measured stretch.
 pub const TRACKER_AT_LIMIT: &str = "dibs-tracker-limit";
+/// A tree with nodes, asked by a tracker, or by a whole query.
+pub const NODES_TRACKER: &str = "dibs-nodes-tracker";
+pub const NODES_QUERY: &str = "dibs-nodes-query";
+/// Boxes over the elements, whose vertices are moved when a query reads them.
+pub const LAZY: &str = "aabb-lazy";
 pub const REFIT: &str = "aabb-refit";
 pub const HYBRID: &str = "aabb-hybrid";
 /// Boxes over two frames, for a surface that moves between them.
@@ -33,6 +38,9 @@ pub fn title(method: &str) -> &str {
         MEASURED_WARM => "DIBS, measured stretch, warm start",
         TRACKER => "DIBS, measured stretch, tracker",
         TRACKER_AT_LIMIT => "DIBS, tracker",
+        NODES_TRACKER => "DIBS, nodes, measured stretch, tracker",
+        NODES_QUERY => "DIBS, nodes, measured stretch, warm start",
+        LAZY => "AABB over the elements, moved and refitted below when entered",
         SWEPT => "AABB, boxes over both frames",
         REFIT => "AABB, bottom-up refit",
         HYBRID => "AABB, hybrid refit",

@@ -36,6 +36,8 @@ pub struct Options {
 pub enum Only {
     /// The control loop at imaging rates: ten minutes on a quiet machine.
     Imaging,
+    /// Surfaces that nodes move: ten minutes on a quiet machine.
+    Embedded,
     /// Contacts within a margin: two minutes.
     Contacts,
     /// A tracker on the emulated Cortex-M7, on real surfaces where they are at hand.

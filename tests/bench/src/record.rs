@@ -12,7 +12,7 @@ use super::statistics::Summary;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// `run` (facts about the run), `brain` (tables 1 and 2), `heart` (table 3), `compare`, `crossover`,
-    /// `ablation`, `histogram`, `imaging`, `imaging-heart` and `imaging-run` (their facts), `contacts` and
+    /// `ablation`, `histogram`, `imaging`, `imaging-heart` and `imaging-run` (their facts), `embedded` and `embedded-run`, `contacts` and
     /// `contacts-run`, `tracker` (on the emulated board) and `tracker-run`.
     pub experiment: String,
     pub mesh: String,

@@ -20,7 +20,7 @@ pub(super) const STACK: usize = 96;
 /// A box: its lowest and highest corner.
 pub type Bounds = [Vec3A; 2];
 
-const NOTHING: Bounds = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
+pub(super) const NOTHING: Bounds = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
 
 /// A node. Children are adjacent, after their parent, and all descendants of a node are one
 /// range.
@@ -59,15 +59,8 @@ impl AabbTree {
         let corners = |t: &[u32; 3]| t.map(|v| Vec3A::from(mesh.positions[v as usize]));
         let boxes: Vec<Bounds> =
             mesh.triangles.iter().map(|t| corners(t).into_iter().fold(NOTHING, grown)).collect();
-        let mut builder = Builder {
-            centres: boxes.iter().map(|[low, high]| (low + high) * 0.5).collect(),
-            boxes,
-            items: (0..mesh.triangles.len() as u32).collect(),
-            links: vec![Link { first: 0, count: 0 }],
-        };
-        let depth = builder.node(0, 0..mesh.triangles.len(), 1);
+        let Built { items, links, depth } = build(boxes, LEAF);
         assert!(depth < STACK, "the tree is {depth} deep");
-        let Builder { items, links, .. } = builder;
 
         let rows = Rows::new(mesh, &items);
         let is_leaf = |&node: &u32| links[node as usize].count > 0;
@@ -202,11 +195,33 @@ fn area([low, high]: Bounds) -> f32 {
     size.x * size.y + size.y * size.z + size.z * size.x
 }
 
+/// A tree over some boxes: its nodes, and the boxes in the order of its leaves.
+pub(super) struct Built {
+    pub links: Vec<Link>,
+    pub items: Vec<u32>,
+    pub depth: usize,
+}
+
+/// Builds a tree over some boxes, with at most so many in a leaf.
+pub(super) fn build(boxes: Vec<Bounds>, most: usize) -> Built {
+    let count = boxes.len();
+    let mut builder = Builder {
+        centres: boxes.iter().map(|[low, high]| (low + high) * 0.5).collect(),
+        boxes,
+        items: (0..count as u32).collect(),
+        links: vec![Link { first: 0, count: 0 }],
+        most,
+    };
+    let depth = builder.node(0, 0..count, 1);
+    Built { links: builder.links, items: builder.items, depth }
+}
+
 struct Builder {
     boxes: Vec<Bounds>,
     centres: Vec<Vec3A>,
     items: Vec<u32>,
     links: Vec<Link>,
+    most: usize,
 }
 
 impl Builder {
@@ -257,10 +272,10 @@ impl Builder {
         }
         let Some((cost, axis, cut)) = best else {
             // All centres coincide.
-            return (items.len() > LEAF).then_some(range.start + items.len() / 2);
+            return (items.len() > self.most).then_some(range.start + items.len() / 2);
         };
         let leaf_cost = area(whole) * (items.len() as f32 - 2.0 * BOX_COST);
-        if items.len() <= LEAF && leaf_cost <= cost {
+        if items.len() <= self.most && leaf_cost <= cost {
             return None;
         }
         let is_right =

@@ -163,6 +163,18 @@ impl Rows {
         &mut self.positions
     }
 
+    /// The mesh's vertex of a row.
+    #[must_use]
+    pub fn vertex(&self, row: usize) -> u32 {
+        self.order[row]
+    }
+
+    /// Exchanges the positions for others by row, or for zeros where those are of another mesh.
+    pub fn swap(&mut self, positions: &mut Vec<Vec3A>) {
+        positions.resize(self.order.len(), Vec3A::ZERO);
+        std::mem::swap(&mut self.positions, positions);
+    }
+
     /// The rows of a triangle's corners.
     #[inline(always)]
     #[must_use]

@@ -11,16 +11,16 @@ use crate::method::{Found, Layout, Method, Probe};
 
 /// A tree of boxes with a cut.
 pub struct Hybrid {
-    tree: AabbTree,
+    pub(super) tree: AabbTree,
     /// Inner nodes above the cut, parents first.
     top: Vec<u32>,
-    cut: Vec<Cut>,
+    pub(super) cut: Vec<Cut>,
     frame: u64,
-    start: Start,
+    pub(super) start: Start,
 }
 
 /// A subtree below the cut.
-struct Cut {
+pub(super) struct Cut {
     node: u32,
     first_child: u32,
     end: u32,
@@ -82,7 +82,17 @@ impl Cut {
         }
     }
 
-    fn bounds(&self, tree: &AabbTree) -> Bounds {
+    /// The vertices below.
+    pub fn vertices(&self) -> impl Iterator<Item = u32> {
+        (self.rows.0..self.rows.1).chain(self.others.iter().copied())
+    }
+
+    /// Whether it is a leaf, which no search refits.
+    pub const fn is_leaf(&self) -> bool {
+        self.first_child == self.end
+    }
+
+    pub fn bounds(&self, tree: &AabbTree) -> Bounds {
         let run = &tree.rows.positions()[self.rows.0 as usize..self.rows.1 as usize];
         let start = [run[0]; 2];
         let of_run = run.iter().fold(start, |b, &p| grown(b, p));
@@ -96,9 +106,21 @@ impl Method for Hybrid {
     }
 
     fn update(&mut self) {
+        self.update_by(|tree, _, cut| cut.bounds(tree));
+    }
+
+    fn find(&mut self, tool: &Probe) -> Found {
+        self.find_by(tool, |_, _| ())
+    }
+}
+
+impl Hybrid {
+    /// Refits the boxes at and above the cut: `bounds` gives those of each subtree, with its number.
+    #[inline(always)]
+    pub(super) fn update_by(&mut self, bounds: impl Fn(&mut AabbTree, usize, &Cut) -> Bounds) {
         self.frame += 1;
-        for cut in &self.cut {
-            self.tree.boxes[cut.node as usize] = cut.bounds(&self.tree);
+        for (number, cut) in self.cut.iter().enumerate() {
+            self.tree.boxes[cut.node as usize] = bounds(&mut self.tree, number, cut);
         }
         for &node in self.top.iter().rev() {
             let first = self.tree.links[node as usize].first as usize;
@@ -107,12 +129,15 @@ impl Method for Hybrid {
         }
     }
 
-    fn find(&mut self, tool: &Probe) -> Found {
+    /// The closest pair; `enter` is called with each subtree before it is refitted.
+    #[inline(always)]
+    pub(super) fn find_by(&mut self, tool: &Probe, enter: impl Fn(&mut AabbTree, &Cut)) -> Found {
         let (cuts, frame) = (&mut self.cut, self.frame);
         let refresh = |tree: &mut AabbTree, node: usize| {
             let cut = &mut cuts[(tree.links[node].count & !DEFERRED) as usize];
             if cut.refitted != frame {
                 cut.refitted = frame;
+                enter(tree, cut);
                 tree.refit(cut.first_child as usize..cut.end as usize);
             }
             cut.first_child
@@ -129,5 +154,9 @@ impl Layout for Hybrid {
 
     fn positions_mut(&mut self) -> &mut [Vec3A] {
         self.tree.rows.positions_mut()
+    }
+
+    fn vertex(&self, row: usize) -> u32 {
+        self.tree.rows.vertex(row)
     }
 }

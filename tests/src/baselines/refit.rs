@@ -50,4 +50,8 @@ impl Layout for Refit {
     fn positions_mut(&mut self) -> &mut [Vec3A] {
         self.tree.rows.positions_mut()
     }
+
+    fn vertex(&self, row: usize) -> u32 {
+        self.tree.rows.vertex(row)
+    }
 }

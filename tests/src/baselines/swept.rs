@@ -26,9 +26,22 @@ impl Swept {
 
     /// Loads the next frame. The one loaded last becomes the one before.
     pub fn load(&mut self, positions: &[Vec3]) {
-        self.before.clear();
-        self.before.extend_from_slice(self.tree.rows.positions());
+        self.next();
         self.tree.rows.load(positions);
+    }
+
+    /// The next frame's positions, to be written. The one written last becomes the one
+    /// before.
+    pub fn next(&mut self) -> &mut [Vec3A] {
+        let rows = &mut self.tree.rows;
+        rows.swap(&mut self.before);
+        rows.positions_mut()
+    }
+
+    /// The mesh's vertex that a position is of.
+    #[must_use]
+    pub fn vertex(&self, row: usize) -> u32 {
+        self.tree.rows.vertex(row)
     }
 
     /// All work of a frame before its first query.

@@ -6,6 +6,7 @@
 //! held, and at every tick where it moves. All searches start from the last answer's triangle, where a method can.
 
 pub mod controller;
+pub mod course;
 pub mod ours;
 pub mod race;
 
@@ -26,9 +27,10 @@ use super::plan::{Options, Plan, Progress};
 use super::record::{Cell, Record, Records};
 use super::statistics::{Paired, Summary};
 use super::subjects::{self, Heart};
-use controller::{Held, Interpolated, Tick};
+use controller::{Held, Interpolated};
+use course::{Course, TICK_RATE};
 use ours::{Frames, Surface, Tracking, Warm};
-use race::{Contender, Period, Race};
+use race::Contender;
 
 /// The experiment on brains; the heart's is [`HEART`], and its facts are those of [`RUN`].
 pub const EXPERIMENT: &str = "imaging";
@@ -37,17 +39,13 @@ pub const RUN: &str = "imaging-run";
 
 /// Frames a second.
 pub const RATES: [u32; 2] = [30, 60];
-/// Ticks of the control loop a second.
-const TICK_RATE: u32 = 1_000;
 /// Seconds of a heartbeat. A recorded motion's frame a second is no living heart's.
 const BEAT: f32 = 1.0;
-/// Imaging periods that train the hybrid's split level.
-const TRAINING: u32 = 4;
 /// The motion's seed.
 const SEED: u64 = 3_000;
 
 /// The turns of which parry3d takes part in one: its queries and refits at every tick would dominate the time of a run.
-const fn rarely(triangles: usize) -> usize {
+pub const fn rarely(triangles: usize) -> usize {
     match triangles {
         400_000.. => 40,
         40_000.. => 10,
@@ -75,25 +73,17 @@ pub fn run(plan: &Plan, options: &Options, records: &mut Records) -> Result<()> 
             name: subject.name,
             mesh: &subject.mesh,
             limit: STRETCH,
-            frame: &|seconds, positions| pulse.deform(seconds, positions),
             ticks: plan.imaging_ticks,
         };
-        scene.run(records)?;
+        scene.run(&|seconds, positions| pulse.deform(seconds, positions), records)?;
     }
     let Some(heart) = subjects::hearts(plan.heart_triangles)?.pop() else { return Ok(()) };
     let limit = heart.stretch.map_or_else(|| sufficient_stretch(&heart), Ok)?;
     let Heart { name, mesh, motion, .. } = heart;
     let motion = Motion { rate: motion.frames.len() as f32 / BEAT, ..motion };
     let beat = Beat::new(&motion);
-    let scene = Scene {
-        experiment: HEART,
-        name,
-        mesh: &mesh,
-        limit,
-        frame: &|seconds, positions| beat.deform_at(seconds, positions),
-        ticks: plan.imaging_ticks,
-    };
-    scene.run(records)
+    let scene = Scene { experiment: HEART, name, mesh: &mesh, limit, ticks: plan.imaging_ticks };
+    scene.run(&|seconds, positions| beat.deform_at(seconds, positions), records)
 }
 
 /// A surface in motion.
@@ -103,8 +93,6 @@ struct Scene<'m> {
     mesh: &'m Mesh,
     /// The tree's limit on stretch.
     limit: f32,
-    /// The surface's positions after so many seconds.
-    frame: &'m dyn Fn(f32, &mut Vec<Vec3>),
     ticks: u32,
 }
 
@@ -112,24 +100,31 @@ struct Scene<'m> {
 type Levels = [u32; 2];
 
 impl Scene<'_> {
-    fn run(&self, records: &mut Records) -> Result<()> {
+    /// On a surface with these positions after so many seconds.
+    fn run(&self, frame: &dyn Fn(f32, &mut Vec<Vec3>), records: &mut Records) -> Result<()> {
         let size = self.mesh.triangles.len();
         let progress = Progress::start(&format!("{} of {size} triangles: building", self.name), 0);
         let built = Builder::new().stretch(self.limit).build(self.mesh)?;
         let boxes = AabbTree::new(self.mesh);
         let rest = Motion { frames: vec![self.mesh.positions.clone()], ..Motion::default() };
         let beat = Beat::new(&rest);
-        let levels = [self.level(&boxes, &beat, Surface::Held)?, {
-            self.level(&boxes, &beat, Surface::Continuous)?
-        }];
+        let course = Course { frame, tool: &|tick| beat.tool(tick) };
+        let level = |surface| {
+            course.split_level(size, RATES[0], |level| {
+                of_boxes(HYBRID, surface, Hybrid::new(boxes.clone(), level).warm())
+            })
+        };
+        let levels = [level(Surface::Held)?, level(Surface::Continuous)?];
         progress.finish();
         for rate in RATES {
             match built.index_bits() {
                 16 => {
-                    self.at(rate, &built, &built.tree::<u16>()?, &boxes, levels, &beat, records)?;
+                    let tree = built.tree::<u16>()?;
+                    self.at(rate, &built, &tree, &boxes, levels, &course, records)?;
                 }
                 _ => {
-                    self.at(rate, &built, &built.tree::<u32>()?, &boxes, levels, &beat, records)?;
+                    let tree = built.tree::<u32>()?;
+                    self.at(rate, &built, &tree, &boxes, levels, &course, records)?;
                 }
             }
         }
@@ -145,7 +140,7 @@ impl Scene<'_> {
         tree: &Tree<'_, I>,
         boxes: &AabbTree,
         levels: Levels,
-        beat: &Beat<'_>,
+        course: &Course<'_>,
         records: &mut Records,
     ) -> Result<()> {
         let size = self.mesh.triangles.len();
@@ -175,55 +170,11 @@ impl Scene<'_> {
         let swept = Swept::new(boxes.clone());
         contenders.push(Contender::new(SWEPT, Surface::Continuous, swept));
 
-        let periods = self.ticks * rate / TICK_RATE;
         let title = format!("{} of {size} triangles at {rate} Hz", self.name);
-        let progress = Progress::start(&title, u64::from(periods));
-        let mut race = self.race(rate, beat, contenders);
-        for number in 0..periods {
-            race.period(self.period(rate, number + FIRST, beat))?;
-            progress.one();
-        }
-        race.finish()?;
-        progress.finish();
-        self.record(rate, levels, &race.contenders, records);
+        let periods = self.ticks * rate / TICK_RATE;
+        let contenders = course.run(&title, rate, periods, contenders)?;
+        self.record(rate, levels, &contenders, records);
         Ok(())
-    }
-
-    /// A race that is ready for the period [`FIRST`].
-    fn race<'a>(&self, rate: u32, beat: &Beat<'_>, contenders: Vec<Contender<'a>>) -> Race<'a> {
-        let before = self.period(rate, FIRST - 2, beat).frame;
-        Race::new(contenders, before, self.period(rate, FIRST - 1, beat))
-    }
-
-    /// A frame, and the ticks until the next.
-    fn period(&self, rate: u32, number: u32, beat: &Beat<'_>) -> Period {
-        let mut frame = Vec::new();
-        (self.frame)(number as f32 / rate as f32, &mut frame);
-        let first = |number: u32| (number * TICK_RATE).div_ceil(rate);
-        let ticks = (first(number)..first(number + 1)).map(|tick| Tick {
-            tool: beat.tool(tick),
-            share: (tick * rate % TICK_RATE) as f32 / TICK_RATE as f32,
-        });
-        Period { frame, ticks: ticks.collect() }
-    }
-
-    /// The hybrid's best split level.
-    fn level(&self, boxes: &AabbTree, beat: &Beat<'_>, surface: Surface) -> Result<u32> {
-        let deepest = self.mesh.triangles.len().ilog2().saturating_sub(2).max(2);
-        let mut best = (f64::INFINITY, 1);
-        for level in 2..=deepest {
-            let hybrid = of_boxes(HYBRID, surface, Hybrid::new(boxes.clone(), level).warm());
-            let mut race = self.race(RATES[0], beat, vec![hybrid]);
-            for number in 0..TRAINING {
-                race.period(self.period(RATES[0], number + FIRST, beat))?;
-            }
-            race.finish()?;
-            let median = Summary::of(&race.contenders[0].samples.total).median;
-            if median < best.0 {
-                best = (median, level);
-            }
-        }
-        Ok(best.1)
     }
 
     fn record(
@@ -237,38 +188,11 @@ impl Scene<'_> {
             let condition = condition(rate, surface);
             let size = self.mesh.triangles.len();
             let cell = Cell::new(self.experiment, &self.name, size, &condition);
-            let of_surface = || contenders.iter().filter(|c| c.surface == surface);
-            for Contender { name, samples, .. } in of_surface() {
-                let mut push = |metric: &str, values: &[f64], unit: &str| {
-                    if !values.is_empty() {
-                        let summary = Summary::of(values);
-                        records.push(Record::summary(&cell, name, metric, &summary, unit));
-                    }
-                };
-                push("update", &samples.update, "us a tick");
-                push("query", &samples.query, "us a tick");
-                push("total", &samples.total, "us a tick");
-                push("node_tests", &samples.node_tests, "tests");
-                push("triangle_tests", &samples.triangle_tests, "tests");
-                push("disagreement", &[f64::from(samples.disagreement)], "mm");
-                if *name == TRACKER || *name == TRACKER_AT_LIMIT {
-                    push("fallbacks", &[f64::from(samples.fallbacks)], "ticks");
-                }
-            }
+            let of_surface: Vec<_> = contenders.iter().filter(|c| c.surface == surface).collect();
+            record(&cell, &of_surface, &OURS, records);
             let level = f64::from(levels[surface as usize]);
             records.push(Record::number(&cell, HYBRID, "split_level", level, "levels"));
-            let find = |name: &str| of_surface().find(|c| c.name == name);
-            for ours in OURS {
-                let Some(ours) = find(ours) else { continue };
-                for theirs in of_surface().filter(|c| !OURS.contains(&c.name)) {
-                    // Periods are numbered from 0, and these methods take part in all.
-                    let same = theirs.samples.period.iter().map(|&p| ours.samples.total[p]);
-                    let ratio = Paired::of(&theirs.samples.total, &same.collect::<Vec<_>>()).ratio;
-                    let metric = format!("total {}", theirs.name);
-                    let unit = "theirs / ours";
-                    records.push(Record::summary(&cell, ours.name, &metric, &ratio, unit));
-                }
-            }
+            let find = |name: &str| of_surface.iter().find(|c| c.name == name);
             if let (Some(tracker), Some(warm)) = (find(TRACKER), find(MEASURED_WARM)) {
                 let ratio = Paired::of(&warm.samples.query, &tracker.samples.query).ratio;
                 let metric = format!("query {MEASURED_WARM}");
@@ -278,8 +202,35 @@ impl Scene<'_> {
     }
 }
 
-/// The first period that is timed: two come before it.
-const FIRST: u32 = 2;
+/// The samples of each method on one surface, and how many times as long as each of ours the others take.
+pub fn record(cell: &Cell, of_surface: &[&Contender<'_>], ours: &[&str], records: &mut Records) {
+    for Contender { name, samples, .. } in of_surface {
+        let mut push = |metric: &str, values: &[f64], unit: &str| {
+            if !values.is_empty() {
+                let summary = Summary::of(values);
+                records.push(Record::summary(cell, name, metric, &summary, unit));
+            }
+        };
+        push("update", &samples.update, "us a tick");
+        push("query", &samples.query, "us a tick");
+        push("total", &samples.total, "us a tick");
+        push("node_tests", &samples.node_tests, "tests");
+        push("triangle_tests", &samples.triangle_tests, "tests");
+        push("disagreement", &[f64::from(samples.disagreement)], "mm");
+        if [TRACKER, TRACKER_AT_LIMIT, NODES_TRACKER].contains(name) {
+            push("fallbacks", &[f64::from(samples.fallbacks)], "ticks");
+        }
+    }
+    for own in of_surface.iter().filter(|c| ours.contains(&c.name)) {
+        for theirs in of_surface.iter().filter(|c| !ours.contains(&c.name)) {
+            // Periods are numbered from 0, and these methods take part in all.
+            let same = theirs.samples.period.iter().map(|&p| own.samples.total[p]);
+            let ratio = Paired::of(&theirs.samples.total, &same.collect::<Vec<_>>()).ratio;
+            let metric = format!("total {}", theirs.name);
+            records.push(Record::summary(cell, own.name, &metric, &ratio, "theirs / ours"));
+        }
+    }
+}
 
 /// Methods of this library that take part.
 pub const OURS: [&str; 4] = [TRACKER, TRACKER_AT_LIMIT, MEASURED_WARM, WARM];

@@ -12,7 +12,7 @@ use glam::Vec3;
 use super::controller::{Controller, Tick, Times};
 
 /// Nodes that a tracker remembers with their children: enough here, so that none falls back for want of places.
-const OPENED: usize = 1_024;
+pub const OPENED: usize = 1_024;
 
 /// The surface between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,9 +25,9 @@ pub enum Surface {
 
 /// A frame in the tree's order, with its stretch once that is measured.
 #[derive(Default)]
-struct Frame {
-    rows: Vec<Vec3>,
-    stretch: Option<MeasuredStretch>,
+pub struct Frame {
+    pub rows: Vec<Vec3>,
+    pub stretch: Option<MeasuredStretch>,
 }
 
 impl VertexTable for Frame {
@@ -71,14 +71,22 @@ impl<'t, I: Index> Frames<'t, I> {
     /// Measures the last frame.
     fn measure(&mut self) {
         let Some(monitor) = &mut self.monitor else { return };
-        let count = self.after.rows.len() as u32;
-        monitor.begin(FrameExtent::Whole);
-        monitor.moved(0..count);
-        let verdict = monitor.advance(IncomingSurface::new(&self.after, count), u32::MAX);
-        let Ok(Admission::Admitted(stretch)) = verdict else { panic!("{verdict:?}") };
-        monitor.published();
-        self.after.stretch = stretch;
+        self.after.stretch = measured(monitor, &self.after);
     }
+}
+
+/// The stretch of a whole frame.
+pub fn measured<I: Index>(
+    monitor: &mut StretchMonitor<'_, I>,
+    frame: &(impl VertexTable + ?Sized),
+) -> Option<MeasuredStretch> {
+    let count = frame.len() as u32;
+    monitor.begin(FrameExtent::Whole);
+    monitor.moved(0..count);
+    let verdict = monitor.advance(IncomingSurface::new(frame, count), u32::MAX);
+    let Ok(Admission::Admitted(stretch)) = verdict else { panic!("{verdict:?}") };
+    monitor.published();
+    stretch
 }
 
 /// A tracker: the motion is measured once a frame, and the stretch too unless the tree's limit is assumed.
@@ -124,7 +132,7 @@ impl<I: Index> Controller for Tracking<'_, I> {
     }
 }
 
-fn track<I: Index, S: MovingSurface>(
+pub fn track<I: Index, S: MovingSurface>(
     tracker: &mut Tracker<'_, I, MAX_STACK, OPENED>,
     surface: &S,
     tool: &Probe,
@@ -162,14 +170,17 @@ impl<I: Index> Controller for Warm<'_, I> {
         for tick in ticks {
             times.query(|| match surface {
                 Surface::Held => ask(query, &frames.after, &tick.tool),
-                Surface::Continuous => ask(query, &Between::new(frames, tick.share), &tick.tool),
+                Surface::Continuous => {
+                    let between = Between::new(&frames.before, &frames.after, tick.share);
+                    ask(query, &between, &tick.tool)
+                }
             });
         }
     }
 }
 
 /// The surface between two frames whose motion is not measured.
-struct Between<'f> {
+pub struct Between<'f> {
     before: &'f Frame,
     after: &'f Frame,
     share: f32,
@@ -177,8 +188,7 @@ struct Between<'f> {
 }
 
 impl<'f> Between<'f> {
-    fn new<I>(frames: &'f Frames<'_, I>, share: f32) -> Self {
-        let Frames { before, after, .. } = frames;
+    pub fn new(before: &'f Frame, after: &'f Frame, share: f32) -> Self {
         let both = before.stretch.zip(after.stretch);
         let stretch = both.and_then(|(before, after)| before.or_larger(after));
         Self { before, after, share, stretch }
@@ -201,7 +211,7 @@ impl VertexTable for Between<'_> {
     }
 }
 
-fn ask<I: Index>(
+pub fn ask<I: Index>(
     query: &mut Query<'_, I, MAX_STACK>,
     surface: &impl VertexTable,
     tool: &Probe,
@@ -214,7 +224,7 @@ fn ask<I: Index>(
     found(&closest.expect("finite positions"))
 }
 
-fn found(closest: &Proximity) -> Found {
+pub fn found(closest: &Proximity) -> Found {
     let tests = Some([closest.node_tests, closest.triangle_tests]);
     Found { separation: closest.separation.max(0.0), tests }
 }

@@ -116,4 +116,8 @@ impl Layout for Obvhs {
     fn positions_mut(&mut self) -> &mut [Vec3A] {
         self.rows.positions_mut()
     }
+
+    fn vertex(&self, row: usize) -> u32 {
+        self.rows.vertex(row)
+    }
 }

@@ -109,4 +109,8 @@ impl Layout for ParryBvh {
     fn positions_mut(&mut self) -> &mut [Vec3] {
         &mut self.positions
     }
+
+    fn vertex(&self, row: usize) -> u32 {
+        row as u32
+    }
 }

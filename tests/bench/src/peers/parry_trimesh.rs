@@ -58,4 +58,8 @@ impl Layout for ParryTriMesh {
     fn positions_mut(&mut self) -> &mut [Vector] {
         &mut self.positions
     }
+
+    fn vertex(&self, row: usize) -> u32 {
+        row as u32
+    }
 }

@@ -7,7 +7,7 @@ use dibs_bench::imaging::ours::Surface;
 use dibs_bench::imaging::race::{Contender, Period, Race};
 use dibs_bench::plan::{Options, Plan};
 use dibs_bench::record::{Record, Records};
-use dibs_bench::{contacts, documents, imaging, run, write};
+use dibs_bench::{contacts, documents, embedded, imaging, run, write};
 use dibs_nostd::Sphere;
 use dibs_nostd::glam::Vec3;
 use dibs_tests::method::{Found, Probe};
@@ -54,16 +54,19 @@ fn a_part_is_recorded_apart_from_the_rest() {
     let mut records = Records(vec![
         Record::fact("run", "kind", "another run"),
         Record::fact("imaging", "an older run", "to be replaced"),
+        Record::fact("embedded", "an older run", "to be replaced"),
         Record::fact("contacts", "an older run", "to be replaced"),
         Record::fact("brain", "total", "another run"),
     ]);
-    let others = [records.0[0].clone(), records.0[3].clone()];
+    let others = [records.0[0].clone(), records.0[4].clone()];
     imaging::run(&Plan::smoke(), &Options::default(), &mut records).expect("methods agree");
+    embedded::run(&Plan::smoke(), &Options::default(), &mut records).expect("methods agree");
     contacts::run(&Plan::smoke(), &Options::default(), &mut records).expect("all are found");
     assert_eq!(records.0[..2], others);
     let of = |name: &str| records.0[2..].iter().filter(|r| r.experiment.starts_with(name)).count();
-    assert!(of("imaging") > 10 && of("contacts") > 10);
-    assert_eq!(of("imaging") + of("contacts") + 2, records.0.len());
+    let parts = ["imaging", "embedded", "contacts"].map(of);
+    assert!(parts.iter().all(|&count| count > 10), "{parts:?}");
+    assert_eq!(parts.iter().sum::<usize>() + 2, records.0.len());
     assert!(records.0.iter().all(|r| r.metric != "an older run"));
 }
 

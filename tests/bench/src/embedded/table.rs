@@ -1,0 +1,92 @@
+//! The experiment's part of `docs/evidence/benchmarks.md`.
+
+use std::fmt::Write;
+
+use super::super::markdown::{median, number};
+use super::super::names::*;
+use super::super::record::{Cell, Record, Records};
+use super::{CONDITIONS, EXPERIMENT, FRAME, RUN};
+
+const HEAD: &str = "\n## Table 7: surfaces that nodes move\n\n\
+    A frame brings the nodes of a lattice around the brain, which pulses in long waves; the rest of the work is \
+    each method's own, and counts, in µs a tick. DIBS checks every element, measures the nodes' motion, and \
+    computes the vertices that a query reads. Refitted trees have all vertices moved by four nodes each, in their \
+    own order and layout, once a frame where the surface is held and at every tick where it is continuous. *Boxes \
+    over the elements* move no vertex before a query reads it: their boxes are around nodes, and what is below \
+    is moved and refitted when a query enters it; they check nothing. *Boxes over both frames* are refitted once a \
+    frame. *Ratio* is the peer's total over that of the tracker; in brackets the 95 % interval of the median of each \
+    period's. All searches start from the last answer's triangle. Answers are compared at every tick, and the run \
+    stops if two differ by more than 0.001 mm.\n\n";
+
+/// The part, where the experiment was run.
+pub fn table(page: &mut String, records: &Records) {
+    let meshes = records.meshes(EXPERIMENT);
+    if meshes.is_empty() {
+        return;
+    }
+    page.push_str(HEAD);
+    let fact = |metric| records.note_of(RUN, metric);
+    let _ = writeln!(
+        page,
+        "Recorded by `{}` on {}, commit {}, {}.\n\n\
+         | surface | nodes | tetrahedra | a frame, bytes | two buffers, bytes | tree, bytes a triangle \
+         | check, µs | check of the triangles, µs | triangles / elements |\n|---|---|---|---|---|---|---|---|---|",
+        fact("command"),
+        fact("machine"),
+        fact("commit"),
+        fact("date")
+    );
+    for (mesh, triangles) in &meshes {
+        let cell = Cell::new(EXPERIMENT, mesh, *triangles as usize, FRAME);
+        let value = |method, metric, of: fn(&Record) -> f64| {
+            records.find(&cell, method, metric).map_or("–".to_owned(), |r| number(of(r)))
+        };
+        let exact = |metric| {
+            let found = records.find(&cell, NODES_QUERY, metric);
+            found.map_or("–".to_owned(), |r| format!("{:.0}", r.mean))
+        };
+        let flash = records.find(&cell, NODES_QUERY, "flash").map_or(0.0, |r| r.mean);
+        let ratio = records.find(&cell, NODES_QUERY, "check of triangles");
+        let _ = writeln!(
+            page,
+            "| {mesh}, {triangles} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            exact("nodes"),
+            exact("elements"),
+            exact("payload"),
+            exact("memory"),
+            number(flash / *triangles as f64),
+            value(NODES_QUERY, "check", |r| r.median),
+            value(DIBS, "check", |r| r.median),
+            ratio.map_or("–".to_owned(), median),
+        );
+    }
+    page.push_str(
+        "\n| asked | surface | best refitted tree | its total | tracker | ratio | boxes over the elements: total \
+         | ratio | boxes over both frames: ratio | whole query: total |\n|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (condition, ..) in CONDITIONS {
+        for (mesh, triangles) in &meshes {
+            let cell = Cell::new(EXPERIMENT, mesh, *triangles as usize, condition);
+            let total = |method| records.find(&cell, method, "total").map(|r| r.mean);
+            let peers = OTHERS.into_iter().filter_map(|peer| Some((peer, total(peer)?)));
+            let Some((best, theirs)) = peers.min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+            let text = |method| total(method).map_or("–".to_owned(), number);
+            let ratio = |peer| {
+                let found = records.find(&cell, NODES_TRACKER, &format!("total {peer}"));
+                found.map_or("–".to_owned(), median)
+            };
+            let _ = writeln!(
+                page,
+                "| {condition} | {mesh}, {triangles} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                title(best),
+                number(theirs),
+                text(NODES_TRACKER),
+                ratio(best),
+                text(LAZY),
+                ratio(LAZY),
+                ratio(SWEPT),
+                text(NODES_QUERY),
+            );
+        }
+    }
+}
