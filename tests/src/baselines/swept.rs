@@ -26,13 +26,13 @@ impl Swept {
 
     /// Loads the next frame. The one loaded last becomes the one before.
     pub fn load(&mut self, positions: &[Vec3]) {
-        self.next();
+        self.arriving();
         self.tree.rows.load(positions);
     }
 
     /// The next frame's positions, to be written. The one written last becomes the one
     /// before.
-    pub fn next(&mut self) -> &mut [Vec3A] {
+    pub fn arriving(&mut self) -> &mut [Vec3A] {
         let rows = &mut self.tree.rows;
         rows.swap(&mut self.before);
         rows.positions_mut()

@@ -123,7 +123,7 @@ pub struct MovedSwept {
 
 impl MovedSwept {
     pub fn new(mut swept: Swept, blends: &[Blend]) -> Self {
-        let rows = swept.next().len();
+        let rows = swept.arriving().len();
         let blends = (0..rows).map(|row| blends[swept.vertex(row) as usize]).collect();
         Self { swept, blends, nodes: Vec::new(), arrived: Vec::new() }
     }
@@ -155,7 +155,7 @@ impl MovedSwept {
         }
         nodes.clear();
         nodes.extend(arrived.drain(..).map(Vec3A::from));
-        for (position, blend) in swept.next().iter_mut().zip(blends) {
+        for (position, blend) in swept.arriving().iter_mut().zip(blends) {
             *position = blend.of(nodes);
         }
     }
