@@ -45,8 +45,8 @@ const FRAME: &str = "a frame";
 /// The cells of the lattice around a brain of so many triangles: about 250, 700 and 2,100 nodes.
 const fn lattice(triangles: u32) -> [u32; 3] {
     match triangles {
-        ..=10_000 => [6, 5, 5],
-        ..=100_000 => [9, 8, 7],
+        ..10_000 => [6, 5, 5],
+        10_000..100_000 => [9, 8, 7],
         _ => [10, 14, 12],
     }
 }
