@@ -25,6 +25,26 @@ pub struct SweepAnswer {
 
 /// The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices each
 /// move straight and evenly.
+///
+/// ```
+/// use dibs_build::{Builder, generate};
+/// use dibs_nostd::{Odometer, Options, Sphere, Sweep, SweepAnswer, Tracker, Tree, glam::Vec3};
+///
+/// let generate::MovingMesh { mesh: heart, motion } = generate::heart(1_000)?;
+/// let built = Builder::new().stretch(1.5).build(&heart)?;
+/// let tree = Tree::<u16>::from_bytes(built.blob())?;
+/// let [first, second] = [0, 1].map(|frame: usize| built.to_rows(&motion.frames[frame]));
+/// let step = Odometer::new(&tree).step(first.as_slice(), second.as_slice());
+/// let mut tracker = Tracker::<_, 32, 256>::new(&tree)?;
+///
+/// // From 50 mm beside the heart into it, while it moves by half a step.
+/// let beside = Sphere::new(Vec3::new(90.0, 0.0, 0.0), 2.0)?;
+/// let sweep = Sweep { step: &step, t: [0.5, 1.0], tools: [beside, Sphere::new(Vec3::ZERO, 2.0)?] };
+/// let SweepAnswer { clear_until, contact, .. } = tracker.sweep(&sweep, 1.0, 32, &Options::new())?;
+/// assert!((0.1..1.0).contains(&clear_until), "met on the way, and not before this time");
+/// assert!(contact.is_none_or(|first| first >= clear_until));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Sweep<'s, 'v, W: ?Sized, V: ?Sized, T> {
     /// The surface's frames.

@@ -49,7 +49,10 @@ use step::{Earlier, Step};
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Advance, Assembler, Frames, Millis, NoGate, VertexTable, glam::Vec3};
+/// use dibs_nostd::{
+///     Advance, Assembler, BusHealth, FrameView, Frames, LastHeartbeat, Millis, NoGate, VertexTable,
+///     glam::Vec3,
+/// };
 ///
 /// static FRAMES: Frames<3> = Frames::new();
 /// let (writer, mut reader) = FRAMES.split().unwrap();
@@ -64,6 +67,13 @@ use step::{Earlier, Step};
 /// }
 /// assert_eq!(assembler.advance(100), Ok(Advance::Published { epoch: 1 }));
 /// assert_eq!(reader.read().unwrap().position(2), Some(Vec3::Z));
+///
+/// // Beside it, what the bus interrupt itself may want to know.
+/// let published: FrameView<'_> = assembler.surface().unwrap();
+/// assert_eq!(published.position(0), Some(Vec3::X));
+/// let BusHealth { packet, rejections, .. } = assembler.health();
+/// assert_eq!((packet, rejections), (Some(Millis(0)), 0));
+/// assert_eq!(assembler.last_heartbeat(), None::<LastHeartbeat>);
 /// ```
 #[derive(Debug)]
 pub struct Assembler<'f, G, M = NoMac> {

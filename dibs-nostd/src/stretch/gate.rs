@@ -63,6 +63,57 @@ impl<'a, V: ?Sized> IncomingSurface<'a, V> {
 /// For each frame: [`begin`](Self::begin) once, then [`moved`](Self::moved) for each packet and
 /// [`advance`](Self::advance) as often as there is time, until it admits or refuses the frame. A frame may be abandoned
 /// at any moment, and another begun. [`published`](Self::published) follows once an admitted frame is published.
+///
+/// A check of one's own goes around the library's: here whole frames wait until somebody has confirmed them.
+///
+/// ```
+/// use core::ops::Range;
+/// use dibs_build::{Builder, generate};
+/// use dibs_nostd::{
+///     Admission, FrameExtent, Gate, IncomingSurface, StretchError, StretchMonitor, Tree, VertexTable,
+/// };
+///
+/// struct Confirmed<G> {
+///     measured: G,
+///     is_confirmed: bool,
+/// }
+///
+/// impl<G: Gate> Gate for Confirmed<G> {
+///     fn begin(&mut self, changed: FrameExtent) {
+///         self.is_confirmed |= changed == FrameExtent::Partial;
+///         self.measured.begin(changed);
+///     }
+///     fn moved(&mut self, rows: Range<u32>) {
+///         self.measured.moved(rows);
+///     }
+///     fn advance<V: VertexTable + ?Sized>(
+///         &mut self,
+///         arriving: IncomingSurface<'_, V>,
+///         work: u32,
+///     ) -> Result<Admission, StretchError> {
+///         let admission = self.measured.advance(arriving, work)?;
+///         Ok(if self.is_confirmed { admission } else { Admission::Pending })
+///     }
+///     fn published(&mut self) {
+///         self.is_confirmed = false;
+///         self.measured.published();
+///     }
+/// }
+///
+/// let heart = generate::heart(320)?.mesh;
+/// let built = Builder::new().build(&heart)?;
+/// let tree = Tree::<u16>::from_bytes(built.blob())?;
+/// let rows = built.to_rows(&heart.positions);
+/// let mut gate = Confirmed { measured: StretchMonitor::new(&tree)?, is_confirmed: false };
+///
+/// gate.begin(FrameExtent::Whole);
+/// gate.moved(0..tree.vertex_count());
+/// let arriving = || IncomingSurface::new(rows.as_slice(), tree.vertex_count());
+/// assert_eq!(gate.advance(arriving(), u32::MAX)?, Admission::Pending);
+/// gate.is_confirmed = true;
+/// assert!(matches!(gate.advance(arriving(), u32::MAX)?, Admission::Admitted(Some(_))));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Gate {
     /// A frame begins, and the one before is forgotten unless it was published. O(1).
     fn begin(&mut self, changed: FrameExtent);

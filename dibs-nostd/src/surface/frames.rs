@@ -53,15 +53,19 @@ const PUBLISHED: u32 = 8;
 /// RAM: 12 bytes a vertex and buffer, plus some 50 a buffer. All zero at start, so it lies in `.bss`.
 ///
 /// ```
-/// use dibs_nostd::{FrameLabel, Frames, Millis, VertexTable, glam::Vec3};
+/// use dibs_nostd::{
+///     FrameLabel, Frames, Millis, OutOfTableError, SplitError, VertexTable, glam::Vec3,
+/// };
 ///
 /// static FRAMES: Frames<2> = Frames::new();
 /// let (mut writer, mut reader) = FRAMES.split().expect("split once");
+/// assert!(matches!(FRAMES.split(), Err(SplitError)));
 /// assert!(reader.read().is_none(), "nothing published yet");
 ///
 /// writer.begin();
 /// writer.push(Vec3::X).unwrap();
 /// writer.push(Vec3::Y).unwrap();
+/// assert!(matches!(writer.push(Vec3::Z), Err(OutOfTableError { vertex: 2, .. })));
 /// let label = FrameLabel { epoch: 7, received: Millis(1000), position_error: 0.0, stretch: None };
 /// writer.publish(label).unwrap();
 ///

@@ -291,7 +291,7 @@ impl<V: VertexTable + ?Sized> MovingSurface for MovingTable<'_, V> {
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
-/// use dibs_nostd::{MovingSurface, Odometer, Tree};
+/// use dibs_nostd::{MotionReading, MovingSurface, Odometer, Tree};
 ///
 /// let generate::MovingMesh { mesh: heart, motion } = generate::heart(320)?;
 /// let built = Builder::new().stretch(1.5).build(&heart)?;
@@ -301,7 +301,8 @@ impl<V: VertexTable + ?Sized> MovingSurface for MovingTable<'_, V> {
 /// let mut odometer = Odometer::new(&tree);
 /// let before = odometer.start(first.as_slice());
 /// let step = odometer.step(first.as_slice(), second.as_slice());
-/// assert!(step.length() > 0.0 && step.after().motion() != before.motion());
+/// let reading: Option<MotionReading> = step.after().motion();
+/// assert!(step.length() > 0.0 && reading != before.motion());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]

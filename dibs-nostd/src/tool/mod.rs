@@ -62,6 +62,18 @@ pub trait Tool: Copy + sealed::Sealed {
     ///
     /// Both the distance and the comparison with the limit are accurate to [`ACCURACY`]` * S`.
     /// A triangle with a corner that is not a number, or infinite, is never closer than any limit.
+    ///
+    /// ```
+    /// use dibs_nostd::{AxisPair, Sphere, Tool, glam::Vec3};
+    ///
+    /// let tool = Sphere::new(Vec3::new(0.0, 0.0, 3.0), 1.0)?;
+    /// let triangle = [Vec3::NEG_X, Vec3::X, Vec3::Y];
+    /// let AxisPair { distance_squared, .. } =
+    ///     tool.closest_on_triangle(&triangle, f32::INFINITY).expect("finite");
+    /// assert_eq!(distance_squared, 9.0); // from the axis, not from the tool's surface
+    /// assert!(tool.closest_on_triangle(&triangle, 8.0).is_none());
+    /// # Ok::<(), dibs_nostd::ToolError>(())
+    /// ```
     fn closest_on_triangle(&self, corners: &[Vec3; 3], limit_squared: f32) -> Option<AxisPair>;
 }
 

@@ -247,6 +247,16 @@ impl<'a, I: Index> Tree<'a, I> {
 
     /// The mesh's number of the vertex in `row`; `None` outside the table or where the tree was emitted without its
     /// vertex order.
+    ///
+    /// ```
+    /// use dibs_build::{Builder, generate};
+    /// use dibs_nostd::{Tree, VertexNumber};
+    ///
+    /// let built = Builder::new().build(&generate::heart(320)?.mesh)?;
+    /// let tree = Tree::<u16>::from_bytes(built.blob())?;
+    /// assert_eq!(tree.vertex_number(5), Some(VertexNumber(built.vertex_order()[5])));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub const fn vertex_number(&self, row: u32) -> Option<VertexNumber> {
         match format::vertex_number::<I>(self.sections.order, row) {

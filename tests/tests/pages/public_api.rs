@@ -41,6 +41,68 @@ fn the_public_items_are_those_that_are_listed() {
     }
 }
 
+/// Where an item of the core's root is used: examples, products, and the code of documents.
+const USES: [&str; 11] = [
+    "examples",
+    "dibs-nostd/examples",
+    "dibs-build/examples",
+    "dibs-build/src",
+    "dibs-stream",
+    "dibs-cli/src",
+    "firmware-example/src",
+    "bindings/c/src",
+    "bindings/python/src",
+    "viewer/src",
+    "docs/guide.md",
+];
+
+#[test]
+fn every_item_of_the_root_is_in_an_example_or_a_product() {
+    let path = Path::new(REPOSITORY).join("docs/evidence/public-api.txt");
+    let listed = fs::read_to_string(path).expect("the list");
+    let items = listed.lines().filter_map(|line| line.strip_prefix("dibs_nostd::"));
+    let items: BTreeSet<&str> = items.filter(|item| !item.contains(':')).collect();
+    let mut words = BTreeSet::new();
+    for place in USES {
+        read_words(&Path::new(REPOSITORY).join(place), |text| text.to_owned(), &mut words);
+    }
+    // The core itself counts by the examples in its documentation.
+    read_words(&Path::new(REPOSITORY).join("dibs-nostd/src"), documented_code, &mut words);
+    let unused: Vec<_> =
+        items.iter().filter(|item| !words.contains(item.trim_end_matches('!'))).collect();
+    assert!(items.len() > 50 && unused.is_empty(), "in no example: {unused:?}");
+}
+
+/// Adds the words of all sources at a place.
+fn read_words(place: &Path, part: fn(&str) -> String, words: &mut BTreeSet<String>) {
+    if place.is_dir() {
+        for entry in fs::read_dir(place).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.file_name().is_none_or(|name| name != "target" && name != "tests") {
+                read_words(&path, part, words);
+            }
+        }
+    } else if place.extension().is_some_and(|extension| extension == "rs" || extension == "md") {
+        let text = part(&fs::read_to_string(place).expect("text"));
+        words.extend(text.split(|c: char| !c.is_alphanumeric() && c != '_').map(str::to_owned));
+    }
+}
+
+/// The code between the fences of a source's documentation.
+fn documented_code(source: &str) -> String {
+    let mut is_code = false;
+    let lines = source.lines().filter_map(|line| {
+        let line = line.trim_start();
+        let text = line.strip_prefix("///").or_else(|| line.strip_prefix("//!"))?;
+        if text.trim_start().starts_with("```") {
+            is_code = !is_code;
+            return None;
+        }
+        is_code.then_some(text)
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
 #[derive(Default)]
 struct Listing {
     items: BTreeSet<String>,

@@ -83,7 +83,7 @@ impl Contact {
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
-/// use dibs_nostd::{Capsule, Contacts, Options, Query, Tree, glam::Vec3};
+/// use dibs_nostd::{Capsule, ContactIter, Contacts, Options, Query, Tree, glam::Vec3};
 ///
 /// let heart = generate::heart(1_000)?.mesh;
 /// let built = Builder::new().build(&heart)?;
@@ -96,6 +96,8 @@ impl Contact {
 /// query.contacts(rows.as_slice(), &tool, 15.0, &Options::new(), &mut contacts)?;
 /// assert!(contacts.iter().all(|contact| contact.separation <= 15.0));
 /// assert!(contacts.bound() >= 15.0); // all there are
+/// let near: ContactIter<'_> = contacts.within(10.0)?; // what a constraint acts on
+/// assert!(near.is_complete());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
