@@ -1,4 +1,4 @@
-//! A frame as the vertices that a query reads, whatever moves them.
+//! The surface's vertices in one frame: the frame's own, or computed from its nodes.
 
 use dibs_nostd::nodes::{Nodes, NodesError};
 use dibs_nostd::{

@@ -68,7 +68,7 @@ pub fn tools<T>(path: &Path, each: impl Fn(ToolSpec) -> Result<T>) -> Result<Vec
 pub struct Recorded {
     /// Positions of the tree's vertices.
     pub frames: Vec<Vec<Vec3>>,
-    /// Positions of its nodes, where these move it.
+    /// Positions of the nodes, of a tree with nodes.
     nodes: Option<Vec<Vec<Vec3>>>,
     pub stretches: Vec<MeasuredStretch>,
     /// Frames a second.

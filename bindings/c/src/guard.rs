@@ -95,7 +95,7 @@ pub struct dibs_answer {
     pub lag: u32,
     /// The health of the bus.
     pub link: dibs_link,
-    /// The surface that was searched, and the pair on it, whatever it is trusted: for records.
+    /// The surface that was searched, and the pair on it, trusted or not: for records.
     pub searched: dibs_searched,
 }
 

@@ -17,7 +17,7 @@ pub(crate) struct Embedding {
     pub tetrahedra: Vec<[u32; 4]>,
     pub is_box: bool,
     pub vertices: Vec<Bound>,
-    /// Largest distance of a vertex from its position in the mesh (mm): that of the weights' rounding.
+    /// Largest distance (mm) of a vertex from its position in the mesh, caused by rounding its weights.
     pub error: f64,
 }
 

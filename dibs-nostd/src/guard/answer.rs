@@ -24,7 +24,7 @@ pub struct Answer {
     pub link: Link,
     /// The surface that was searched; `None` before the first.
     pub searched: Option<Searched>,
-    /// The answer on that surface, whatever it is trusted.
+    /// The answer on that surface, trusted or not.
     pub tracked: Result<TrackerAnswer, Unavailable>,
 }
 

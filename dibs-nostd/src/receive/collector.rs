@@ -1,8 +1,10 @@
-//! The order of frames and packets: new or old, and the moment at which a frame is complete.
+//! Which frames, packets and hellos are taken, when a frame is complete, and the receiver's status.
 //!
-//! It does not depend on a frame's content (vertices or weights) or its storage.
+//! Of a frame's content only whether it is partial matters.
 //!
 //! One file, because the order of its checks is the protocol's.
+
+mod heartbeats;
 
 use super::ReceiveError;
 use super::arrivals::{Arrivals, Misplaced, Place};
@@ -10,9 +12,11 @@ use super::health::{BusHealth, FrameName, Trouble};
 use crate::surface::{AHEAD, Millis, elapsed};
 use crate::tree::SurfaceFacts;
 use crate::wire::{
-    Answer, Begin, Commit, Content, Counters, Event, FrameId, Heartbeat, Hello, Mac, Packet,
-    PublishedStatus, Status, is_newer,
+    Answer, Begin, Commit, Content, Counters, Event, FrameId, Hello, Mac, Packet, PublishedStatus,
+    Status, is_newer,
 };
+
+pub use heartbeats::LastHeartbeat;
 
 /// The frame in work.
 #[derive(Clone, Copy, Debug)]
@@ -49,20 +53,6 @@ struct Published {
     oldest: Millis,
 }
 
-/// The last heartbeat.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct LastHeartbeat {
-    /// The sender's session.
-    pub session: u32,
-    /// Number of the heartbeat.
-    pub beat: u32,
-    /// The newest epoch that the sender had begun.
-    pub epoch: u32,
-    /// The receiver's clock when it came.
-    pub received: Millis,
-}
-
 /// Decides which packets and frames to take, and counts them.
 #[derive(Debug)]
 pub(super) struct Collector {
@@ -82,10 +72,11 @@ pub(super) struct Collector {
     is_greeted: bool,
     /// The heartbeat refused last as not later, where nothing is under a tag.
     straggler: Option<(u32, u32)>,
-    /// The receiver's clock at the packet in work, and at the last packet and heartbeat that were taken.
+    /// The receiver's clock at the packet in work, and at the last packet that was taken.
     now: Millis,
     packet: Option<Millis>,
-    heartbeat_at: Option<Millis>,
+    /// The latest time at which the sender is known to have lived.
+    alive_at: Option<Millis>,
     trouble: Trouble,
     /// The frame refused or abandoned last, and why: the cause of its packets that follow.
     refused: Option<(FrameName, Event)>,
@@ -94,9 +85,6 @@ pub(super) struct Collector {
 
 /// Time in which one hello without a tag is taken: anybody can send them. A sender repeats its own after 50 ms.
 const GREETING: Millis = Millis(20);
-
-/// Most heartbeats lost between two that are taken for one sender's.
-const STRAGGLERS: u32 = 16;
 
 /// Time without a packet after which an earlier frame may replace the one in work.
 const PATIENCE: Millis = Millis(100);
@@ -121,7 +109,7 @@ impl Collector {
             straggler: None,
             now: Millis(0),
             packet: None,
-            heartbeat_at: None,
+            alive_at: None,
             trouble: Trouble::new(),
             refused: None,
             counters: Counters::new(),
@@ -183,7 +171,7 @@ impl Collector {
         let (rejections, forgeries) = self.trouble.counts(self.now);
         BusHealth {
             packet: self.packet,
-            heartbeat: self.heartbeat_at,
+            heartbeat: self.alive_at,
             rejections,
             forgeries,
             transit,
@@ -363,56 +351,6 @@ impl Collector {
         Ok(true)
     }
 
-    pub fn heartbeat<M: Mac>(
-        &mut self,
-        packet: &Packet<'_>,
-        heartbeat: Heartbeat,
-        mac: &M,
-    ) -> Result<(), ReceiveError> {
-        let Heartbeat { session, beat, echo } = heartbeat;
-        let epoch = packet.epoch;
-        if !packet.is_genuine(mac, session) {
-            return Err(ReceiveError::Forged { epoch });
-        }
-        let before_published =
-            self.published.is_some_and(|published| is_newer(published.id.session, session));
-        let before_last = self.heartbeat.is_some_and(|last| {
-            if last.session == session {
-                !is_newer(beat, last.beat)
-            } else {
-                !is_newer(session, last.session)
-            }
-        });
-        // Without a key one stray heartbeat from the far future must not refuse all genuine ones. Two in a row that are
-        // in order are a sender's; a repeated one is not.
-        let is_in_order = !M::TAGGED
-            && self.heartbeat.is_none_or(|last| last.beat != beat)
-            && self.straggler.is_some_and(|(of, before)| {
-                of == session && (1..=STRAGGLERS).contains(&beat.wrapping_sub(before))
-            });
-        if before_published || before_last && !is_in_order {
-            self.straggler = Some((session, beat));
-            return Err(ReceiveError::Stale { epoch });
-        }
-        self.heartbeat = Some(LastHeartbeat { session, beat, epoch, received: self.now });
-        self.note_alive(echo);
-        Ok(())
-    }
-
-    /// The sender lived when it heard the status that it echoes; without an echo, when the heartbeat comes: so heartbeats
-    /// that somebody held back are as old as they are. An echo ahead of this clock is of another run, and shows nothing.
-    fn note_alive(&mut self, echo: Option<u32>) {
-        let at = echo.map_or(self.now, Millis);
-        // One that is ahead by no more than two clocks' readings may be counts as now.
-        let age = elapsed(self.now, at);
-        let at = if age == Millis(0) { self.now } else { at };
-        // By their ages, so that the longest silence ends with a heartbeat.
-        let is_later = self.heartbeat_at.is_none_or(|last| age <= self.now.since(last));
-        if age.0 <= i32::MAX as u32 && is_later {
-            self.heartbeat_at = Some(at);
-        }
-    }
-
     /// The frame in work has become the published one.
     pub fn published(&mut self, frame: &Frame) {
         self.frame = None;
@@ -500,16 +438,6 @@ impl Collector {
     }
 }
 
-impl Misplaced {
-    pub fn rejection(self, sequence: u16) -> Option<ReceiveError> {
-        match self {
-            Self::Duplicate => None,
-            Self::Order => Some(ReceiveError::Order { sequence }),
-            Self::Gaps => Some(ReceiveError::Gaps { sequence }),
-        }
-    }
-}
-
 impl Frame {
     pub const fn is_partial(&self) -> bool {
         matches!(self.begin.content, Content::Partial { .. })
@@ -532,7 +460,9 @@ impl Frame {
         }
         match self.arrivals.locate(sequence, rows) {
             Ok(place) => Ok(Some(place)),
-            Err(misplaced) => misplaced.rejection(sequence).map_or(Ok(None), Err),
+            Err(Misplaced::Duplicate) => Ok(None),
+            Err(Misplaced::Order) => Err(ReceiveError::Order { sequence }),
+            Err(Misplaced::Gaps) => Err(ReceiveError::Gaps { sequence }),
         }
     }
 }

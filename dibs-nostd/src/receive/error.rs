@@ -117,7 +117,7 @@ pub enum ReceiveError {
     },
     /// A coordinate or weight is larger than this receiver allows.
     TooFar {
-        /// The first such row, 0 for a quantisation box that reaches too far.
+        /// The first such row.
         row: u32,
     },
     /// The packets do not add up to the commit's digest. The frame is abandoned.
@@ -213,7 +213,10 @@ impl fmt::Display for ReceiveError {
             }
             Self::Base { epoch } => write!(f, "frame {epoch}, to be changed, is not published"),
             Self::NotReady { first } => {
-                write!(f, "the rows before row {first} are not copied yet")
+                write!(
+                    f,
+                    "published rows that the packet from row {first} on changes are not copied yet"
+                )
             }
             Self::RowCount { rows } => write!(f, "the frame has {rows} rows"),
             Self::Encoding => write!(f, "not the content or encoding that is received here"),

@@ -15,14 +15,15 @@ use crate::wire::{FrameId, Packet, is_newer};
 pub struct BusHealth {
     /// Time of the last packet taken; repeated packets and hellos do not count.
     pub packet: Option<Millis>,
-    /// Time of the last heartbeat taken.
+    /// Latest time at which the sender is known to have lived: that of the status that a heartbeat echoed, or without an
+    /// echo that of its arrival.
     pub heartbeat: Option<Millis>,
-    /// Frames refused, abandoned or without a begin since the last publication, each counted once. Packets of other
-    /// meshes and of frames that are over do not count.
+    /// Frames refused, abandoned or without a begin since the last publication: each once, unless more than four were
+    /// refused in turn. Packets of other meshes and of frames that are over do not count.
     pub rejections: u32,
     /// Packets without a genuine tag, less [`FORGERIES_A_SECOND`](Self::FORGERIES_A_SECOND), at most
-    /// [`MOST_FORGERIES`](Self::MOST_FORGERIES). Publications change nothing but the first, which sets it to 0: until
-    /// then the sender did not know the receiver's challenge.
+    /// [`MOST_FORGERIES`](Self::MOST_FORGERIES). The first publication sets it to 0, because until
+    /// then the sender did not know the receiver's challenge. Later ones leave it.
     pub forgeries: u32,
     /// Time from the status that the published frame echoes to the arrival of its begin packet: an upper bound on the
     /// latency of each. [`Millis::MAX`] where it echoes none.

@@ -46,7 +46,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         }
         let takes_weights = self.gate.weight_range(0).is_some();
         let here = self.surface_facts();
-        let is_acceptable = |begin: &Begin| {
+        let check_begin = |begin: &Begin| {
             if begin.rows != self.writer.len() {
                 Err(ReceiveError::RowCount { rows: begin.rows })
             } else if (begin.content == Content::Modal) != takes_weights {
@@ -62,7 +62,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         let contribution = contribution.ok_or(ReceiveError::Forged { epoch: packet.epoch })?;
         // Even if this frame is refused, the next one must find the published rows copied.
         self.takes_partial |= is_partial;
-        let begun = self.collector.begin::<M>(packet, begin, contribution, is_acceptable)?;
+        let begun = self.collector.begin::<M>(packet, begin, contribution, check_begin)?;
         let Some(frame) = begun else { return Ok(Progress::Duplicate) };
         self.is_admitted = false;
         self.clean();

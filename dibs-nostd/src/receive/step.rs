@@ -85,8 +85,9 @@ impl Step {
             _ => None,
         };
         let (passed, off) = known.unwrap_or((0, PredictionCheck::UNKNOWN.off));
-        // Of a velocity that changes steadily, after as long a time again as the last step took: more than was seen, if
-        // the step took longer than the one before.
+        // With a steady acceleration the error, after a time `b` beyond a step that took `a`, grows as `b (a + b)`. That
+        // seen had the last step's time for `b`; the next one is taken to have it for both. With `t = b / a` of the one
+        // seen the ratio is `2 t / (1 + t)`.
         let growth = 2.0 * self.t / (1.0 + self.t);
         let growth = if growth > 1.0 { growth } else { 1.0 };
         PredictionCheck { shown: sqrt(self.off) * growth, passed, off, ..PredictionCheck::UNKNOWN }

@@ -1,6 +1,6 @@
 //! `cargo xtask mutants`: changes operators of the core by `cargo-mutants`, and lists the changes that no test notices.
 //!
-//! `.cargo/mutants.toml` lists accepted survivors with their reasons, `docs/mutants.md` the survivors among mutants tried by hand.
+//! `.cargo/mutants.toml` lists accepted survivors with their reasons, and those among mutants tried by hand.
 
 use std::fs;
 use std::process::Command;

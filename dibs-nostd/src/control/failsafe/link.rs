@@ -8,7 +8,7 @@ use crate::surface::Millis;
 pub struct Link {
     /// Time since the last good packet; [`Millis::MAX`] before the first.
     pub silence: Millis,
-    /// Time since the last heartbeat; [`Millis::MAX`] before the first.
+    /// Time since the sender was last known to live, by its heartbeats; [`Millis::MAX`] before the first.
     pub heartbeat: Millis,
     /// Frames that failed since the last publication: [`BusHealth::rejections`](crate::BusHealth::rejections).
     pub rejections: u32,

@@ -94,7 +94,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
         // The search below takes the positions as exact; the answer's accuracy has their error already.
         let accuracy = closest.accuracy - vertices.position_error();
-        let has_side = closest.side != Side::Undefined(NoSide::CutShort);
+        let is_side_searched = closest.side != Side::Undefined(NoSide::CutShort);
         found.has_no_side |= may_be_inside(closest);
         let is_of = |row| options.part.is_none() || tree.label(row) == options.part;
         let mut own =
@@ -105,7 +105,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         {
             (contact.across, spent) = pair.across(contact, stack, options)?;
         }
-        if closest.side == Side::Inside || (closest.lower > margin && has_side) {
+        if closest.side == Side::Inside || (closest.lower > margin && is_side_searched) {
             if let Some(contact) = own {
                 found.insert(contact);
             }
@@ -162,7 +162,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
         made.triangle_tests = made.triangle_tests.saturating_add(left - look.left);
         let is_met = is_crossing || closest.is_at_surface();
-        let is_known = has_side && (is_met || !closest.is_cut_short());
+        let is_known = is_side_searched && (is_met || !closest.is_cut_short());
         // The closest pair is certain then, whatever became of the search.
         if is_known
             && !is_crossing
@@ -181,8 +181,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if is_crossing && meets > 1 {
             found.lower_bound(closest.lower);
         }
-        // Without a side the tool may be inside, deeper than every pair seen.
-        if !has_side {
+        // The budget ended before the side: the tool may be inside, deeper than every pair seen.
+        if !is_side_searched {
             found.lower_bound(f32::NEG_INFINITY);
         } else if from < limit {
             // A valley's lowest triangle is less than a ridge below the low one that was visited.

@@ -2,8 +2,8 @@
 //!
 //! The distance from the tool is a height over the surface, and each valley of it is a contact. A flood from each low
 //! triangle, the lowest first, goes down to a triangle with nothing lower next to it. Then it rises over triangles in
-//! much the same direction by a ridge, as high as one beside which a contact has activation 0. So none ends while it
-//! acts. If it runs into the flood of a lower one in much the same direction, both are one valley: a flat wall along a
+//! much the same direction by a ridge. That ridge is the one up to which a contact has activation 0, so no contact ends
+//! while it acts. If it runs into the flood of a lower one in much the same direction, both are one valley: a flat wall along a
 //! capsule is one, however many triangles are equally far, and two walls are two, however low the ridge between.
 //!
 //! Over a triangle the height is convex. So the path from its lowest point to a neighbour leads over no ridge exactly if
@@ -342,7 +342,7 @@ impl<const N: usize> Basins<N> {
         self.at(entry).map(|near| sqrt(near.square))
     }
 
-    /// Takes the marks of all entries, those of floods too.
+    /// Clears the marks of all entries, also those of floods.
     pub(super) fn forget(&mut self) {
         self.reached_by.get_mut(..self.count).unwrap_or_default().fill(NONE);
     }

@@ -77,7 +77,7 @@ impl Contact {
 /// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
 /// contact, and some with no lower vertex next to theirs, at most half of `NEAR`.
 ///
-/// RAM on a 32-bit processor: 148 bytes for each of the `N`, 20 for each of the `NEAR`, and 60.
+/// RAM on a 32-bit processor: 152 bytes for each of the `N`, 20 for each of the `NEAR`, and 28.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -172,7 +172,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     }
 
     /// The contacts, deepest first, for a constraint that acts within `margin` (mm). The deepest is among them for
-    /// certain; others may be missing where [`ContactIter::is_complete`] says so.
+    /// certain; others may be missing where [`ContactIter::is_complete`] says so. Those beyond `margin`, of a query with a
+    /// larger one, are among them too.
     ///
     /// # Errors
     /// [`Unavailable::CutShort`] if the budget ended before the deepest contact was known, or no query filled the list;
@@ -195,11 +196,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         Ok(ContactIter { contacts, bound, is_complete })
     }
 
-    /// Gives a list whose tool may be inside, because the closest pair has no side, that of `closest`: a pair whose side
-    /// is certain from a tracker's last tick. That pair is a contact
-    /// then, and the only one unless the tool is outside. Other lists stay as they are, and so does one whose `closest` has
-    /// no direction.
-    pub(super) fn settle(&mut self, closest: &Proximity) {
+    /// Resolves a list whose tool may be inside, because its closest pair has no side, by `closest`, whose side a tracker's
+    /// last tick makes certain. That pair becomes a contact, and the only one unless the tool is outside. Other lists stay as
+    /// they are, and so does one whose `closest` has no direction.
+    pub(super) fn resolve_side(&mut self, closest: &Proximity) {
         if !self.found.has_no_side || matches!(closest.side, Side::Undefined(_)) {
             return;
         }
@@ -267,10 +267,10 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// that pair is the first. An axis that meets the surface in several places may be inside in several parts: only the
     /// deepest is a contact, and its separation is the list's [bound](Contacts::bound).
     ///
-    /// Two valleys of the distance in much the same direction, within 7 degrees, are one contact unless a ridge parts
-    /// them of more than a 128th of the axis' distance there, at most of the margin. So a flat wall along a capsule is one;
-    /// so may be two within 15 degrees. Walls in other directions are contacts of their own, if a ridge of more than a 512th of
-    /// that distance and a 128th of the margin parts them; lower ones may be. Pairs with the inner side of a
+    /// Two valleys of the distance in nearly the same direction, within 7 degrees, are one contact unless a ridge parts
+    /// them that is higher than a 128th of the axis' distance there, or of the margin if that is less. So a flat wall along
+    /// a capsule is one; so may be two within 15 degrees. In other directions each is a contact of its own if the ridge is
+    /// higher than a 512th of that distance and a 128th of the margin; others may be. Pairs with the inner side of a
     /// sheet, say the far side of an organ, are not contacts. Where the side is undefined the tool is taken to be outside.
     /// If that is because the budget ended, contacts may be missing at any distance: see [`Contacts::within`].
     ///

@@ -108,7 +108,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 }
             };
             if let Some(gathered) = gathered {
-                if !waiting.is_empty() && !gathered.are_gathered() {
+                if !waiting.is_empty() && !gathered.is_gathering() {
                     return Ok(None);
                 }
                 return search.gather(gathered, waiting).map(Some);

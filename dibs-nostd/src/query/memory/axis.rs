@@ -30,7 +30,7 @@ impl Axis {
         }
         let (start, end) = (start.length_squared(), (start + end).length_squared());
         let larger = if start > end { start } else { end };
-        // A span is within 2^-23 of the length, each difference within 2^-24 of itself.
+        // Each component of a span is off by at most `2 U` of the axis' length; a difference rounds by `U` of itself.
         let rounding = 8.0 * U * (tool.axis_length() + self.length);
         unit.up(sqrt(larger) * (1.0 + 16.0 * U) + rounding)
     }

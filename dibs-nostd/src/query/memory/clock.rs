@@ -60,16 +60,22 @@ impl MotionClock {
         Deadline((self.now as u32).wrapping_add(self.unit.down(bound)))
     }
 
-    /// The deadline of a distance (mm), rounded up: bounds with a deadline not after it are less than the distance.
+    /// The deadline of a distance (mm), rounded up: every bound up to the distance has a deadline not after it.
     #[inline(always)]
     pub fn within(&self, distance: f32) -> Deadline {
         Deadline((self.now as u32).wrapping_add(self.unit.up(distance)))
     }
 
-    /// The length (mm) of so many units, to the nearest number; they are less than half a turn.
+    /// The length (mm) of so many units, rounded up; they are less than half a turn.
     #[inline(always)]
     pub fn length(&self, units: u32) -> f32 {
-        self.unit.length(units as i32)
+        self.unit.length(units as i32) * (1.0 + 4.0 * f32::EPSILON)
+    }
+
+    /// The motion (mm) since an earlier reading of this clock, rounded up; `None` from half a turn on.
+    pub fn moved_since(&self, before: Reading) -> Option<f32> {
+        let units = self.since(before);
+        (units < i32::MAX as u32).then(|| self.length(units))
     }
 
     /// A deadline after that of every bound.

@@ -120,17 +120,21 @@ impl<'m> KnownDepthMut<'m> {
             waiting.clear();
             state.shells = roots.key();
         }
+        let moved = clock.moved_since(state.at);
+        if moved.is_none() {
+            state.forget();
+            waiting.clear();
+        }
         let State { points, leaves, at, .. } = state;
-        let moved = clock.since(*at);
-        if moved > 0 {
-            let moved = clock.length(moved) * (1.0 + 4.0 * f32::EPSILON);
+        let moved = moved.unwrap_or(0.0);
+        if moved > 0.0 {
             for point in &mut points.points {
                 point.depth = raised(point.depth, moved);
                 point.bound = raised(point.bound, moved);
             }
             leaves.iter_mut().for_each(|leaves| leaves.add_motion(moved));
-            *at = clock.now();
         }
+        *at = clock.now();
         // Of several solids another one may be the deepest.
         let least = past.filter(|_| roots == RootSet::ALL).map_or(0.0, |past| -past.upper);
         let between = [least, past.map_or(f32::INFINITY, |past| -past.lower)];

@@ -87,7 +87,7 @@ pub(in crate::query) struct Front<const OPENED: usize> {
     free: u16,
     /// The closest triangle's place.
     pub best: Option<Place>,
-    /// The place to look at next for a node to close.
+    /// The place looked at last, for a node to close.
     hand: usize,
 }
 
@@ -253,7 +253,8 @@ impl FrontMut<'_> {
         Some(())
     }
 
-    /// The next place, in turn, of a node below the root whose children all have bounds.
+    /// Moves the hand on by one place. The node there and its first deadline, if it may be closed: opened, below a root,
+    /// all children with bounds.
     pub fn next_closable(&mut self) -> Option<(u16, Deadline)> {
         *self.hand = if *self.hand + 1 < *self.end { *self.hand + 1 } else { 0 };
         let node = self.nodes.get(*self.hand)?;

@@ -21,8 +21,8 @@ pub(in crate::query) struct Leaves {
     beyond: f32,
     /// The same of those that were passed over while the leaves are gathered.
     passed: f32,
-    /// A search for them has begun and not ended.
-    are_gathered: bool,
+    /// A search for them goes on.
+    is_gathering: bool,
     /// Where the point is on its axis: 0 at the start, 1 at the end.
     parameter: f32,
     /// The motion (mm) of the last tick.
@@ -46,7 +46,7 @@ impl Leaves {
             moved: 0.0,
             beyond: 0.0,
             passed: f32::INFINITY,
-            are_gathered: false,
+            is_gathering: false,
             parameter: f32::NAN,
             step: 0.0,
         }
@@ -55,18 +55,18 @@ impl Leaves {
     pub fn forget(&mut self) {
         self.leaves.clear();
         (self.is_over, self.moved, self.beyond, self.passed) = (false, 0.0, 0.0, f32::INFINITY);
-        self.are_gathered = false;
+        self.is_gathering = false;
     }
 
     /// Forgets them, and begins to gather them anew.
     pub fn begin(&mut self) {
         self.forget();
-        self.are_gathered = true;
+        self.is_gathering = true;
     }
 
-    /// Whether a search for them has begun and not ended.
-    pub const fn are_gathered(&self) -> bool {
-        self.are_gathered
+    /// Whether a search for them goes on.
+    pub const fn is_gathering(&self) -> bool {
+        self.is_gathering
     }
 
     /// Forgets them for the leaves around another point of the axis.
@@ -77,7 +77,7 @@ impl Leaves {
 
     /// Forgets them and their point, and the subtrees that wait for them.
     pub fn end(&mut self, waiting: &mut VecView<Waiting>) {
-        if self.are_gathered {
+        if self.is_gathering {
             waiting.clear();
         }
         self.forget_for(f32::NAN);
@@ -149,7 +149,7 @@ impl Leaves {
 
     /// All leaves are gathered that were not passed over, unless there was no room for one. `slack` is the rounding.
     pub fn close(&mut self, slack: f32) {
-        self.are_gathered = false;
+        self.is_gathering = false;
         if !self.is_over {
             self.beyond = self.passed - slack;
         }

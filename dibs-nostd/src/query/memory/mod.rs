@@ -20,7 +20,7 @@ pub mod range;
 pub mod separation;
 pub mod waiting;
 
-use crate::surface::motion::Unit;
+use crate::surface::motion::{FAR, Unit};
 use crate::{MotionReading, Tool};
 use axis::Axis;
 use clock::{MotionClock, Reading};
@@ -29,8 +29,9 @@ use front::Front;
 use range::RangeFront;
 use separation::KnownSeparation;
 
-/// Most units that the clock may count between two tests of a bound: half of the range that deadlines can tell apart.
-const FARTHEST: u32 = 1 << 29;
+/// Most units between two tests of a bound. With [`FAR`], the longest bound, it stays below half a turn of a deadline.
+const LONGEST_WAIT: u32 = 1 << 29;
+const _: () = assert!(LONGEST_WAIT < (1 << 31) - FAR as u32 - 1);
 
 /// A tracker's memory.
 #[derive(Clone, Debug)]
@@ -77,7 +78,7 @@ impl<const STACK: usize, const OPENED: usize, const RANGE: usize> Memory<STACK, 
         let (axis, before) = self.last.ok_or(Lost::Start)?;
         let surface = motion.and_then(|motion| motion.since(&before)).ok_or(Lost::Surface)?;
         let moved = surface.saturating_add(u64::from(axis.step(tool, self.clock.unit())));
-        if moved > u64::from(FARTHEST.saturating_sub(self.clock.since(self.complete))) {
+        if moved > u64::from(LONGEST_WAIT.saturating_sub(self.clock.since(self.complete))) {
             return Err(Lost::Jump);
         }
         Ok(moved as u32)
@@ -108,7 +109,7 @@ impl<const STACK: usize, const OPENED: usize, const RANGE: usize> Memory<STACK, 
     }
 
     /// Forgets the last tick.
-    pub fn forget(&mut self) {
+    pub fn forget_tick(&mut self) {
         self.last = None;
     }
 }

@@ -41,11 +41,45 @@ impl KnownSeparation {
     /// What is certain now.
     pub fn now(&self, clock: MotionClock) -> Option<Certain> {
         let (certain, at) = self.last?;
-        let moved = clock.length(clock.since(at)) * (1.0 + 4.0 * f32::EPSILON);
+        let moved = clock.moved_since(at)?;
         // Rounded outwards.
         let (lower, upper) = (certain.lower - moved, certain.upper + moved);
         let (lower, upper) =
             (lower - lower.abs() * f32::EPSILON, upper + upper.abs() * f32::EPSILON);
         Some(Certain { lower, upper, ..certain })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Tree;
+    use crate::surface::motion::Unit;
+
+    #[test]
+    fn nothing_is_certain_after_more_motion_than_the_clock_tells_apart() {
+        let mesh = dibs_build::generate::heart(320).unwrap().mesh;
+        let built = dibs_build::Builder::new().build(&mesh).unwrap();
+        let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+        let mut clock = MotionClock::new(Unit::of(&tree));
+        let mut known = KnownSeparation::NONE;
+        let certain = Certain {
+            lower: 1.0,
+            upper: 2.0,
+            side: Side::Outside,
+            axis_parameter: 0.0,
+            triangle: None,
+            direction: Vec3::X,
+        };
+        known.keep(certain, clock);
+        let mut widest = 0.0;
+        for _ in 0..3 {
+            clock.advance(1 << 29);
+            let now = known.now(clock).expect("less than half a turn");
+            assert!(now.upper - now.lower > widest);
+            widest = now.upper - now.lower;
+        }
+        clock.advance(1 << 29);
+        assert!(known.now(clock).is_none());
     }
 }

@@ -2,9 +2,10 @@
 //!
 //! The square of the distance from the axis is convex in space, and twice the vector from the axis is its gradient. So
 //! over a triangle it is at least the value at the lowest corner plus the least rise towards the other two. Where that
-//! is no more than `ridge / 2` below the corner's distance, and no more than a 512th of it, and a vertex next to that corner is lower, the triangle is
-//! not the lowest: the triangles around the corner lead down, over no ridge of that height. Where the triangle's lowest
-//! point is on an edge, and the vertex beyond it is lower, neither is it. All others may be.
+//! is no more than `ridge / 2` below the corner's distance, and no more than a 512th of it, and a vertex next to that
+//! corner is lower, the triangle is not the lowest: the triangles around the corner lead down, over no ridge of that
+//! height. Where the triangle's lowest point is on an edge, and the vertex beyond it is lower, neither is it. All others
+//! may be.
 //!
 //! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, `ridge / 2`
 //! above the first one at most.
@@ -76,7 +77,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                         heights.stand(seen.lowest, triangle);
                         Some(false)
                     }
-                    Dip::Edge(edge) => self.dips(triangle, edge, seen.low, heights)?,
+                    Dip::Edge(edge) => {
+                        self.may_be_low_at_edge(triangle, edge, seen.low, heights)?
+                    }
                     Dip::Anywhere => self.is_outside(triangle, heights)?,
                 }
             };
@@ -153,7 +156,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             return Ok(Seen { lowest, low: square - self.tilt_slack, dip: Dip::Nowhere });
         }
         // The rounding of a rise is less than the tilt's slack, and so is that of the square.
-        let fall = if least < 0.0 { -2.0 * least } else { 0.0 } + 3.0 * self.tilt_slack;
+        let fall = (if least < 0.0 { -2.0 * least } else { 0.0 }) + 3.0 * self.tilt_slack;
+        // `h - sqrt(h^2 - fall) <= ridge / 2` without roots: `fall + ridge^2 / 4 <= ridge h`.
         let quarter = 0.25 * ridge * ridge;
         let is_level = (fall + quarter) * (fall + quarter) <= ridge * ridge * square;
         let dip = if is_level && fall <= square * FLAT {
@@ -184,8 +188,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Whether the axis is on the inner side of a triangle of a closed surface, wherever it is closest to the triangle. No
     /// contact is there: if the closest point is on an edge, and the axis outside, it is above the edge's other triangle.
     ///
-    /// Above a point that moves along a line, the closest point of the axis moves one way. So it is nowhere higher above
-    /// the triangle than above one of the corners.
+    /// Along a line in the triangle the axis' closest point moves monotonically, and so does its height over the triangle's
+    /// plane: the largest is at a corner.
     #[inline(always)]
     fn is_inside(&self, corners: &[Vec3; 3]) -> bool {
         let &[a, b, c] = corners;
@@ -250,9 +254,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Some(true))
     }
 
-    /// Whether the vertex beyond an edge is not lower than the triangle, or the way there leads over a ridge. `None` without
-    /// budget.
-    fn dips(
+    /// Whether a triangle whose lowest point seems to be on `edge` may be the lowest. It is not if that point is on the edge
+    /// for certain and the vertex beyond is lower, nor if the axis is inside of it. `None` without budget.
+    fn may_be_low_at_edge(
         &mut self,
         triangle: u32,
         edge: u32,
@@ -273,8 +277,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.is_outside(triangle, heights)
     }
 
-    /// Whether a triangle's lowest point is on an edge, as far as is clear: from the whole edge it rises towards the third
-    /// corner. Half the gradient is a point less the axis' point closest to it, and along the edge both move one way.
+    /// Whether a triangle's lowest point is on an edge for certain: from the whole edge it rises towards the third corner.
+    /// Half the gradient at a point is the vector to it from the axis' closest point. Along the edge both change
+    /// monotonically, so the four pairs of ends bound it.
     #[inline(never)]
     fn is_lowest_on(&self, edge: u32, &[a, b, c]: &[Vec3; 3]) -> bool {
         let (from, to, third) = match edge {

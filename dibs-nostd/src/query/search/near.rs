@@ -16,8 +16,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// A search over a range, with the budget of `options`.
     ///
     /// In a sound tree it tests each node's sphere once. It looks at each triangle once, at the vertex beyond one edge of
-    /// it, and at its side, and tests it exactly twice at most. Each triangle stands for one vertex at most, and has it turned round once, past [`MAX_RING`]
-    /// triangles at most. So this bound is never met; if corrupt bytes form a loop, it ends the search.
+    /// it, and at its side, and tests it exactly twice at most. Each triangle stands for one vertex at most, and has it
+    /// turned round once, past [`MAX_RING`] triangles at most. So this bound is never met; if corrupt bytes form a loop, it
+    /// ends the search.
     pub fn over_range(mut self, options: &Options) -> Self {
         let header = self.tree.header();
         let most = 3 + MAX_RING + 2 * Budget::TRIANGLE;

@@ -66,7 +66,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         }
         tracked.closest.add_position_error(surface);
         if tracked.is_kept && !is_cut {
-            contacts.settle(&tracked.closest);
+            contacts.resolve_side(&tracked.closest);
         }
         Ok(tracked)
     }

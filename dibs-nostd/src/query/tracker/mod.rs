@@ -190,7 +190,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
 
     /// Forgets the last tick: the next one is a whole query.
     pub fn forget(&mut self) {
-        self.memory.forget();
+        self.memory.forget_tick();
         self.last = None;
     }
 
@@ -227,9 +227,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let moved = memory.moved(tool, motion);
         memory.begin(moved);
         self.last = None;
-        // Rounded to nearest from whole units.
-        let length = |units: u32| memory.clock.length(units) * (1.0 + 4.0 * f32::EPSILON);
-        let moved_by = moved.ok().map(length);
+        let moved_by = moved.ok().map(|units| memory.clock.length(units));
         let mut fallback = match moved {
             Ok(_) => memory.front.borrow().is_empty().then_some(Fallback::Start),
             Err(lost) => Some(lost.into()),
@@ -339,7 +337,7 @@ impl Last {
 
     /// The distance within which nothing is certain to be, after a motion.
     fn clear_after(&self, moved: f32) -> f32 {
-        let clear = self.clear - moved * (1.0 + 4.0 * f32::EPSILON);
+        let clear = self.clear - moved;
         clear - clear.abs() * f32::EPSILON
     }
 }
