@@ -17,9 +17,10 @@ fn main() -> io::Result<()> {
         println!("cargo:rerun-if-changed=riscv.x");
         println!("cargo:rustc-link-arg-bin=riscv=-T{}/riscv.x", env!("CARGO_MANIFEST_DIR"));
         for argument in ["--nmagic", "-Tlink.x"] {
-            for name in
-                ["probe", "torn", "receive", "bus", "track", "side", "chain", "weights", "tick"]
-            {
+            for name in [
+                "probe", "torn", "receive", "bus", "track", "side", "chain", "filter", "weights",
+                "tick",
+            ] {
                 println!("cargo:rustc-link-arg-bin={name}={argument}");
             }
         }

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bus;
+pub mod filter;
 pub mod receive;
 pub mod tick;
 pub mod track;

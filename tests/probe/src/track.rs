@@ -57,8 +57,8 @@ pub const OPENED: usize = 512;
 
 /// Memory for a tree and two frames.
 pub struct Memory {
-    tree: [u8; TREE_BYTES],
-    frames: [[Vec3; VERTICES]; 2],
+    pub(crate) tree: [u8; TREE_BYTES],
+    pub(crate) frames: [[Vec3; VERTICES]; 2],
 }
 
 impl Memory {

@@ -3,11 +3,10 @@
 use dibs_build::{Builder, Mesh, Motion as Recorded};
 use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{
-    Capsule, Contacts, MovingTable, Odometer, Options, Query, Tracker, measure_stretch,
-};
+use dibs_nostd::{Capsule, Contacts, Cost, Odometer, Options, Query, Tracker, measure_stretch};
 use glam::Vec3;
 
+use super::{Asked, Listener, Settings};
 use crate::deform::unit;
 use fastrand::Rng;
 
@@ -17,6 +16,10 @@ const TICK: f32 = 0.001;
 const STAND_OFF: f32 = 1.0;
 /// mm/s.
 const ROBOT: f32 = 200.0;
+/// Instructions of a tick's queries.
+const INSTRUCTIONS: u32 = 200_000;
+/// mm.
+const RADIUS: f32 = 2.5;
 
 /// What a glide took, and what it left of the commands.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,13 +56,40 @@ pub struct Glided {
 /// If the tree cannot be built or a query fails.
 #[must_use]
 pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64) -> Glided {
+    glide_told(mesh, motion, stretch, (ticks, seed), &mut ())
+}
+
+/// The same, with a listener.
+///
+/// # Panics
+/// If the tree cannot be built or a query fails.
+#[must_use]
+pub fn glide_told(
+    mesh: &Mesh,
+    motion: &Recorded,
+    stretch: f32,
+    (ticks, seed): (u32, u64),
+    listener: &mut impl Listener,
+) -> Glided {
     let built = Builder::new().stretch(stretch).build(mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
     let frames: Vec<Vec<Vec3>> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
     let tissue = fastest(motion);
     let filter = Filter::new(STAND_OFF, ROBOT).expect("in range");
+    let filter = filter.budget(INSTRUCTIONS, Cost::M7_CAPSULE);
+    listener.walk(&Settings {
+        stand_off: STAND_OFF,
+        robot: ROBOT,
+        instructions: INSTRUCTIONS,
+        period: TICK,
+        is_measured: true,
+    });
+    let stretches: Vec<_> = frames
+        .iter()
+        .map(|rows| measure_stretch(&tree, rows.as_slice()).expect("within the limit"))
+        .collect();
     let mut trackers =
-        [(); 2].map(|()| Tracker::<_, MAX_STACK, 1_024>::new(&tree).expect("deep enough"));
+        [(); 2].map(|()| Tracker::<_, MAX_STACK, 512>::new(&tree).expect("deep enough"));
     let mut query = Query::<_, MAX_STACK>::new(&tree).expect("deep enough");
     let mut contacts = Contacts::<4>::new();
     let mut rng = Rng::with_seed(seed);
@@ -68,18 +98,23 @@ pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64
     let mut joints = [100.0, 112.0, 182.0].map(|far| middle + outward * far);
     let mut glided = Glided { least_along: f32::INFINITY, ..Glided::default() };
     let mut odometer = Odometer::new(&tree);
-    let mut before: Option<Vec<Vec3>> = None;
+    listener.frame(&frames[0]);
+    let mut step = None;
     let mut goal = middle;
     for tick in 0..ticks {
         let time = tick as f32 * TICK * motion.rate;
         let (at, share) = (time as usize, time.fract());
-        let [from, to] = [at, at + 1].map(|at| &frames[at % frames.len()]);
-        let rows: Vec<Vec3> = from.iter().zip(to).map(|(a, b)| a.lerp(*b, share)).collect();
-        let measured = measure_stretch(&tree, rows.as_slice()).expect("within the limit");
-        let surface: MovingTable<'_, [Vec3]> = match &before {
-            None => odometer.start(rows.as_slice()),
-            Some(before) => odometer.step(before.as_slice(), rows.as_slice()).after(),
+        let [from, to] = [at, at + 1].map(|at| at % frames.len());
+        let measured = stretches[from].or_larger(stretches[to]).expect("one tree");
+        let step = match &mut step {
+            Some((number, step)) if *number == at => step,
+            _ => {
+                listener.frame(&frames[to]);
+                let (from, to) = (frames[from].as_slice(), frames[to].as_slice());
+                &mut step.insert((at, odometer.step(from, to))).1
+            }
         };
+        let surface = step.at(share);
         let uncertainty = Uncertainty::new(tissue);
         if tick % 700 == 0 {
             // Into it, along it, away from it.
@@ -93,10 +128,11 @@ pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64
         let way = (goal - joints[0]).clamp_length_max(ROBOT * TICK);
         let turn = unit(&mut rng) * 0.0005;
         let command = Motion::new(joints[0], way, turn);
-        let tools = [0, 1].map(|at| Capsule::new(joints[at], joints[at + 1], 2.5).expect("finite"));
+        let tools =
+            [0, 1].map(|at| Capsule::new(joints[at], joints[at + 1], RADIUS).expect("finite"));
         let filter = filter.options(Options::new().stretch(measured));
         let [one, other] = &mut trackers;
-        let near = |tracker: &Tracker<'_, _, MAX_STACK, 1_024>, tool| {
+        let near = |tracker: &Tracker<'_, _, MAX_STACK, 512>, tool| {
             tracker.clone().closest(&surface, tool, &Options::new()).expect("an answer").closest
         };
         let (tip, shaft) = (near(one, &tools[0]), near(other, &tools[1]));
@@ -105,6 +141,8 @@ pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64
         let mut pairs = [(one, &surface, &tools[0]), (other, &surface, &tools[1])];
         let admitted =
             filter.admit(&mut pairs, &command, TICK, &uncertainty, &[]).expect("an answer");
+        let (share, radii, tissue) = (Some(share), [RADIUS; 2], [tissue, 0.0, 0.0]);
+        listener.tick(&Asked { share, joints, radii, command, tissue, admitted });
         let moved = admitted.motion;
         if tick < 100 {
             glided.most_at_start = glided.most_at_start.max(admitted.instructions);
@@ -135,7 +173,6 @@ pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64
             }
         }
         joints = joints.map(|joint| moved.apply(joint));
-        before = Some(rows);
     }
     glided
 }

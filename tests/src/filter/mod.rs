@@ -1,9 +1,11 @@
 //! Adversarial ticks of a filter of commands, judged in f64.
 
+mod asked;
 mod glide;
 mod walk;
 mod world;
 
-pub use glide::{Glided, glide};
-pub use walk::{Episode, Tally, walk};
+pub use asked::{Asked, Listener, Settings};
+pub use glide::{Glided, glide, glide_told};
+pub use walk::{Episode, Tally, walk, walk_told};
 pub use world::{Course, Scene, scenes};

@@ -9,7 +9,7 @@ use dibs_nostd::{Capsule, Cost, MovingSurface, Odometer, Tracker};
 use fastrand::Rng;
 use glam::{DQuat, DVec3, Vec3};
 
-use super::{Course, Scene};
+use super::{Asked, Course, Listener, Scene, Settings};
 use crate::deform::unit;
 use crate::oracle::closest_pair;
 
@@ -167,6 +167,27 @@ impl Truth<'_> {
 /// If a query fails.
 #[must_use]
 pub fn walk(scene: &Scene, episode: &Episode, seed: u64) -> Tally {
+    walk_told(scene, episode, seed, &mut ())
+}
+
+/// The same, with a listener.
+///
+/// # Panics
+/// If a query fails.
+#[must_use]
+pub fn walk_told(
+    scene: &Scene,
+    episode: &Episode,
+    seed: u64,
+    listener: &mut impl Listener,
+) -> Tally {
+    listener.walk(&Settings {
+        stand_off: episode.stand_off,
+        robot: episode.robot,
+        instructions: episode.instructions,
+        period: episode.period as f32,
+        is_measured: false,
+    });
     let mut rng = Rng::with_seed(seed);
     let tree = scene.tree.tree::<u16>().expect("16-bit indices");
     let filter = Filter::new(episode.stand_off, episode.robot).expect("in range");
@@ -212,15 +233,17 @@ pub fn walk(scene: &Scene, episode: &Episode, seed: u64) -> Tally {
             }
             next = tick + 1 + rng.u32(..episode.frames);
         }
+        if before != shown.1 {
+            listener.frame(&shown.1);
+        }
         let surface = if before.is_empty() {
             odometer.start(shown.1.as_slice())
         } else {
             odometer.step(before.as_slice(), shown.1.as_slice()).after()
         };
         let age = f64::from(tick - shown.0) * episode.period;
-        let uncertainty = Uncertainty::new(episode.tissue)
-            .error((f64::from(episode.tissue) * age * (1.0 + 1e-6)) as f32)
-            .error(episode.registration);
+        let aged = (f64::from(episode.tissue) * age * (1.0 + 1e-6)) as f32;
+        let uncertainty = Uncertainty::new(episode.tissue).error(aged).error(episode.registration);
         // A goal beyond the surface, a way along it, or anything.
         if tick >= until {
             until = tick + 1 + rng.u32(..60);
@@ -256,6 +279,8 @@ pub fn walk(scene: &Scene, episode: &Episode, seed: u64) -> Tally {
         }
         let admitted =
             ask(&filter, &mut trackers, &surface, &tools, &command, (episode, &uncertainty));
+        let tissue = [episode.tissue, aged, episode.registration];
+        listener.tick(&Asked { share: None, joints, radii, command, tissue, admitted });
         tally.judge(&truth, &axes, &admitted, episode, rng.bool());
         let is_unsafe = admitted.reason == Reason::NoSafeMotion;
         tally.cries += u64::from(is_easy && is_unsafe && !was_unsafe);

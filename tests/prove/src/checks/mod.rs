@@ -12,6 +12,7 @@ mod demo_c;
 mod demo_faults;
 mod examples;
 mod filter;
+mod filter_board;
 mod flood;
 mod fuzz;
 mod hand;
@@ -44,6 +45,7 @@ pub const CHECKS: &[Check] = &[
     sides::CHECK,
     hand::CHECK,
     filter::CHECK,
+    filter_board::CHECK,
     cost::BOARD,
     cost::HOST,
     path::CHECK,

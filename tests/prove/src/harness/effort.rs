@@ -9,6 +9,10 @@ pub struct Effort {
     pub sides: usize,
     /// Walks of 400 ticks against a filter of commands.
     pub walks: u64,
+    /// The same on the board, and glides about the heart with their ticks.
+    pub board_walks: u64,
+    pub board_glides: u64,
+    pub board_glide_ticks: u32,
     /// Ticks of a path, with each of some budgets.
     pub bounded_ticks: usize,
     /// Queries that must give the same bits.
@@ -49,6 +53,9 @@ impl Effort {
         cases: 1_000_000,
         sides: 1_000_000,
         walks: 25_000,
+        board_walks: 250,
+        board_glides: 3,
+        board_glide_ticks: 3_000,
         bounded_ticks: 30_000,
         bits: 100_000,
         costs: 100_000,
@@ -71,6 +78,9 @@ impl Effort {
         cases: 100_000,
         sides: 4_000,
         walks: 100,
+        board_walks: 20,
+        board_glides: 1,
+        board_glide_ticks: 1_500,
         bounded_ticks: 10_000,
         bits: 10_000,
         costs: 10_000,
@@ -98,6 +108,9 @@ impl Effort {
             cases: wide(self.cases, least.cases),
             sides: wide(self.sides, least.sides),
             walks: (self.walks / u64::from(share)).max(least.walks),
+            board_walks: (self.board_walks / u64::from(share)).max(least.board_walks),
+            board_glides: (self.board_glides / u64::from(share)).max(least.board_glides),
+            board_glide_ticks: narrow(self.board_glide_ticks, least.board_glide_ticks),
             bounded_ticks: wide(self.bounded_ticks, least.bounded_ticks),
             bits: wide(self.bits, least.bits),
             costs: wide(self.costs, least.costs),

@@ -1,5 +1,6 @@
 //! The probe: a program that answers a script, on the emulated board and on this computer.
 
+pub mod filter;
 pub mod script;
 pub mod ticks;
 

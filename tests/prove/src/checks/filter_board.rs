@@ -1,0 +1,141 @@
+//! A filter of commands on the emulated board: the walks of the computer, with the same bits, and their instructions.
+
+use anyhow::Result;
+use dibs_build::{Builder, generate};
+use dibs_tests::filter::{Episode, Tally, glide_told, scenes, walk_told};
+use fastrand::Rng;
+use rayon::prelude::*;
+use xtask::steps::Outcome;
+
+use crate::harness::figures::Figures;
+use crate::harness::promise::{
+    Bound, Promise,
+    criteria::{EDGES, FLOW, TIMING},
+    note,
+};
+use crate::harness::{Check, Effort};
+use crate::probe::filter::{Script, Tick};
+use crate::probe::{COUNTING, board, build_for_board, run_on_board};
+
+pub const CHECK: Check = Check {
+    name: "a filter on the board",
+    run: check,
+    promises: &[
+        note("filter.board.ticks"),
+        note("filter.board.near"),
+        Promise {
+            id: "filter.board.different",
+            says: "A filter on the board admits the motions of this computer, to the bit",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "of {filter.board.ticks} ticks, with the certified separation, the reason and the cost",
+            limits: "Both follow the motions that were admitted. A part of the walks of the filter on this computer, with other seeds: \
+                     corners, gaps, a plate of 0.2 mm, tissue at its limit of speed, late and lost frames, climbing commands.",
+        },
+        Promise {
+            id: "filter.board.violations",
+            says: "No motion admitted on the board comes nearer than the stand-off less 0.02 mm at any instant, unless the reason says \
+                   that none is safe",
+            criterion: EDGES,
+            bound: Bound::Is(0.0),
+            unit: "of {filter.board.judged} ticks of walks, {filter.board.near} of them within 5 mm; {filter.board.unsafe} had no safe \
+                   motion",
+            limits: "Truth by exhaustive search in f64 at six instants of a tick.",
+        },
+        note("filter.board.judged"),
+        note("filter.board.unsafe"),
+        Promise {
+            id: "filter.board.mean",
+            says: "A tick of two capsules on the beating heart takes, on the board",
+            criterion: TIMING,
+            bound: Bound::AtMost(60_000.0),
+            unit: "instructions in the mean of {filter.board.glides} ticks, rows and all",
+            limits: "10,272 triangles, 1 kHz, 200 mm/s, in free space, against and along the wall; after the first 100 ticks.",
+        },
+        note("filter.board.glides"),
+        Promise {
+            id: "filter.board.most",
+            says: "The most of these",
+            criterion: TIMING,
+            bound: Bound::AtMost(200_000.0),
+            unit: "instructions; {filter.board.start} in the first 100 ticks, {filter.board.walks} in the walks",
+            limits: "",
+        },
+        note("filter.board.start"),
+        note("filter.board.walks"),
+    ],
+};
+
+/// Ticks in which a glide's trackers start.
+const START: usize = 100;
+
+/// Triangles and stretch of the heart.
+const HEART: (u32, f32) = (10_272, 1.5);
+
+/// Walks on one scene.
+struct Walked {
+    script: Script,
+    tally: Tally,
+}
+
+fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    let program = build_for_board(&board()?, "filter")?;
+    let ask = |script: &Script| -> Result<Vec<Tick>> {
+        script.read(&run_on_board(&program, &script.bytes(), COUNTING)?)
+    };
+    let most = |ticks: &[Tick]| ticks.iter().map(|tick| tick.instructions).max().unwrap_or(0);
+    let (mut sum, mut most_of_walks, mut different) = (Tally::default(), 0, 0);
+    let (mut count, mut glides) = (0, Vec::new());
+    let mut most_at_start = 0;
+    for Walked { script, tally } in walks(effort) {
+        let ticks = ask(&script)?;
+        different += ticks.iter().filter(|tick| !tick.is_same).count();
+        most_of_walks = most_of_walks.max(most(&ticks));
+        count += ticks.len();
+        sum += tally;
+    }
+    let generate::MovingMesh { mesh, motion } = generate::heart(HEART.0)?;
+    let built = Builder::new().stretch(HEART.1).build(&mesh)?;
+    for seed in 0..effort.board_glides {
+        let mut script = Script::new(&built, true);
+        let settings = (effort.board_glide_ticks, seed + 11);
+        let _ = glide_told(&mesh, &motion, HEART.1, settings, &mut script);
+        let ticks = ask(&script)?;
+        different += ticks.iter().filter(|tick| !tick.is_same).count();
+        count += ticks.len();
+        let (start, rest) = ticks.split_at(START.min(ticks.len()));
+        most_at_start = most_at_start.max(most(start));
+        glides.extend(rest.iter().map(|tick| tick.instructions));
+    }
+    let of_glides: f64 = glides.iter().map(|&one| f64::from(one)).sum();
+    figures.note("filter.board.ticks", count as f64);
+    figures.note("filter.board.near", sum.near as f64);
+    figures.note("filter.board.different", different as f64);
+    figures.note("filter.board.violations", (sum.violations + sum.too_fast + sum.uncertain) as f64);
+    figures.note("filter.board.unsafe", sum.unsafe_ticks as f64);
+    figures.note("filter.board.judged", sum.ticks as f64);
+    figures.note("filter.board.mean", (of_glides / glides.len() as f64).round());
+    figures.note("filter.board.glides", glides.len() as f64);
+    figures.note("filter.board.most", f64::from(glides.iter().copied().max().unwrap_or(0)));
+    figures.note("filter.board.start", f64::from(most_at_start));
+    figures.note("filter.board.walks", f64::from(most_of_walks));
+    Ok(Outcome::Passed)
+}
+
+/// The same number of walks on each scene.
+fn walks(effort: &Effort) -> Vec<Walked> {
+    let scenes = scenes();
+    let each = effort.board_walks.div_ceil(scenes.len() as u64);
+    let walked = scenes.par_iter().enumerate().map(|(number, scene)| {
+        let mut walked =
+            Walked { script: Script::new(&scene.tree, false), tally: Tally::default() };
+        for walk in 0..each {
+            // Seeds that the check on this computer does not have.
+            let seed = 1_000_000 + walk * scenes.len() as u64 + number as u64;
+            let episode = Episode::any(&mut Rng::with_seed(seed));
+            walked.tally += walk_told(scene, &episode, seed, &mut walked.script);
+        }
+        walked
+    });
+    walked.collect()
+}
