@@ -2,12 +2,14 @@
 
 use bytemuck::Zeroable;
 use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
+use dibs_nostd::filter::Filter;
+use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, GuardLimits};
 use dibs_nostd::{Budget, Capsule, Cost, Error, Millis, Options, Proximity, Ticks, Tool};
 
 use crate::surface;
-use crate::telemetry::{Tick, cause_code, fallback_code};
-use crate::{BusStatus, Receiver, TICK_RATE, Trust, instrument, time_of};
+use crate::telemetry::{Push, Tick, cause_code, fallback_code};
+use crate::{BusStatus, Receiver, Robot, TICK_RATE, Trust, time_of};
 
 /// The budget of a query: more than the closest pair on the heart needs, and within a tick on every admitted surface. It
 /// is less than [`Cost`] would allow, because a position of a moving surface is a sum of two.
@@ -35,6 +37,12 @@ pub const MAX_FORCE: f32 = 5.0;
 /// How far it reaches from the surface, in mm.
 pub const MARGIN: f32 = 5.0;
 
+/// How far a filter keeps a commanded instrument from the surface, in mm.
+pub const STAND_OFF: f32 = 0.5;
+
+/// The robot's largest speed, in mm/s.
+const ROBOT_SPEED: f32 = 300.0;
+
 /// Limit on a vertex's speed, in mm/s: twice the generated heart's top speed in real time, 1.57 mm in a thirtieth of a
 /// second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
 const SPEED: f32 = 100.0;
@@ -44,29 +52,34 @@ const SPEED: f32 = 100.0;
 /// # Errors
 /// [`Error`] when the tree is damaged, a constant above out of range, or the surface was started before.
 #[inline(always)]
-pub fn start(
+pub fn start<R: Robot>(
     surface: &'static surface::Surface,
     bus: &'static BusStatus,
     trust: &Trust,
-) -> Result<(Receiver, Control), Error> {
+    robot: R,
+) -> Result<(Receiver, Control<R>), Error> {
     let options = Options::new().budget(BUDGET).depth_tolerance(DEPTH_TOLERANCE);
     let limits = GuardLimits::new(SPEED, Millis(trust.age.1)).ticks_a_second(TICK_RATE);
     let (receiver, guard) =
         surface::start(surface, limits.options(options).trust(trust.limits()?))?;
     let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
     let wall = ForbiddenRegion::new(spring, MARGIN)?;
-    Ok((Receiver::new(receiver, bus), Control { guard, wall, bus, tick: Ticks(0) }))
+    let filter = Filter::new(STAND_OFF, ROBOT_SPEED)?;
+    let control = Control { guard, wall, filter, robot, bus, tick: Ticks(0) };
+    Ok((Receiver::new(receiver, bus), control))
 }
 
 /// The controller's state from tick to tick.
-pub struct Control {
+pub struct Control<R> {
     guard: surface::Guard,
     wall: ForbiddenRegion,
+    filter: Filter,
+    robot: R,
     bus: &'static BusStatus,
     tick: Ticks,
 }
 
-impl Control {
+impl<R: Robot> Control<R> {
     /// The tree that is searched.
     #[must_use]
     pub const fn tree(&self) -> &surface::Tree {
@@ -84,23 +97,41 @@ impl Control {
         self.tick = self.tick.after(ticks);
     }
 
+    /// The demo's record of a hand that pushed in the last tick.
+    #[must_use]
+    pub fn push(&self) -> Option<Push> {
+        let tick = (self.tick.0 as u32).wrapping_sub(1);
+        Some(Push { tick, ..self.robot.push()? })
+    }
+
     /// Runs one tick. `clock` is any free-running counter; it only measures the answer.
     pub fn tick(&mut self, clock: impl Fn() -> u32) -> Tick {
         let (tick, now) = (self.tick.0 as u32, time_of(self.tick));
-        let tool = instrument(tick);
+        let tool = self.robot.instrument(tick);
+        let command = self.robot.command();
         let start = clock();
-        let answer = match &tool {
-            Ok(tool) => self.guard.closest(tool, now),
+        let (answer, admitted) = match (&tool, &command) {
+            (Ok(tool), Some(command)) => {
+                let (answer, admitted) = self.guard.admit(&self.filter, tool, command, now);
+                (answer, Some(admitted))
+            }
+            (Ok(tool), None) => (self.guard.closest(tool, now), None),
             // The pose is not finite, so no query is possible.
-            Err(_) => self.guard.without_pose(now),
+            (Err(_), _) => (self.guard.without_pose(now), None),
         };
         let took = clock().wrapping_sub(start);
-        let force = answer.force(&self.wall);
+        let force = match &admitted {
+            Some(admitted) => {
+                self.robot.execute(&answer, admitted);
+                Vec3::ZERO
+            }
+            None => self.robot.apply(&answer, &answer.force(&self.wall)),
+        };
         self.tick = self.tick.after(Ticks(1));
         Tick {
             tick,
             query_counts: took,
-            force: force.force.to_array(),
+            force: force.to_array(),
             ..record(&answer, tool.ok().as_ref(), self.bus)
         }
     }

@@ -1,4 +1,4 @@
-//! The instrument's pose: on a robot from the kinematics, here from a script.
+//! The instrument's pose by a script.
 
 use core::f32::consts::TAU;
 
@@ -8,9 +8,9 @@ use dibs_nostd::{Capsule, ToolError};
 use crate::surface::{CENTRE, REACH};
 
 /// Length of the instrument's last link, in mm.
-const LENGTH: f32 = 60.0;
+pub const LENGTH: f32 = 60.0;
 /// Its radius, in mm.
-const RADIUS: f32 = 2.5;
+pub const RADIUS: f32 = 2.5;
 
 /// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery,
 /// while its tip sweeps around the surface and, every seven seconds, through the middle of it.

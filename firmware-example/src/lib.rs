@@ -3,23 +3,27 @@
 //! It compiles for board and host: `no_std`, no allocation, no panic, and no access to hardware. Three contexts share
 //! it:
 //!
-//! - the control tick, 1 kHz, highest priority: [`Control::tick`] poses the instrument, asks the guard, and makes a force
-//!   of its answer;
+//! - the control tick, 1 kHz, highest priority: [`Control::tick`] reads the instrument's pose, asks the guard, and gives
+//!   the robot a force, or of a commanded motion as much as a filter admits;
 //! - bus reception, any lower priority: [`Receiver::bytes`] takes vertices as they come over a serial line,
 //!   [`Receiver::packet`] those that [`network`] finds in Ethernet frames;
 //! - the background: [`Receiver::work`] checks complete frames and the tree in flash in slices, and
 //!   [`Receiver::report`] makes statuses for the sender.
 //!
 //! They share a [`Surface`](dibs_nostd::guard::Surface), where one atomic operation publishes a frame, and
-//! [`BusStatus`], counters for the records. [`telemetry`] is the tick's record for the host.
+//! [`BusStatus`], counters for the records. [`telemetry`] is the tick's record for the host. A [`Robot`] moves the
+//! instrument: a script, or a simulated hand.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
 mod control;
 mod fingerprint;
+mod hand;
 mod instrument;
 pub mod network;
+mod pushed;
 mod receiver;
+mod robot;
 mod status;
 pub mod telemetry;
 mod trust;
@@ -29,11 +33,14 @@ use core::num::NonZeroU32;
 use dibs_nostd::{Millis, Ticks};
 
 pub use control::{
-    BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, STIFFNESS, TICK_INSTRUCTIONS, start,
+    BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS, start,
 };
 pub use fingerprint::fingerprint;
+pub use hand::Hand;
 pub use instrument::instrument;
+pub use pushed::Pushed;
 pub use receiver::{MTU, Receiver, STATUS_FRAMED, STATUS_MTU};
+pub use robot::{Either, Robot, Script};
 pub use status::BusStatus;
 pub use trust::{DWELL, Trust};
 
@@ -42,6 +49,9 @@ dibs_nostd::include_tree!("surface");
 
 /// Control ticks a second.
 pub const TICK_RATE: u32 = 1_000;
+
+/// Seconds of a control tick.
+pub const PERIOD: f32 = 1.0 / TICK_RATE as f32;
 
 /// The receiver's clock at so many control ticks after the start.
 #[must_use]

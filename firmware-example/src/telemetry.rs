@@ -4,6 +4,7 @@
 //! a zero byte. The first field is the kind of record.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
+use dibs_nostd::filter::{Admitted, FilterError, Reason};
 use dibs_nostd::wire::{Event, enframe, framed_bytes};
 use dibs_nostd::{Fallback, Unavailable};
 
@@ -191,6 +192,66 @@ impl Summary {
     pub const KIND: u32 = 2;
 }
 
+/// A hand that pushes, in one control tick; a scripted instrument has none.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Push {
+    /// [`Push::KIND`].
+    pub kind: u32,
+    /// Number of the tick.
+    pub tick: u32,
+    /// 0 where the hand moves the instrument against the wall's force; where it commands, what the filter made of that:
+    /// [`reason_code`].
+    pub outcome: u32,
+    /// 1 while the hand pushes inwards, else 0: it draws back.
+    pub is_inwards: u32,
+    /// The hand's push, in N.
+    pub push: [f32; 3],
+    /// The velocity that it leads to where nothing resists, in mm/s: by commands, the commanded one.
+    pub commanded: [f32; 3],
+    /// The instrument's velocity until the next tick, in mm/s: by commands, the admitted one.
+    pub moved: [f32; 3],
+    /// The instrument's velocity relative to the surface's until this tick, in mm/s.
+    pub velocity: [f32; 3],
+    /// Of an admitted motion: no separation is less at any instant until the next tick, in mm.
+    pub least_separation: f32,
+    /// Of an admitted motion: the filter's queries, and their instructions by the cost model.
+    pub queries: u32,
+    /// Instructions of these.
+    pub instructions: u32,
+    /// The energy that the wall may still give to the hand, in mJ.
+    pub balance: f32,
+}
+
+impl Push {
+    /// First field.
+    pub const KIND: u32 = 4;
+
+    /// Notes a filter's answer.
+    pub(crate) fn filtered(&mut self, admitted: &Result<Admitted, FilterError>) {
+        self.outcome = reason_code(admitted.as_ref().ok().map(|admitted| admitted.reason));
+        let (least, queries, instructions) = match admitted {
+            Ok(admitted) => (admitted.least_separation, admitted.queries, admitted.instructions),
+            Err(_) => (0.0, 0, 0),
+        };
+        (self.least_separation, self.queries, self.instructions) = (least, queries, instructions);
+    }
+}
+
+/// A filter's reason as a number; `None` where it admitted nothing.
+#[must_use]
+pub const fn reason_code(reason: Option<Reason>) -> u32 {
+    match reason {
+        Some(Reason::Commanded) => 1,
+        Some(Reason::Nearest) => 2,
+        Some(Reason::Shortened) => 3,
+        Some(Reason::Stopped) => 4,
+        Some(Reason::Retreating) => 5,
+        Some(Reason::NoSafeMotion) => 6,
+        _ => 7,
+    }
+}
+
 /// The network in the whole run; a run over a serial line has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -221,6 +282,8 @@ impl Network {
 pub enum Record {
     /// One control tick.
     Tick(Tick),
+    /// The hand in that tick.
+    Push(Push),
     /// The network.
     Network(Network),
     /// The whole run: the last record.
@@ -251,6 +314,7 @@ impl Record {
         let kind = u32::from_le_bytes(*fields.first_chunk()?);
         match kind {
             Tick::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Tick),
+            Push::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Push),
             Network::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Network),
             Summary::KIND => bytemuck::try_pod_read_unaligned(fields).ok().map(Self::Summary),
             _ => None,

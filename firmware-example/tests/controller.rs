@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use controller::surface::{self, Surface};
 use controller::telemetry::{Tick, cause_code};
-use controller::{BusStatus, Control, DWELL, MTU, Receiver, Trust, start};
+use controller::{BusStatus, Control, DWELL, MTU, Receiver, Script, Trust, start};
 use dibs_build::{Builder, generate};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
@@ -29,10 +29,10 @@ fn firmware_tree() -> &'static surface::Tree {
 }
 
 /// A controller's two ends, and its notes.
-fn controller() -> (Receiver, Control, &'static BusStatus) {
+fn controller() -> (Receiver, Control<Script>, &'static BusStatus) {
     let surface: &'static Surface = Box::leak(Box::new(Surface::new()));
     let bus: &'static BusStatus = Box::leak(Box::new(BusStatus::new()));
-    let (receiver, control) = start(surface, bus, &Trust::SERIAL).unwrap();
+    let (receiver, control) = start(surface, bus, &Trust::SERIAL, Script).unwrap();
     (receiver, control, bus)
 }
 

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use controller::{DAMPING, Hand, MARGIN, MAX_FORCE as MOST, PERIOD as TICK, STIFFNESS};
 use dibs_build::{Builder, Mesh, Motion as Recorded, generate};
 use dibs_nostd::constraint::{EnergyAccount, ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::filter::{Filter, Motion, Uncertainty};
@@ -11,26 +12,14 @@ use glam::Vec3;
 
 use crate::surfaces::{ball, sheet};
 
-/// Seconds of a tick, and number of ticks of a push.
-const TICK: f32 = 0.001;
+/// Ticks of a push.
 const TICKS: u32 = 4_000;
-
-/// Stiffness (N/mm), damping (N s/mm), largest force (N) and margin (mm) of the constraint: the demo's.
-const STIFFNESS: f32 = 1.0;
-const DAMPING: f32 = 0.002;
-const MOST: f32 = 5.0;
-const MARGIN: f32 = 5.0;
 
 /// The account's tank (mJ) and largest step (N).
 const TANK: f32 = 1.0;
 const STEP: f32 = 0.5;
 
-/// The hand's push (N): nine tenths of the saturation.
-pub const PUSH: f32 = 0.9 * MOST;
-
-/// The hand's mass (200 g, in N s^2/mm) and damper (N s/mm), and the instrument's radius (mm).
-const MASS: f32 = 2e-4;
-const DAMPER: f32 = 0.02;
+/// The instrument's radius (mm).
 const RADIUS: f32 = 1.0;
 
 /// Gain (1/s) of velocity rows.
@@ -121,12 +110,13 @@ impl Scene {
         let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
         let alone = ForbiddenRegion::new(spring, MARGIN).expect("a valid margin");
         let mut account = EnergyAccount::new(TANK, STEP, STIFFNESS).expect("in range");
-        let (mut at, mut velocity, mut given) = (self.from, Vec3::ZERO, 0.0);
+        let (mut hand, mut given) = (Hand::new(self.from), 0.0);
         let mut pushed = Pushed { least: f32::INFINITY, step: 0.0, given: 0.0 };
         let mut before: Option<Vec3> = None;
         let mut tick = |now: u32| {
             let (rows, velocities) = self.surface(now);
             let (rows, velocities) = (built.to_rows(&rows), built.to_rows(&velocities));
+            let Hand { at, velocity } = hand;
             let tool = Sphere::new(at, RADIUS).expect("a finite place");
             let closest = query
                 .contacts(rows.as_slice(), &tool, 2.0 * MARGIN, &Options::new(), &mut contacts)
@@ -147,9 +137,8 @@ impl Scene {
                 pushed.step = pushed.step.max(before.distance(force));
             }
             before = Some(force);
-            velocity += (force + self.push * PUSH - velocity * DAMPER) * (TICK / MASS);
-            at += velocity * TICK;
-            given += force.dot(velocity - wall) * TICK;
+            hand.push(self.push * Hand::PUSH, force, TICK);
+            given += force.dot(hand.velocity - wall) * TICK;
             pushed.given = pushed.given.max(given);
             if pushed.least < -10.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
@@ -170,11 +159,11 @@ impl Scene {
         let mut tracker = Tracker::<u16, MAX_STACK, 512>::new(&tree).expect("deep enough");
         let mut odometer = Odometer::new(&tree);
         let mut contacts = Contacts::<8>::new();
-        let (speed, most) = (PUSH / DAMPER, 2.0 * PUSH / DAMPER);
+        let command = Hand::free(self.push * Hand::PUSH);
+        let most = 2.0 * command.length();
         // The gap's slivers take long to tell sides apart; other checks are about budgets.
         let filter = Filter::new(0.0, most).expect("in range").budget(2_000_000, Cost::M7_SPHERE);
         let uncertainty = Uncertainty::new(self.fastest());
-        let command = self.push * speed;
         let mut at = self.from;
         let mut pushed = Pushed { least: f32::INFINITY, step: 0.0, given: 0.0 };
         let mut before: Option<Vec<Vec3>> = None;

@@ -77,15 +77,15 @@ pub enum Bus {
     Ethernet(String),
 }
 
-/// The command that boots `program` for `ticks` control ticks. Its telemetry is UART 1, connected to the socket
-/// `telemetry`.
-pub fn command(program: &Path, bus: &Bus, telemetry: &Path, ticks: u32) -> Command {
-    // The firmware reads its bus and its run length from the arguments.
+/// The command that boots `program` for `ticks` control ticks, with a word for the instrument's robot. Its telemetry is
+/// UART 1, connected to the socket `telemetry`.
+pub fn command(program: &Path, robot: &str, bus: &Bus, telemetry: &Path, ticks: u32) -> Command {
+    // The firmware reads its robot, its bus and its run length from the arguments.
     let (bus_word, serial) = match bus {
         Bus::Serial(socket) => ("serial", format!("unix:{}", socket.display())),
         Bus::Ethernet(_) => ("ethernet", "null".to_owned()),
     };
-    let mut command = boot(program, BOARD, &["board", bus_word, &ticks.to_string()]);
+    let mut command = boot(program, BOARD, &["board", robot, bus_word, &ticks.to_string()]);
     command.args(["-serial", &serial, "-serial"]).arg(format!("unix:{}", telemetry.display()));
     if let Bus::Ethernet(backend) = bus {
         command.args(["-nic", &format!("{backend},model=lan9118")]);

@@ -21,7 +21,7 @@ mod tick;
 use core::panic::PanicInfo;
 
 use bus::Bus;
-use controller::{BusStatus, Receiver, surface};
+use controller::{BusStatus, Receiver, Script, surface};
 use cortex_m::Peripherals;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::entry;
@@ -46,7 +46,7 @@ fn start() -> Option<(Receiver, Bus)> {
     memory::protect(&mut core);
     let parts = clocks::start();
     memory::start_sram3();
-    let (receiver, control) = controller::start(&SURFACE, &BUS, &bus::TRUST).ok()?;
+    let (receiver, control) = controller::start(&SURFACE, &BUS, &bus::TRUST, Script).ok()?;
     let bus = Bus::start(parts)?;
     tick::start(&mut core, control);
     Some((receiver, bus))

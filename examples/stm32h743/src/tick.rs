@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use controller::{Control, TICK_RATE, time_of};
+use controller::{Control, Script, TICK_RATE, time_of};
 use cortex_m::Peripherals;
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
@@ -16,7 +16,7 @@ use crate::exclusive::Exclusive;
 const PERIOD: u32 = clocks::HERTZ / TICK_RATE;
 
 #[unsafe(link_section = ".dtcm.control")]
-static CONTROL: Exclusive<Option<Control>> = Exclusive::new(None);
+static CONTROL: Exclusive<Option<Control<Script>>> = Exclusive::new(None);
 
 /// What a debugger reads, in words. In the TCM, where no cache is between.
 #[repr(C)]
@@ -50,7 +50,7 @@ pub fn now() -> Millis {
 }
 
 /// Starts the ticks.
-pub fn start(core: &mut Peripherals, control: Control) {
+pub fn start(core: &mut Peripherals, control: Control<Script>) {
     CONTROL.with(|place| *place = Some(control));
     core.DCB.enable_trace();
     DWT::unlock(); // the M7's lock access register

@@ -1,7 +1,8 @@
 //! The controller as a program on this computer: the same logic as on the board, with a thread for the bus interrupt.
 //! It claims no deadline.
 //!
-//! `host BUS TELEMETRY TICKS`: two Unix sockets to connect to, and the length of the run.
+//! `host BUS TELEMETRY TICKS [hand]`: two Unix sockets to connect to, the length of the run, and whether a simulated hand
+//! pushes the instrument.
 
 use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -12,7 +13,7 @@ use std::{env, thread};
 
 use anyhow::{Context, Result};
 use controller::telemetry::{MAX_FRAMED, Summary, frame};
-use controller::{BusStatus, STATUS_FRAMED, TICK_RATE, Trust, start, surface};
+use controller::{BusStatus, Either, STATUS_FRAMED, TICK_RATE, Trust, start, surface};
 use dibs_nostd::Millis;
 use dibs_nostd::wire::{Counters, Event};
 
@@ -30,8 +31,9 @@ fn main() -> Result<()> {
     let mut bus = UnixStream::connect(argument("BUS")?)?;
     let telemetry = UnixStream::connect(argument("TELEMETRY")?)?;
     let ticks: u32 = argument("TICKS")?.to_str().and_then(|t| t.parse().ok()).context("TICKS")?;
+    let robot = Either::new(arguments.next().is_some_and(|word| word == "hand"));
 
-    let (mut receiver, mut control) = start(&SURFACE, &BUS, &Trust::SERIAL)?;
+    let (mut receiver, mut control) = start(&SURFACE, &BUS, &Trust::SERIAL, robot)?;
     bus.set_read_timeout(Some(Duration::from_millis(1)))?;
     thread::spawn(move || {
         let (mut buffer, mut line) = ([0; 1024], [0; STATUS_FRAMED]);
@@ -69,6 +71,9 @@ fn main() -> Result<()> {
         let record = control.tick(|| 0);
         NOW.store(control.now().0, Ordering::Relaxed);
         out.write_all(frame(&record, &mut line).context("a record fits its line")?)?;
+        if let Some(push) = control.push() {
+            out.write_all(frame(&push, &mut line).context("a record fits its line")?)?;
+        }
         out.flush()?;
     }
     let mut summary = Summary { kind: Summary::KIND, ticks, ..bytemuck::Zeroable::zeroed() };

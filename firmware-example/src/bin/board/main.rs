@@ -20,8 +20,8 @@ mod stack;
 mod uart;
 mod vectors;
 
-use controller::telemetry::{MAX_FRAMED, Tick, frame};
-use controller::{BusStatus, STATUS_FRAMED, STATUS_MTU, Trust, start, surface};
+use controller::telemetry::{MAX_FRAMED, Push, Tick, frame};
+use controller::{BusStatus, Either, STATUS_FRAMED, STATUS_MTU, Trust, start, surface};
 use cortex_m_rt::entry;
 use dibs_nostd::wire::enframe;
 use heapless::spsc::{Consumer, Queue};
@@ -31,12 +31,15 @@ use semihosting::Arguments;
 /// Records that wait for the line.
 const QUEUE: usize = 64;
 
+/// The records of a tick.
+type Records = (Tick, Option<Push>);
+
 static SURFACE: surface::Surface = surface::Surface::new();
 static BUS: BusStatus = BusStatus::new();
 
 #[entry]
 fn main() -> ! {
-    static mut RECORDS: Queue<Tick, QUEUE> = Queue::new();
+    static mut RECORDS: Queue<Records, QUEUE> = Queue::new();
     static mut NETWORK: Option<Network> = None;
     let (producer, consumer) = RECORDS.split();
 
@@ -49,7 +52,8 @@ fn main() -> ! {
         }
     }
     let trust = if arguments.is_ethernet { &Trust::ETHERNET } else { &Trust::SERIAL };
-    let (receiver, control) = match start(&SURFACE, &BUS, trust) {
+    let robot = Either::new(arguments.is_pushed);
+    let (receiver, control) = match start(&SURFACE, &BUS, trust, robot) {
         Ok(ends) => ends,
         Err(_) => {
             defmt::error!("the tree in flash is damaged, or a constant out of range");
@@ -71,7 +75,7 @@ fn main() -> ! {
 
 /// Sends records and takes frames until the run is over; with a run length of 0 for ever.
 fn idle(
-    mut records: Consumer<'static, Tick>,
+    mut records: Consumer<'static, Records>,
     mut network: Option<&'static mut Network>,
     ticks: u32,
 ) -> ! {
@@ -90,7 +94,7 @@ fn idle(
         // a panic path would survive.
         let record = if records.capacity() < QUEUE { records.dequeue() } else { None };
         match record {
-            Some(record) => send(frame(&record, &mut line)),
+            Some(records) => send_records(&records, &mut line),
             None if ticks != 0 && schedule::ticks() >= ticks => break,
             None => (),
         }
@@ -106,8 +110,8 @@ fn idle(
         }
     }
     schedule::stop();
-    while let Some(record) = records.dequeue() {
-        send(frame(&record, &mut line));
+    while let Some(records) = records.dequeue() {
+        send_records(&records, &mut line);
     }
     if let Some(network) = network {
         send(frame(network.record(), &mut line));
@@ -145,7 +149,7 @@ fn wide() -> Option<f32> {
     Some(query.closest_wide(&rows[..], &tool, &dibs_nostd::Options::new()).ok()?.separation)
 }
 
-/// A tick of a filter of commands, to show that it has no panic path either.
+/// A tick of a filter with rows of the caller, to show that it has no panic path either.
 #[cfg(feature = "filter")]
 fn filtered() -> Option<f32> {
     use core::hint::black_box;
@@ -171,6 +175,14 @@ fn send_serial(status: &[u8]) {
     let mut line = [0; STATUS_FRAMED];
     for &byte in enframe(status, &mut line).unwrap_or_default() {
         uart::BUS.write(byte);
+    }
+}
+
+/// Sends a tick's records as telemetry.
+fn send_records((tick, push): &Records, line: &mut [u8; MAX_FRAMED]) {
+    send(frame(tick, line));
+    if let Some(push) = push {
+        send(frame(push, line));
     }
 }
 

@@ -2,8 +2,8 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use controller::telemetry::{Summary, Tick};
-use controller::{Control, Receiver, STATUS_MTU};
+use controller::telemetry::Summary;
+use controller::{Control, Either, Receiver, STATUS_MTU};
 use cortex_m::peripheral::scb::SystemHandler;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m::peripheral::{NVIC, Peripherals, SYST};
@@ -14,7 +14,7 @@ use heapless::spsc::Producer;
 
 use crate::exclusive::Exclusive;
 use crate::vectors::BusInterrupt;
-use crate::{QUEUE, clock, semihosting, uart};
+use crate::{QUEUE, Records, clock, semihosting, uart};
 
 /// Priorities of the interrupts: only the upper bits count, and a lower value is more urgent.
 const CONTROL_PRIORITY: u8 = 0x00;
@@ -33,8 +33,8 @@ static BUS_MASKED: AtomicU32 = AtomicU32::new(0);
 
 /// The control interrupt's state.
 struct Timeline {
-    control: Control,
-    records: Producer<'static, Tick>,
+    control: Control<Either>,
+    records: Producer<'static, Records>,
     /// When the running tick was due, on the clock; `None` before the first.
     due: Option<u32>,
     deadline_misses: u32,
@@ -45,8 +45,8 @@ struct Timeline {
 
 /// Starts the clock and the control tick; and the bus interrupt, if the bus is the serial line.
 pub fn start(
-    control: Control,
-    records: Producer<'static, Tick>,
+    control: Control<Either>,
+    records: Producer<'static, Records>,
     receiver: Receiver,
     is_serial: bool,
 ) {
@@ -200,10 +200,11 @@ impl Timeline {
         self.due = Some(due);
         self.latency = self.latency.max(now.wrapping_sub(due));
 
-        let record = self.control.tick(clock::now);
+        let tick = self.control.tick(clock::now);
+        let records = (tick, self.control.push());
         // The check tells the optimiser that the queue's length, by which `heapless` divides, is positive; otherwise a
         // panic path would survive.
-        if self.records.capacity() >= QUEUE || self.records.enqueue(record).is_err() {
+        if self.records.capacity() >= QUEUE || self.records.enqueue(records).is_err() {
             self.dropped = self.dropped.saturating_add(1);
         }
 

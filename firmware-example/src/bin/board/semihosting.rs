@@ -11,12 +11,14 @@ pub fn exit(success: bool) -> ! {
     }
 }
 
-/// The command line: `-semihosting-config ...,arg=board,arg=ethernet,arg=5000`.
+/// The command line: `-semihosting-config ...,arg=board,arg=hand,arg=ethernet,arg=5000`.
 pub struct Arguments {
     /// Ticks to run: the last word; 0, for ever, if that is not a number.
     pub ticks: u32,
     /// Whether the bus is Ethernet, by the word before; a serial line otherwise.
     pub is_ethernet: bool,
+    /// Whether a simulated hand pushes the instrument, by the word before that.
+    pub is_pushed: bool,
 }
 
 impl Arguments {
@@ -27,7 +29,7 @@ impl Arguments {
         // SAFETY: SYS_GET_CMDLINE takes the address and the size of a buffer, and writes a string that
         // fits, ended by a zero.
         if unsafe { syscall(nr::GET_CMDLINE, &place) } != 0 {
-            return Self { ticks: 0, is_ethernet: false };
+            return Self { ticks: 0, is_ethernet: false, is_pushed: false };
         }
         let text = line.split(|&byte| byte == 0).next().unwrap_or_default();
         let mut words = text.rsplit(|&byte| byte == b' ');
@@ -36,6 +38,7 @@ impl Arguments {
             sum?.checked_mul(10)?.checked_add(value)
         };
         let ticks = words.next().unwrap_or_default().iter().fold(Some(0), digit).unwrap_or(0);
-        Self { ticks, is_ethernet: words.next() == Some(b"ethernet") }
+        let is_ethernet = words.next() == Some(b"ethernet");
+        Self { ticks, is_ethernet, is_pushed: words.next() == Some(b"hand") }
     }
 }

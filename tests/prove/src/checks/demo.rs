@@ -150,11 +150,14 @@ pub struct Run {
     pub faults: bool,
     /// The controller in C.
     pub c: bool,
+    /// A hand that pushes, instead of the script.
+    pub hand: bool,
 }
 
 /// The report of a demo.
-pub fn report_of(Run { seconds, faults, c }: Run) -> Result<Value> {
+pub fn report_of(Run { seconds, faults, c, hand }: Run) -> Result<Value> {
     let name = match (faults, c) {
+        (false, false) if hand => "demo-hand",
         (false, false) => "demo",
         (true, false) => "demo-faults",
         (false, true) => "demo-c",
@@ -165,6 +168,7 @@ pub fn report_of(Run { seconds, faults, c }: Run) -> Result<Value> {
         seconds,
         faults,
         c,
+        path: !hand,
         seed: 1,
         board_only: true,
         output: Some(output.clone()),

@@ -62,7 +62,7 @@ pub const CHECK: Check = Check {
 };
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let report = report_of(Run { seconds: effort.fault_seconds, faults: true, c: false })?;
+    let report = report_of(Run { seconds: effort.fault_seconds, faults: true, ..Run::default() })?;
     for (name, field) in [
         ("demo.faults.ticks", "ticks"),
         ("demo.faults.answers", "queries"),

@@ -1,7 +1,8 @@
 //! A simulated hand that pushes against the constraint: all contacts hold it, the closest pair alone not always.
 
 use anyhow::Result;
-use dibs_tests::hand::{PUSH, Pushed, scenes};
+use controller::Hand;
+use dibs_tests::hand::{Pushed, scenes};
 use xtask::steps::Outcome;
 
 use crate::harness::figures::Figures;
@@ -64,7 +65,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("hand.alone", through(&alone));
     figures.note("hand.scenes", scenes.len() as f64);
     figures.note("hand.least", rounded(all.iter().fold(f32::INFINITY, |a, b| a.min(b.least))));
-    figures.note("hand.push", rounded(PUSH));
+    figures.note("hand.push", rounded(Hand::PUSH));
     let given =
         |pushed: &[Pushed]| rounded(pushed.iter().fold(0.0, |most, one| one.given.max(most)));
     figures.note("hand.given", given(&all));

@@ -10,6 +10,7 @@ pub mod cost;
 mod demo;
 mod demo_c;
 mod demo_faults;
+mod demo_hand;
 mod examples;
 mod filter;
 mod filter_board;
@@ -57,6 +58,7 @@ pub const CHECKS: &[Check] = &[
     link::CHECK,
     stack::CHECK,
     demo::CHECK,
+    demo_hand::CHECK,
     demo_faults::CHECK,
     flood::CHECK,
     demo_c::CHECK,

@@ -19,6 +19,8 @@ pub struct Checked {
     pub tick: u32,
     /// Error of the answer in units of [`accuracy_of`] it: at most 1 is right.
     pub error: f64,
+    /// The true separation from the surface of the answer, in mm: the lower end, where it is not certain.
+    pub separation: f64,
 }
 
 impl Checked {
@@ -66,7 +68,7 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
         None => f64::INFINITY,
     };
     let largest = separation.max(interval).max(off_surface);
-    Ok(Checked { tick: tick.tick, error: largest / accuracy })
+    Ok(Checked { tick: tick.tick, error: largest / accuracy, separation: low })
 }
 
 /// A published frame, compared as a whole with the frame sent.

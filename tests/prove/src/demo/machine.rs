@@ -10,6 +10,7 @@ use xtask::{c_firmware, firmware, qemu, workspace};
 
 use super::Options;
 use super::bus::Bus;
+use super::robot::Robot;
 use super::scene::Scene;
 use crate::footprint::Footprint;
 
@@ -29,6 +30,8 @@ pub enum Machine {
         emulator: String,
         /// Its bus.
         bus: Bus,
+        /// What moves its instrument.
+        robot: Robot,
     },
     /// The same control logic as a program.
     Host {
@@ -36,19 +39,22 @@ pub enum Machine {
         program: PathBuf,
         /// Why it is not the board.
         reason: String,
+        /// What moves its instrument.
+        robot: Robot,
     },
 }
 
 impl Machine {
     /// Builds the controller, for the board if possible and wanted.
     pub fn prepare(options: &Options, scene: &Scene) -> Result<Self> {
+        let robot = options.robot();
         if options.host {
             let reason = "as asked by --host".to_owned();
             if options.is_built {
                 let program = std::env::current_exe()?.with_file_name("host");
-                return Ok(Self::Host { program, reason });
+                return Ok(Self::Host { program, reason, robot });
             }
-            return Self::host(scene, reason);
+            return Self::host(scene, reason, robot);
         }
         if options.c {
             return Self::in_c(scene);
@@ -60,7 +66,7 @@ impl Machine {
                 // In defmt's encoding: `defmt-print -e FIRMWARE < log.defmt`.
                 let (log, toolchain) = ("log.defmt", cross.describe());
                 let bus = if options.serial { Bus::Serial } else { Bus::Ethernet };
-                Ok(Self::Board { program, log, footprint, toolchain, emulator, bus })
+                Ok(Self::Board { program, log, footprint, toolchain, emulator, bus, robot })
             }
             Err(error) if options.board_only => Err(error),
             Err(error) => {
@@ -68,7 +74,7 @@ impl Machine {
                 eprintln!("{line}\n{error:#}\n");
                 eprintln!("NO BOARD: running the control logic on this computer instead.");
                 eprintln!("Instructions, deadlines, flash, RAM and stack will be missing.\n{line}");
-                Self::host(scene, format!("no board: {error:#}"))
+                Self::host(scene, format!("no board: {error:#}"), robot)
             }
         }
     }
@@ -82,10 +88,11 @@ impl Machine {
         let footprint = Footprint::read(&program)?;
         let toolchain = format!("{compiler}, its library by {}", cross.describe());
         let (log, bus) = ("log.txt", Bus::Serial);
-        Ok(Self::Board { program, log, footprint, toolchain, emulator, bus })
+        let robot = Robot::Script;
+        Ok(Self::Board { program, log, footprint, toolchain, emulator, bus, robot })
     }
 
-    fn host(scene: &Scene, reason: String) -> Result<Self> {
+    fn host(scene: &Scene, reason: String, robot: Robot) -> Result<Self> {
         // This program contains the controller's library too. A separate folder for another surface, and the same
         // selection of packages for this one, keep cargo from building anything twice.
         let folder = if scene.surface.is_default() {
@@ -99,7 +106,7 @@ impl Machine {
         cargo.current_dir(workspace::root());
         scene.surface.describe_to(&mut cargo);
         run(&mut cargo).context("the host's controller does not build")?;
-        Ok(Self::Host { program: folder.join("release").join("host"), reason })
+        Ok(Self::Host { program: folder.join("release").join("host"), reason, robot })
     }
 
     /// The controller's bus.
@@ -110,17 +117,26 @@ impl Machine {
         }
     }
 
+    /// What moves its instrument.
+    pub const fn robot(&self) -> Robot {
+        match self {
+            Self::Board { robot, .. } | Self::Host { robot, .. } => *robot,
+        }
+    }
+
     /// The command that runs the controller for `ticks` ticks, with this end of its bus, and its telemetry on a socket
     /// that it connects to.
     pub fn command(&self, bus: &qemu::Bus, telemetry: &Path, ticks: u32) -> Command {
         let mut command = match self {
-            Self::Board { program, .. } => qemu::command(program, bus, telemetry, ticks),
-            Self::Host { program, .. } => {
+            Self::Board { program, robot, .. } => {
+                qemu::command(program, robot.word(), bus, telemetry, ticks)
+            }
+            Self::Host { program, robot, .. } => {
                 let mut command = Command::new(program);
                 if let qemu::Bus::Serial(socket) = bus {
                     command.arg(socket);
                 }
-                command.arg(telemetry).arg(ticks.to_string());
+                command.arg(telemetry).arg(ticks.to_string()).arg(robot.word());
                 command
             }
         };

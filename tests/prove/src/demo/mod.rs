@@ -1,4 +1,4 @@
-//! `cargo xtask demo`: a beating heart streamed to the controller, every answer checked.
+//! `cargo xtask demo`: a beating heart streamed to the controller, while a simulated hand pushes the instrument against it.
 
 mod bus;
 mod check;
@@ -6,12 +6,16 @@ mod contacts;
 pub mod debugger;
 mod faults;
 pub mod flood;
+mod forces;
 pub mod freshness;
+mod hand;
+mod hand_plot;
 pub mod machine;
 mod plot;
 mod push;
 mod replay;
 mod report;
+pub mod robot;
 pub mod scene;
 mod sender;
 pub mod session;
@@ -26,13 +30,14 @@ use anyhow::{Context, Result};
 use faults::Plan;
 use machine::Machine;
 use report::Report;
+use robot::Robot;
 use scene::Scene;
 use session::Harm;
 use xtask::steps::Outcome;
 use xtask::workspace;
 
-/// Streams a beating heart to the firmware while its instrument moves around and through it, and
-/// checks every answer against exhaustive search.
+/// Streams a beating heart to the firmware while a simulated hand pushes its instrument against it, by force and by
+/// commands, and does not get in. Every answer is checked against exhaustive search.
 #[derive(clap::Args, Default)]
 pub struct Options {
     /// Mesh of the surface at rest, in any format that `dibs build` reads; the generated heart of 10,272 triangles
@@ -46,6 +51,10 @@ pub struct Options {
     /// learned from its motion, with a tenth to spare.
     #[arg(long)]
     pub stretch: Option<f32>,
+    /// A script moves the instrument instead of the hand, around the surface and through it: nothing stops it, so every
+    /// force is seen. With `--c` and `--faults` it does, too.
+    #[arg(long)]
+    pub path: bool,
     /// Seconds of the controller's time to run.
     #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=3600))]
     pub seconds: u32,
@@ -76,6 +85,13 @@ pub struct Options {
     pub is_built: bool,
 }
 
+impl Options {
+    /// What moves the instrument.
+    pub const fn robot(&self) -> Robot {
+        if self.path || self.c || self.faults { Robot::Script } else { Robot::Hand }
+    }
+}
+
 /// Runs the demo and writes its report and pictures; an error names each promise that was broken.
 pub fn run(options: &Options) -> Result<()> {
     let scene = Scene::load(options)?;
@@ -96,6 +112,7 @@ pub fn run(options: &Options) -> Result<()> {
     // Made before anything is written, since it names the commit, and whether it is clean.
     let report = Report::new(&scene, &machine, &outcome)?;
     plot::draw(&outcome, &folder)?;
+    hand_plot::draw(&outcome, &folder)?;
     if options.faults {
         timeline::draw(&outcome, &folder)?;
     }
@@ -105,8 +122,8 @@ pub fn run(options: &Options) -> Result<()> {
     report.verdict()
 }
 
-/// The demo of `cargo xtask test`, on this computer.
+/// The demo of `cargo xtask test`, on this computer: the script.
 pub fn on_host(seconds: u32) -> Result<Outcome> {
-    run(&Options { seconds, host: true, is_built: true, ..Options::default() })
+    run(&Options { seconds, host: true, path: true, is_built: true, ..Options::default() })
         .map(|()| Outcome::Passed)
 }

@@ -10,20 +10,23 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use xtask::qemu;
 
-use super::contacts::Touch;
+use super::contacts::{Touch, Touches};
 use super::report::force;
 use super::session::Outcome;
 
 /// Points of a curve; more would not be visible.
 const POINTS: usize = 1_500;
 
+/// Seconds without a value that interrupt a curve.
+const GAP: f64 = 0.1;
+
 /// Bars of a histogram.
 const BINS: usize = 80;
 
-const BLUE_INK: RGBColor = RGBColor(31, 90, 160);
-const RED_INK: RGBColor = RGBColor(190, 50, 40);
-const GREEN_INK: RGBColor = RGBColor(0, 120, 90);
-const ORANGE_INK: RGBColor = RGBColor(230, 140, 0);
+pub const BLUE_INK: RGBColor = RGBColor(31, 90, 160);
+pub const RED_INK: RGBColor = RGBColor(190, 50, 40);
+pub const GREEN_INK: RGBColor = RGBColor(0, 120, 90);
+pub const ORANGE_INK: RGBColor = RGBColor(230, 140, 0);
 
 /// Draws `separation.svg` (with contacts and forces below it) and, where instructions were counted,
 /// `instructions.svg`.
@@ -32,6 +35,19 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let (Some(first), Some(last)) = (answered.first(), answered.last()) else { return Ok(()) };
     // Longer than nothing, and the same for curves without a point: a chart of no length is never done.
     let time = at(first.tick, 0.0).0..at(last.tick + 1, 0.0).0;
+    if let Some((_, touches)) = &outcome.path {
+        separation(&answered, touches, &time, folder)?;
+    }
+    instructions(&answered, &time, folder)
+}
+
+/// Draws `separation.svg`.
+fn separation(
+    answered: &[&Tick],
+    touches: &Touches,
+    time: &Range<f64>,
+    folder: &Path,
+) -> Result<()> {
     let picture = folder.join("separation.svg");
     let root = SVGBackend::new(&picture, (900, 760)).into_drawing_area();
     root.fill(&WHITE).map_err(failed)?;
@@ -39,37 +55,40 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let (middle, lower) = rest.split_vertically(200);
     // They differ where the budget ended before a depth was known.
     let interval = [
-        Curve::new("certainly at most", ORANGE_INK, &answered, |tick| {
+        Curve::new("certainly at most", ORANGE_INK, answered, |tick| {
             at(tick.tick, tick.separation.into())
         }),
-        Curve::new("at least, which the force is for", BLUE_INK, &answered, |tick| {
+        Curve::new("at least, which the force is for", BLUE_INK, answered, |tick| {
             at(tick.tick, tick.lower.into())
         }),
     ];
-    curves(&upper, &time, "separation (mm)", &interval)?;
-    let touches: Vec<&Touch> = outcome.touches.all.iter().collect();
+    curves(&upper, time, "separation (mm)", &interval)?;
+    let touches: Vec<&Touch> = touches.all.iter().collect();
     let contacts =
         Curve::new("", GREEN_INK, &touches, |touch| at(touch.tick, touch.contacts as f64));
-    curves(&middle, &time, "contacts", &[contacts])?;
+    curves(&middle, time, "contacts", &[contacts])?;
     let forces = [
         Curve::new("of all contacts, by the proxy", ORANGE_INK, &touches, |touch| {
             at(touch.tick, touch.force.into())
         }),
-        Curve::new("the controller's, of the closest pair", BLUE_INK, &answered, |tick| {
+        Curve::new("the controller's, of the closest pair", BLUE_INK, answered, |tick| {
             at(tick.tick, force(tick).into())
         }),
     ];
-    curves(&lower, &time, "force (N)", &forces)?;
-    root.present().map_err(failed)?;
+    curves(&lower, time, "force (N)", &forces)?;
+    root.present().map_err(failed)
+}
 
+/// Draws `instructions.svg`, where instructions were counted.
+fn instructions(answered: &[&Tick], time: &Range<f64>, folder: &Path) -> Result<()> {
     let instructions = |tick: &Tick| f64::from(tick.query_counts * qemu::INSTRUCTIONS_A_COUNT);
     if answered.iter().any(|tick| tick.query_counts > 0) {
         let picture = folder.join("instructions.svg");
         let root = SVGBackend::new(&picture, (900, 560)).into_drawing_area();
         root.fill(&WHITE).map_err(failed)?;
         let (upper, lower) = root.split_vertically(280);
-        let curve = Curve::new("", BLUE_INK, &answered, |tick| at(tick.tick, instructions(tick)));
-        curves(&upper, &time, "instructions a query", &[curve])?;
+        let curve = Curve::new("", BLUE_INK, answered, |tick| at(tick.tick, instructions(tick)));
+        curves(&upper, time, "instructions a query", &[curve])?;
         let values: Vec<f64> = answered.iter().map(|tick| instructions(tick)).collect();
         histogram(&lower, "instructions a query", &values)?;
         root.present().map_err(failed)?;
@@ -78,7 +97,7 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
 }
 
 /// A value at a tick's time, in s.
-fn at(tick: u32, value: f64) -> (f64, f64) {
+pub fn at(tick: u32, value: f64) -> (f64, f64) {
     (f64::from(tick) / f64::from(TICK_RATE), value)
 }
 
@@ -96,7 +115,7 @@ fn extremes<T>(ticks: &[&T], point: impl Fn(&T) -> (f64, f64)) -> Vec<(f64, f64)
 }
 
 /// A value over time, in s.
-struct Curve {
+pub struct Curve {
     /// Its name, if there are several.
     name: &'static str,
     ink: RGBColor,
@@ -104,7 +123,7 @@ struct Curve {
 }
 
 impl Curve {
-    fn new<T>(
+    pub fn new<T>(
         name: &'static str,
         ink: RGBColor,
         ticks: &[&T],
@@ -115,7 +134,7 @@ impl Curve {
 }
 
 /// Curves over the same time.
-fn curves(
+pub fn curves(
     area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
     time: &Range<f64>,
     name: &str,
@@ -143,8 +162,10 @@ fn curves(
         chart.draw_series(LineSeries::new(zero, RED_INK)).map_err(failed)?;
     }
     for &Curve { name, ink, ref points } in curves {
-        let series = LineSeries::new(points.iter().copied(), ink);
-        let drawn = chart.draw_series(series).map_err(failed)?;
+        // A time without a value is a gap.
+        let runs = points.chunk_by(|before, after| after.0 - before.0 < GAP);
+        let paths = runs.map(|run| PathElement::new(run, ink));
+        let drawn = chart.draw_series(paths).map_err(failed)?;
         if curves.len() > 1 {
             drawn
                 .label(name)
@@ -205,6 +226,6 @@ fn histogram(
     Ok(())
 }
 
-fn failed(error: impl std::fmt::Display) -> anyhow::Error {
+pub fn failed(error: impl std::fmt::Display) -> anyhow::Error {
     anyhow!("cannot draw: {error}")
 }

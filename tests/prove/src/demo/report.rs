@@ -15,14 +15,13 @@ use serde::Serialize;
 use xtask::qemu;
 
 use super::check;
-use super::contacts::Touches;
 use super::faults::{Faults, Silence};
+use super::forces::Forces;
 use super::freshness::Freshness;
+use super::hand::Hand;
 use super::machine::Machine;
-use super::push::Pushed;
 use super::scene::Scene;
 use super::session::Outcome;
-use super::steps::Steps;
 use super::transition::Transition;
 use crate::harness::run::Run;
 
@@ -56,18 +55,12 @@ pub struct Report {
     separation_min_mm: f32,
     separation_max_mm: f32,
     force_max_n: f32,
+    /// Of a scripted instrument.
     #[serde(flatten)]
-    steps: Steps,
+    forces: Option<Forces>,
+    /// Of an instrument that a hand pushes.
     #[serde(flatten)]
-    touches: Touches,
-    /// Ticks whose force was compared with that of the wall, and those of them that were within its margin.
-    forces_compared: usize,
-    forces_pushing: usize,
-    /// Ticks with another force.
-    forces_wrong: usize,
-    /// The first of them.
-    #[serde(skip)]
-    first_wrong_force: u32,
+    hand: Option<Hand>,
     /// Ticks before the first frame, when the output is safe.
     ticks_waiting: usize,
     ticks_nominal: usize,
@@ -138,7 +131,6 @@ impl Report {
         let largest =
             |value: fn(&Tick) -> f32| answered.iter().map(|tick| value(tick)).fold(0.0, f32::max);
         let summary = outcome.summary;
-        let pushed = Pushed::of(&outcome.ticks);
         let footprint = match machine {
             Machine::Board { footprint, .. } => Some(footprint),
             Machine::Host { .. } => None,
@@ -165,12 +157,8 @@ impl Report {
             separation_min_mm: least(|tick| tick.separation),
             separation_max_mm: largest(|tick| tick.separation),
             force_max_n: largest(force),
-            steps: outcome.steps,
-            touches: outcome.touches.clone(),
-            forces_compared: pushed.checked,
-            forces_pushing: pushed.pushing,
-            forces_wrong: pushed.wrong,
-            first_wrong_force: pushed.first,
+            forces: Forces::of(outcome),
+            hand: outcome.hand.clone(),
             ticks_waiting: waiting,
             ticks_nominal: count(State::Nominal),
             ticks_degraded: count(State::Degraded),
@@ -218,7 +206,9 @@ impl Report {
 
     /// The promises that this run broke.
     fn broken(&self, machine: &Machine, outcome: &Outcome, faults: usize) -> Vec<String> {
-        let mut broken = Vec::new();
+        let mut broken = self.forces.as_ref().map_or_else(Vec::new, Forces::broken);
+        let seconds = outcome.ticks_asked / TICK_RATE;
+        broken.extend(self.hand.iter().flat_map(|hand| hand.broken(seconds)));
         let mut promise = |kept: bool, sentence: String| {
             if !kept {
                 broken.push(sentence);
@@ -234,19 +224,6 @@ impl Report {
         promise(
             wrong == 0,
             format!("{wrong} answers differ from exhaustive search, the first at tick {tick}"),
-        );
-        let (wrong, first) = (self.forces_wrong, self.first_wrong_force);
-        promise(
-            wrong == 0,
-            format!("{wrong} ticks have another force than the wall's, the first is {first}"),
-        );
-        let Touches { ticks_too_weak, ticks_proxy_too_weak, ticks_proxy_inward, .. } = self.touches;
-        promise(
-            ticks_too_weak + ticks_proxy_too_weak + ticks_proxy_inward == 0,
-            format!(
-                "inside, the force is too weak at {ticks_too_weak} ticks and the proxy's at {ticks_proxy_too_weak}, which \
-                 points inwards at {ticks_proxy_inward}"
-            ),
         );
         let wrong = self.frames_published_wrong;
         promise(wrong == 0, format!("{wrong} published frames differ from what was sent"));
@@ -363,17 +340,12 @@ impl Report {
             format!("{:.2} to {:.2} mm", self.separation_min_mm, self.separation_max_mm),
         );
         row("largest force", format!("{:.2} N", self.force_max_n));
-        row("force steps", self.steps.row());
-        for (name, value) in self.touches.rows() {
+        for (name, value) in self.forces.iter().flat_map(Forces::rows) {
             row(name, value);
         }
-        row(
-            "forces compared",
-            format!(
-                "{}, {} of them within the margin, {} differ",
-                self.forces_compared, self.forces_pushing, self.forces_wrong
-            ),
-        );
+        for (name, value) in self.hand.iter().flat_map(Hand::rows) {
+            row(name, value);
+        }
         row(
             "tests a query",
             format!("{:.0} nodes, {:.0} triangles", self.node_tests_mean, self.triangle_tests_mean),

@@ -36,17 +36,31 @@ pub struct Link {
     pub frames_sent: AtomicU32,
     /// Set when the controller has ended.
     pub over: AtomicBool,
-    /// The vertices of every frame, exactly as the controller decodes them.
-    frames: Mutex<HashMap<u32, Arc<Vec<Vec3>>>>,
+    /// The frames by their epochs.
+    frames: Mutex<HashMap<u32, Sent>>,
+}
+
+/// A frame that was sent.
+#[derive(Clone)]
+pub struct Sent {
+    /// The vertices, exactly as the controller decodes them.
+    pub rows: Arc<Vec<Vec3>>,
+    /// The controller's tick at which the heart was so.
+    pub captured: u32,
 }
 
 impl Link {
     /// The vertices of a frame.
     pub fn frame(&self, epoch: u32) -> Option<Arc<Vec<Vec3>>> {
-        self.lock().get(&epoch).cloned()
+        self.lock().get(&epoch).map(|sent| Arc::clone(&sent.rows))
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<u32, Arc<Vec<Vec3>>>> {
+    /// All frames, in no order.
+    pub fn all(&self) -> Vec<Sent> {
+        self.lock().values().cloned().collect()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<u32, Sent>> {
         self.frames.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
@@ -163,9 +177,10 @@ fn send_all(
         if silence.is_some_and(|at| link.now() >= at) {
             sender.transport().set_rate(0.0);
         }
+        let captured = link.now();
         let frame = sender.prepare(positions).context("the motion cannot be sent")?;
         if let Some((epoch, held)) = sender.held() {
-            link.lock().insert(epoch, Arc::new(held.to_vec()));
+            link.lock().insert(epoch, Sent { rows: Arc::new(held.to_vec()), captured });
         }
         match sender.transmit(frame) {
             Ok(_) => (),

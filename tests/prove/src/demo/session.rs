@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use controller::TICK_RATE;
-use controller::telemetry::{MAX_FRAMED, Network, Record, Summary, Tick};
+use controller::telemetry::{MAX_FRAMED, Network, Push, Record, Summary, Tick};
 use dibs_nostd::wire::Deframer;
 use indicatif::{ProgressBar, ProgressStyle};
 use xtask::process::shown;
@@ -23,7 +23,9 @@ use super::check::{Checked, Compared, check, compare};
 use super::contacts::Touches;
 use super::debugger::{Bits, flip};
 use super::faults::{Faults, Plan};
+use super::hand::Hand;
 use super::machine::Machine;
+use super::robot::Robot;
 use super::scene::Scene;
 use super::sender::{Link, send};
 use super::steps::Steps;
@@ -57,10 +59,10 @@ pub struct Outcome {
     pub checked: Vec<Checked>,
     /// The comparison of every published frame.
     pub compared: Vec<Compared>,
-    /// The force's steps at new frames.
-    pub steps: Steps,
-    /// All contacts of every tick.
-    pub touches: Touches,
+    /// Of a scripted instrument: the force's steps at new frames, and all contacts of every tick.
+    pub path: Option<(Steps, Touches)>,
+    /// Of an instrument that a hand pushes.
+    pub hand: Option<Hand>,
     /// The faults on the bus, if any.
     pub faults: Option<Faults>,
     /// Frames of a flood that were sent.
@@ -142,24 +144,30 @@ pub fn run(
         Ok(Some(status)) => error.context(format!("the controller ended: {status}")),
         _ => error,
     };
-    let Heard { ticks, network, summary, flipped_at } = listened.map_err(ended)?;
+    let Heard { ticks, pushes, network, summary, flipped_at } = listened.map_err(ended)?;
     let injected = sent?;
     let mut compared = Vec::new();
     for tick in &ticks {
         compare(&link, tick, &mut compared);
     }
-    let steps = Steps::of(scene, &link, &ticks)?;
-    let touches = Touches::of(scene, &link, &ticks)?;
+    let checked = checked?;
+    let (path, hand) = match machine.robot() {
+        Robot::Script => {
+            let steps = Steps::of(scene, &link, &ticks)?;
+            (Some((steps, Touches::of(scene, &link, &ticks)?)), None)
+        }
+        Robot::Hand => (None, Some(Hand::new(scene, &link, &ticks, pushes, &checked)?)),
+    };
     let status = child.0.wait()?;
     Ok(Outcome {
         bus: machine.bus(),
         ticks,
         network,
         summary,
-        checked: checked?,
+        checked,
         compared,
-        steps,
-        touches,
+        path,
+        hand,
         faults: faults.map(|plan| Faults::new(plan, injected)),
         flood: flooded?,
         flipped_at,
@@ -211,6 +219,7 @@ pub fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
 /// A controller's telemetry.
 struct Heard {
     ticks: Vec<Tick>,
+    pushes: Vec<Push>,
     network: Option<Network>,
     summary: Summary,
     flipped_at: Option<u32>,
@@ -229,7 +238,7 @@ fn listen(
     let style = "{bar:24} {pos}/{len} ticks  {msg}";
     let bar = ProgressBar::new(ticks_asked.into()).with_style(ProgressStyle::with_template(style)?);
     let mut deframer = Deframer::<MAX_FRAMED>::new();
-    let mut ticks = Vec::new();
+    let (mut ticks, mut pushes) = (Vec::new(), Vec::new());
     let (mut network, mut flipped_at) = (None, None);
     let mut buffer = [0; 4096];
     loop {
@@ -242,8 +251,9 @@ fn listen(
             match record {
                 Record::Summary(summary) => {
                     bar.finish_and_clear();
-                    return Ok(Heard { ticks, network, summary, flipped_at });
+                    return Ok(Heard { ticks, pushes, network, summary, flipped_at });
                 }
+                Record::Push(push) => pushes.push(push),
                 Record::Network(record) => network = Some(record),
                 Record::Tick(tick) => {
                     link.bytes.store(tick.bytes, Ordering::Relaxed);

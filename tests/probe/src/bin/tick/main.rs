@@ -14,7 +14,7 @@ mod exit;
 mod files;
 
 use controller::surface::Surface;
-use controller::{BusStatus, Control, Trust};
+use controller::{BusStatus, Control, Script, Trust};
 use cortex_m_rt::entry;
 use dibs_nostd::Ticks;
 use exit::exit;
@@ -30,7 +30,8 @@ fn main() -> ! {
 }
 
 fn run() -> Option<()> {
-    let (mut receiver, mut control) = controller::start(&SURFACE, &BUS, &Trust::SERIAL).ok()?;
+    let (mut receiver, mut control) =
+        controller::start(&SURFACE, &BUS, &Trust::SERIAL, Script).ok()?;
     let mut script = files::Input::open()?;
     let mut answers = files::Output::create()?;
     loop {
@@ -61,7 +62,7 @@ fn run() -> Option<()> {
     }
 }
 
-fn tick(control: &mut Control) -> [u32; ANSWER_WORDS] {
+fn tick(control: &mut Control<Script>) -> [u32; ANSWER_WORDS] {
     let start = clock::now();
     let record = control.tick(clock::now);
     let took = clock::now().wrapping_sub(start);

@@ -1,0 +1,108 @@
+//! What moves the instrument: on a robot its encoders and drives, here a script or a simulated hand.
+
+use dibs_nostd::constraint::ConstraintForce;
+use dibs_nostd::filter::{Admitted, FilterError, Motion};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::guard::Answer;
+use dibs_nostd::{Capsule, ToolError};
+
+use crate::instrument;
+use crate::pushed::Pushed;
+use crate::telemetry::Push;
+
+/// An instrument's robot. To use your own, read the encoders and write to the drives here.
+pub trait Robot {
+    /// The instrument at this tick.
+    ///
+    /// # Errors
+    /// [`ToolError`] if the pose is not finite.
+    fn instrument(&self, tick: u32) -> Result<Capsule, ToolError>;
+
+    /// The motion that is commanded until the next tick; `None` for a robot that a hand moves against a force.
+    fn command(&self) -> Option<Motion>;
+
+    /// Applies the force of a wall, within what the drives may give. Returns the force applied, in N.
+    fn apply(&mut self, answer: &Answer, force: &ConstraintForce) -> Vec3;
+
+    /// Executes the admitted motion. After an error the instrument rests.
+    fn execute(&mut self, answer: &Answer, admitted: &Result<Admitted, FilterError>);
+
+    /// The demo's record of a hand that pushes.
+    fn push(&self) -> Option<Push>;
+}
+
+/// The script of [`instrument`]: nothing stops it, so that the wall is seen from inside, too.
+pub struct Script;
+
+impl Robot for Script {
+    fn instrument(&self, tick: u32) -> Result<Capsule, ToolError> {
+        instrument(tick)
+    }
+
+    fn command(&self) -> Option<Motion> {
+        None
+    }
+
+    fn apply(&mut self, _: &Answer, force: &ConstraintForce) -> Vec3 {
+        force.force
+    }
+
+    fn execute(&mut self, _: &Answer, _: &Result<Admitted, FilterError>) {}
+
+    fn push(&self) -> Option<Push> {
+        None
+    }
+}
+
+/// The demo's robot, chosen when it starts.
+pub enum Either {
+    /// The script.
+    Script(Script),
+    /// The hand.
+    Pushed(Pushed),
+}
+
+impl Either {
+    /// The script, or an instrument that a simulated hand pushes.
+    #[must_use]
+    pub fn new(is_pushed: bool) -> Self {
+        if is_pushed { Self::Pushed(Pushed::new()) } else { Self::Script(Script) }
+    }
+}
+
+impl Robot for Either {
+    fn instrument(&self, tick: u32) -> Result<Capsule, ToolError> {
+        match self {
+            Self::Script(robot) => robot.instrument(tick),
+            Self::Pushed(robot) => robot.instrument(tick),
+        }
+    }
+
+    fn command(&self) -> Option<Motion> {
+        match self {
+            Self::Script(robot) => robot.command(),
+            Self::Pushed(robot) => robot.command(),
+        }
+    }
+
+    fn apply(&mut self, answer: &Answer, force: &ConstraintForce) -> Vec3 {
+        match self {
+            Self::Script(robot) => robot.apply(answer, force),
+            Self::Pushed(robot) => robot.apply(answer, force),
+        }
+    }
+
+    fn execute(&mut self, answer: &Answer, admitted: &Result<Admitted, FilterError>) {
+        match self {
+            Self::Script(robot) => robot.execute(answer, admitted),
+            Self::Pushed(robot) => robot.execute(answer, admitted),
+        }
+    }
+
+    fn push(&self) -> Option<Push> {
+        match self {
+            Self::Script(robot) => robot.push(),
+            Self::Pushed(robot) => robot.push(),
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! The forces on an instrument that nothing stops.
+
+use serde::Serialize;
+
+use super::contacts::Touches;
+use super::push::Pushed;
+use super::session::Outcome;
+use super::steps::Steps;
+
+/// The forces on a scripted instrument.
+#[derive(Serialize)]
+pub struct Forces {
+    #[serde(flatten)]
+    steps: Steps,
+    #[serde(flatten)]
+    touches: Touches,
+    /// Ticks whose force was compared with that of the wall, and those of them that were within its margin.
+    forces_compared: usize,
+    forces_pushing: usize,
+    /// Ticks with another force.
+    forces_wrong: usize,
+    /// The first of them.
+    #[serde(skip)]
+    first_wrong_force: u32,
+}
+
+impl Forces {
+    /// Of a run with a script.
+    pub fn of(outcome: &Outcome) -> Option<Self> {
+        let (steps, touches) = outcome.path.clone()?;
+        let pushed = Pushed::of(&outcome.ticks);
+        Some(Self {
+            steps,
+            touches,
+            forces_compared: pushed.checked,
+            forces_pushing: pushed.pushing,
+            forces_wrong: pushed.wrong,
+            first_wrong_force: pushed.first,
+        })
+    }
+
+    /// What the run broke, in words.
+    pub fn broken(&self) -> Vec<String> {
+        let mut broken = Vec::new();
+        let (wrong, first) = (self.forces_wrong, self.first_wrong_force);
+        if wrong > 0 {
+            broken.push(format!(
+                "{wrong} ticks have another force than the wall's, the first is {first}"
+            ));
+        }
+        let Touches { ticks_too_weak, ticks_proxy_too_weak, ticks_proxy_inward, .. } = self.touches;
+        if ticks_too_weak + ticks_proxy_too_weak + ticks_proxy_inward > 0 {
+            broken.push(format!(
+                "inside, the force is too weak at {ticks_too_weak} ticks and the proxy's at {ticks_proxy_too_weak}, which \
+                 points inwards at {ticks_proxy_inward}"
+            ));
+        }
+        broken
+    }
+
+    /// Lines for the user.
+    pub fn rows(&self) -> Vec<(&'static str, String)> {
+        let mut rows = vec![("force steps", self.steps.row())];
+        rows.extend(self.touches.rows());
+        rows.push((
+            "forces compared",
+            format!(
+                "{}, {} of them within the margin, {} differ",
+                self.forces_compared, self.forces_pushing, self.forces_wrong
+            ),
+        ));
+        rows
+    }
+}
