@@ -60,7 +60,8 @@ pub struct Args {
     /// Error of the registration of robot and surface
     #[arg(long, value_name = "MM", default_value_t = 0.0, allow_negative_numbers = true)]
     registration: f32,
-    /// Instructions of a Cortex-M7 that the queries of a tick may take
+    /// Instructions of a Cortex-M7 that the queries of a tick may take, by the fit of plain queries: deep in the tissue they
+    /// take up to twice as many
     #[arg(long, value_name = "N", default_value_t = 200_000)]
     budget: u32,
     /// Print a JSON object a line, and another one of the sums on standard error

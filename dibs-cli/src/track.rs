@@ -33,7 +33,8 @@ it moved before (extrapolated). One line a tick on standard output, and what it 
 
 Where a budget ends, is_cut is true and the certified interval is wider: it is that of the last ticks, less what has moved
 since. is_kept says that the side is the last tick's. contacts_bound says how far the list of contacts is complete; it is
-null where nothing is certain.")]
+null where nothing is certain. A budget counts by the fit of plain queries, which is too low for a shaft deep in the
+tissue: there a tick took up to twice as many instructions.")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,

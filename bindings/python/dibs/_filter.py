@@ -67,8 +67,9 @@ class Tracker:
         """The closest pair of this tick, on the surface as it is now.
 
         `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. `instructions` bounds the tick's
-        work, of a Cortex-M7 by the fitted cost: pair, side, depth and contacts together. Where it ends, the interval is
-        that of the last tick, less what moved since, and the next tick goes on. With a `margin` (mm) the contacts are listed.
+        work, of a Cortex-M7 by the fitted cost: pair, side, depth and contacts together. The fit is of plain queries, and too
+        low for a shaft deep in the tissue: there a tick took up to twice as many. Where it ends, the interval is that of
+        the last tick, less what moved since, and the next tick goes on. With a `margin` (mm) the contacts are listed.
         """
         numbers = tool_of(tool)
         margin = None if margin is None else _at_least("margin", margin, 0)
@@ -123,7 +124,8 @@ class Filter:
     It keeps every tool `stand_off` (mm) from the tissue, for a robot that moves its reference point with at most `speed`
     (mm/s). A rotation by one radian counts as much as a translation by the `lever` (mm), by default the distance from the
     reference point to the farthest end of a tool's axis. `instructions` bounds the queries of a tick, of a Cortex-M7 by the
-    fitted cost: what is not verified then is not admitted.
+    fitted cost of plain queries, which is too low for shafts deep in the tissue, by up to a half: what is not verified
+    then is not admitted.
     """
 
     def __init__(

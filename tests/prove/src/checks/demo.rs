@@ -60,9 +60,9 @@ pub const CHECK: Check = Check {
             id: "demo.tick",
             says: "Emulated: longest control tick, from the moment that it is due to its end",
             criterion: TIMING,
-            bound: Bound::AtMost(1_000.0),
+            bound: Bound::AtMost(240.0),
             unit: "µs",
-            limits: "At 500 million instructions a second.",
+            limits: "At 500 million instructions a second: 120,000 instructions.",
         },
         note("demo.compared"),
         Promise {
