@@ -22,44 +22,91 @@
 //! times its rest length, so the builder stores `12 u s^3` times the product of the rest lengths: a volume above it is
 //! positive.
 
-use glam::Vec3;
+use core::ops::{Add, BitAnd, Mul, Sub};
 
-use super::layout::Element;
+use glam::Vec4;
+
+use super::layout::AtRest;
 use crate::math::sqrt::sqrt;
 
-/// An element as it is now.
-#[derive(Clone, Copy)]
-pub(super) struct Now {
-    /// The products of its edges, in the order of [`Element::products`].
-    products: [f32; 6],
-    volume: f32,
+/// A number, or one of each of four elements: they round alike.
+pub(super) trait Lanes:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// An answer for each.
+    type Mask: BitAnd<Output = Self::Mask>;
+
+    fn splat(number: f32) -> Self;
+
+    /// Whether it is above another; false for NaN.
+    fn is_above(self, other: Self) -> Self::Mask;
 }
 
-impl Now {
+impl Lanes for f32 {
+    type Mask = bool;
+
     #[inline(always)]
-    pub fn of([a, b, c, d]: [Vec3; 4]) -> Self {
-        let (first, second, third) = (b - a, c - b, d - c);
+    fn splat(number: f32) -> Self {
+        number
+    }
+
+    #[inline(always)]
+    fn is_above(self, other: Self) -> bool {
+        self > other
+    }
+}
+
+impl Lanes for Vec4 {
+    type Mask = u32;
+
+    #[inline(always)]
+    fn splat(number: f32) -> Self {
+        Self::splat(number)
+    }
+
+    #[inline(always)]
+    fn is_above(self, other: Self) -> u32 {
+        self.cmpgt(other).bitmask()
+    }
+}
+
+/// An element as it is now, or four.
+#[derive(Clone, Copy)]
+pub(super) struct Now<T> {
+    /// The products of its edges, in the order of [`AtRest::products`].
+    products: [T; 6],
+    volume: T,
+}
+
+impl<T: Lanes> Now<T> {
+    /// From the coordinates of its four nodes.
+    #[inline(always)]
+    pub fn of([a, b, c, d]: [[T; 3]; 4]) -> Self {
+        let (first, second, third) = (minus(b, a), minus(c, b), minus(d, c));
         let products = [
-            first.length_squared(),
-            first.dot(second),
-            first.dot(third),
-            second.length_squared(),
-            second.dot(third),
-            third.length_squared(),
+            dot(first, first),
+            dot(first, second),
+            dot(first, third),
+            dot(second, second),
+            dot(second, third),
+            dot(third, third),
         ];
-        Self { products, volume: first.dot(second.cross(third)) }
+        let ([x, y, z], [u, v, w]) = (second, third);
+        let cross = [y * w - v * z, z * u - w * x, x * v - u * y];
+        Self { products, volume: dot(first, cross) }
     }
 
     /// Whether its volume is positive; false for NaN.
     #[inline(always)]
-    pub fn is_upright(&self, element: &Element) -> bool {
-        self.volume > element.least
+    pub fn is_upright(&self, rest: &AtRest<T>) -> T::Mask {
+        self.volume.is_above(rest.least)
     }
 
     /// Whether its stretch is certainly below `sqrt(limit)`; false for NaN.
     #[inline(always)]
-    pub fn is_within(&self, element: &Element, limit: f32) -> bool {
-        let [m11, m12, m13, m22, m23, m33] = element.products;
+    pub fn is_within(&self, rest: &AtRest<T>, limit: f32) -> T::Mask {
+        let (limit, zero) = (T::splat(limit), T::splat(0.0));
+        let [m11, m12, m13, m22, m23, m33] = rest.products;
         let [g11, g12, g13, g22, g23, g33] = self.products;
         let (x11, x12, x13) = (limit * m11 - g11, limit * m12 - g12, limit * m13 - g13);
         let (x22, x23, x33) = (limit * m22 - g22, limit * m23 - g23, limit * m33 - g33);
@@ -67,21 +114,23 @@ impl Now {
         let third = x11 * x33 - x13 * x13;
         let between = x11 * x23 - x12 * x13;
         // `&`, not `&&`: three comparisons cost less than branches.
-        (x11 > 0.0) & (second > 0.0) & (second * third > between * between)
+        x11.is_above(zero) & second.is_above(zero) & (second * third).is_above(between * between)
     }
 
     /// The sum of the squares of its edges, and that at rest.
     #[inline(always)]
-    pub fn sizes(&self, element: &Element) -> [f32; 2] {
-        let sum = |[first, _, _, second, _, third]: [f32; 6]| first + second + third;
-        [sum(self.products), sum(element.products)]
+    pub fn sizes(&self, rest: &AtRest<T>) -> [T; 2] {
+        let sum = |[first, _, _, second, _, third]: [T; 6]| first + second + third;
+        [sum(self.products), sum(rest.products)]
     }
+}
 
+impl Now<f32> {
     /// The squared stretch of an element that is not within `from` but within `limit`, rounded up by at most
     /// [`HEADROOM`].
     #[cold]
     #[inline(never)]
-    pub fn squared_stretch(&self, element: &Element, from: f32, limit: f32) -> f32 {
+    pub fn squared_stretch(&self, rest: &AtRest<f32>, from: f32, limit: f32) -> f32 {
         let (mut low, mut high) = (from, limit);
         // Enough for a limit of a million.
         for _ in 0..64 {
@@ -89,7 +138,7 @@ impl Now {
             if high - low <= high * HEADROOM || middle <= low || middle >= high {
                 break;
             }
-            if self.is_within(element, middle) {
+            if self.is_within(rest, middle) {
                 high = middle;
             } else {
                 low = middle;
@@ -101,16 +150,26 @@ impl Now {
     /// The stretch of an element beyond the square `limit`, to within a part in a thousand; infinite for one that is not
     /// finite.
     #[cold]
-    pub fn stretch_beyond(&self, element: &Element, limit: f32) -> f32 {
+    pub fn stretch_beyond(&self, rest: &AtRest<f32>, limit: f32) -> f32 {
         let (mut from, mut to) = (limit, limit * 2.0);
         for _ in 0..40 {
-            if self.is_within(element, to) {
-                return sqrt(self.squared_stretch(element, from, to));
+            if self.is_within(rest, to) {
+                return sqrt(self.squared_stretch(rest, from, to));
             }
             (from, to) = (to, to * 2.0);
         }
         f32::INFINITY
     }
+}
+
+#[inline(always)]
+fn minus<T: Lanes>([x, y, z]: [T; 3], [u, v, w]: [T; 3]) -> [T; 3] {
+    [x - u, y - v, z - w]
+}
+
+#[inline(always)]
+fn dot<T: Lanes>([x, y, z]: [T; 3], [u, v, w]: [T; 3]) -> T {
+    x * u + y * v + z * w
 }
 
 /// Relative rounding up of a squared stretch. Elements stretched nearly as much as the one stretched most pass the check

@@ -1,6 +1,6 @@
 //! The nodes' bytes: section 11 of `docs/format.md`, and its checker.
 
-use glam::Vec3;
+use glam::{Mat4, Vec3, Vec4};
 
 use super::{MAX_ELEMENTS, MAX_NODES, NodesError};
 use crate::tree::format::u32_at;
@@ -28,14 +28,20 @@ pub(super) struct Parts<'a> {
     pub bindings: &'a [[u8; BINDING_BYTES]],
 }
 
-/// An element: its nodes, and what its check compares.
+/// An element: its nodes, and its shape at rest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Element {
     pub corners: [u32; 4],
-    /// The products of the edges along the path through the four nodes, at rest: 11, 12, 13, 22, 23, 33.
-    pub products: [f32; 6],
+    pub rest: AtRest<f32>,
+}
+
+/// What an element's check compares, or that of four.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AtRest<T> {
+    /// The products of the edges along the path through the four nodes: 11, 12, 13, 22, 23, 33.
+    pub products: [T; 6],
     /// The least volume of the edges that is certainly positive (mm³).
-    pub least: f32,
+    pub least: T,
 }
 
 /// A vertex's element, and the weights of its first three nodes.
@@ -98,26 +104,26 @@ fn check(parts: &Parts<'_>) -> Result<(), NodesError> {
     let nodes = parts.nodes.len() as u32;
     let mut last = 0;
     for (row, record) in (0..).zip(parts.elements) {
-        let element = element(record);
-        if let Some(&node) = element.corners.iter().find(|&&node| node >= nodes) {
+        let Element { corners, rest } = element(record);
+        if let Some(&node) = corners.iter().find(|&&node| node >= nodes) {
             return Err(NodesError::Corner { element: row, node, nodes });
         }
         let is_number = |x: &f32| x.abs() < 1e18;
-        let [first, .., third] = element.products;
-        let is_sound = element.products.iter().all(is_number)
+        let [first, .., third] = rest.products;
+        let is_sound = rest.products.iter().all(is_number)
             && first > 0.0
             && third > 0.0
-            && element.least > 0.0
-            && element.least < 1e27;
-        let latest = element.corners.into_iter().fold(0, u32::max);
+            && rest.least > 0.0
+            && rest.least < 1e27;
+        let latest = corners.into_iter().fold(0, u32::max);
         if !is_sound || latest < last {
             return Err(NodesError::Element { element: row });
         }
         last = latest;
         let at = |node: u32| parts.nodes.get(node as usize).map_or(Vec3::NAN, position);
-        let [a, b, c, d] = element.corners.map(at);
+        let [a, b, c, d] = corners.map(at);
         // Written so that NaN is wrong.
-        if !((b - a).dot((c - b).cross(d - c)) > element.least) {
+        if !((b - a).dot((c - b).cross(d - c)) > rest.least) {
             return Err(NodesError::Inverted { element: row });
         }
     }
@@ -152,12 +158,40 @@ pub(super) fn position(
 pub(super) fn element(record: &[u8; ELEMENT_BYTES]) -> Element {
     let (words, _) = record.as_chunks::<4>();
     let &[ab, cd, m11, m12, m13, m22, m23, m33, least] = words else {
-        return Element { corners: [u32::MAX; 4], products: [0.0; 6], least: f32::NAN };
+        let rest = AtRest { products: [0.0; 6], least: f32::NAN };
+        return Element { corners: [u32::MAX; 4], rest };
     };
-    let products = [m11, m12, m13, m22, m23, m33].map(f32::from_le_bytes);
-    let [ab, cd] = [ab, cd].map(u32::from_le_bytes);
+    let float = f32::from_le_bytes;
+    let products = [float(m11), float(m12), float(m13), float(m22), float(m23), float(m33)];
+    let rest = AtRest { products, least: float(least) };
+    let (ab, cd) = (u32::from_le_bytes(ab), u32::from_le_bytes(cd));
     let corners = [ab & 0xFFFF, ab >> 16, cd & 0xFFFF, cd >> 16];
-    Element { corners, products, least: f32::from_le_bytes(least) }
+    Element { corners, rest }
+}
+
+/// The records of four elements: the first nodes of all, their second ones and so on; and their shapes at rest.
+#[inline(always)]
+pub(super) fn four([a, b, c, d]: &[[u8; ELEMENT_BYTES]; 4]) -> ([[u32; 4]; 4], AtRest<Vec4>) {
+    let (a, b, c, d) = (element(a), element(b), element(c), element(d));
+    let [a0, a1, a2, a3] = a.corners;
+    let [b0, b1, b2, b3] = b.corners;
+    let [c0, c1, c2, c3] = c.corners;
+    let [d0, d1, d2, d3] = d.corners;
+    let corners = [[a0, b0, c0, d0], [a1, b1, c1, d1], [a2, b2, c2, d2], [a3, b3, c3, d3]];
+    let first = |Element { rest, .. }: &Element| {
+        let [m11, m12, m13, m22, ..] = rest.products;
+        Vec4::new(m11, m12, m13, m22)
+    };
+    let last = |Element { rest, .. }: &Element| {
+        let [.., m23, m33] = rest.products;
+        Vec4::new(m23, m33, rest.least, 0.0)
+    };
+    // A transpose takes fewer instructions than gathering each number.
+    let first = Mat4::from_cols(first(&a), first(&b), first(&c), first(&d)).transpose();
+    let last = Mat4::from_cols(last(&a), last(&b), last(&c), last(&d)).transpose();
+    let Mat4 { x_axis: m11, y_axis: m12, z_axis: m13, w_axis: m22 } = first;
+    let products = [m11, m12, m13, m22, last.x_axis, last.y_axis];
+    (corners, AtRest { products, least: last.z_axis })
 }
 
 /// The nodes of an element.

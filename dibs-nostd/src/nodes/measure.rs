@@ -1,8 +1,11 @@
 //! The measurement of all elements, in slices of bounded work.
 
+use glam::{Vec3, Vec4};
+
 use super::Nodes;
 use super::kernel::Now;
-use super::layout::{self, ELEMENT_BYTES};
+use super::layout::{self, ELEMENT_BYTES, Element};
+use crate::math::vec3x4::Vec3x4;
 use crate::stretch::{LEAST, StretchError, root_up, squared_limit};
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 
@@ -33,27 +36,91 @@ impl Pass {
         shrinkage: f32,
         mut work: u32,
     ) -> Result<u32, StretchError> {
-        let limit = squared_limit(nodes.limit);
-        let run = nodes.run();
         let elements = nodes.parts.elements;
-        let rows = elements.get(self.next as usize..).unwrap_or_default();
-        for record in rows {
-            if work == 0 || !self.measure(nodes, record, table, ready, limit)? {
+        let (run, end) = (nodes.run(), elements.len() as u32);
+        while self.next < end && work > 0 {
+            let first = self.next - self.next.checked_rem(run).unwrap_or(0);
+            let run_end = first.saturating_add(run).min(end);
+            let stop = self.next.saturating_add(work).min(run_end);
+            let rows = elements.get(self.next as usize..stop as usize).unwrap_or_default();
+            let start = self.next;
+            self.measure_rows(nodes, rows, table, ready)?;
+            work -= self.next - start;
+            if self.next < stop {
                 break;
             }
-            work -= 1;
-            self.next += 1;
-            let is_end = self.next.is_multiple_of(run) || self.next as usize == elements.len();
-            if is_end {
+            if stop == run_end {
                 let [now, rest] = self.sizes;
                 self.sizes = [0.0; 2];
                 if !(now >= shrinkage * shrinkage * rest) {
-                    let element = self.next.saturating_sub(run);
-                    return Err(StretchError::ElementsShrunk { element, limit: shrinkage });
+                    return Err(StretchError::ElementsShrunk { element: first, limit: shrinkage });
                 }
             }
         }
         Ok(work)
+    }
+
+    /// Measures the next elements, up to one with a node that is not ready.
+    fn measure_rows<V: VertexTable + ?Sized>(
+        &mut self,
+        nodes: &Nodes<'_>,
+        mut rows: &[[u8; ELEMENT_BYTES]],
+        table: &V,
+        ready: u32,
+    ) -> Result<(), StretchError> {
+        let limit = squared_limit(nodes.limit);
+        while !rows.is_empty() {
+            // Elsewhere it would take more instructions, not fewer.
+            if cfg!(any(target_arch = "x86_64", target_arch = "aarch64")) {
+                let passed = self.fours(rows, table, ready);
+                rows = rows.get(passed..).unwrap_or_default();
+            }
+            let (some, others) = rows.split_at_checked(4).unwrap_or((rows, &[]));
+            for record in some {
+                if !self.measure(nodes, record, table, ready, limit)? {
+                    return Ok(());
+                }
+                self.next += 1;
+            }
+            rows = others;
+        }
+        Ok(())
+    }
+
+    /// Measures four elements at a time, up to the first four that do not all pass the quick check, and returns how many
+    /// passed. Numbers round as in [`measure`](Self::measure) and are added in the same order, so the bits are the same.
+    // By itself, so that its state stays in registers.
+    #[inline(never)]
+    fn fours<V: VertexTable + ?Sized>(
+        &mut self,
+        rows: &[[u8; ELEMENT_BYTES]],
+        table: &V,
+        ready: u32,
+    ) -> usize {
+        let [mut sum, mut at_rest] = self.sizes;
+        let mut passed = 0;
+        for records in rows.as_chunks::<4>().0 {
+            // The last of them has the latest node.
+            let [.., last] = records;
+            let [a, b, c, d] = layout::corners(last);
+            if (a >= ready) | (b >= ready) | (c >= ready) | (d >= ready) {
+                break;
+            }
+            let (corners, rest) = layout::four(records);
+            let Some(now) = now_of(table, corners) else { break };
+            if now.is_within(&rest, self.squared) & now.is_upright(&rest) != 0b1111 {
+                break;
+            }
+            let [size, rest] = now.sizes(&rest);
+            for (size, rest) in size.to_array().into_iter().zip(rest.to_array()) {
+                sum += size;
+                at_rest += rest;
+            }
+            passed += 4;
+        }
+        self.sizes = [sum, at_rest];
+        self.next += passed as u32;
+        passed
     }
 
     /// Measures the next element; false where a node of it is not ready.
@@ -66,27 +133,27 @@ impl Pass {
         ready: u32,
         limit: f32,
     ) -> Result<bool, StretchError> {
-        let element = layout::element(record);
-        let [a, b, c, d] = element.corners;
+        let Element { corners: [a, b, c, d], rest } = layout::element(record);
         if (a >= ready) | (b >= ready) | (c >= ready) | (d >= ready) {
             return Ok(false);
         }
-        let at = |node| table.position(node).ok_or(StretchError::Corrupt { row: node });
+        let at =
+            |node| table.position(node).map(Vec3::into).ok_or(StretchError::Corrupt { row: node });
         let now = Now::of([at(a)?, at(b)?, at(c)?, at(d)?]);
-        if !now.is_within(&element, self.squared) {
+        if !now.is_within(&rest, self.squared) {
             let row = self.next;
-            if !now.is_within(&element, limit) {
-                let stretch = now.stretch_beyond(&element, limit);
+            if !now.is_within(&rest, limit) {
+                let stretch = now.stretch_beyond(&rest, limit);
                 let limit = nodes.limit;
                 return Err(StretchError::ElementExceeded { element: row, stretch, limit });
             }
-            self.squared = now.squared_stretch(&element, self.squared, limit);
+            self.squared = now.squared_stretch(&rest, self.squared, limit);
             self.worst = row;
         }
-        if !now.is_upright(&element) {
+        if !now.is_upright(&rest) {
             return Err(StretchError::Inverted { element: self.next });
         }
-        let [size, rest] = now.sizes(&element);
+        let [size, rest] = now.sizes(&rest);
         let [sizes, at_rest] = self.sizes;
         self.sizes = [sizes + size, at_rest + rest];
         Ok(true)
@@ -102,5 +169,73 @@ impl Pass {
         let sigma = root_up(self.squared);
         let regions = [u8::MAX; REGIONS];
         MeasuredStretch::new(sigma, nodes.motion.tree, self.worst, epoch, regions)
+    }
+}
+
+/// Four elements as they are now; `None` where a node is outside of the table.
+#[inline(always)]
+fn now_of<V: VertexTable + ?Sized>(table: &V, corners: [[u32; 4]; 4]) -> Option<Now<Vec4>> {
+    let at = |nodes| {
+        let Vec3x4 { x, y, z } = Vec3x4::of(|node| table.position(node), nodes)?;
+        Some([x, y, z])
+    };
+    let [a, b, c, d] = corners;
+    Some(Now::of([at(a)?, at(b)?, at(c)?, at(d)?]))
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use dibs_build::{Builder, Volume, generate};
+
+    use super::*;
+    use crate::tree::Tree;
+
+    /// Frames of nodes, some with elements beyond the limit, turned inside out or not finite: measured four at a time in
+    /// slices of any length, the bits and the refused element are those of one at a time.
+    #[test]
+    fn four_at_a_time_are_measured_as_one_after_another() {
+        let mesh = generate::heart(600).expect("a valid size").mesh;
+        let lattice = Volume::lattice(&mesh, [5, 4, 3]).expect("a lattice");
+        let built = Builder::new().stretch(2.0).nodes(&lattice).build(&mesh).expect("held");
+        let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+        let nodes = Nodes::of(&tree).expect("valid");
+        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+        let mut rng = fastrand::Rng::with_seed(62);
+        let mut outcomes = [0; 4];
+        for round in 0..400 {
+            let mut random = || Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 0.5;
+            let by = if round % 4 == 0 { 30.0 } else { 12.0 };
+            let mut frame: Vec<Vec3> = rest.iter().map(|&at| at + by * random()).collect();
+            if round % 10 == 1 {
+                frame[rng.usize(..rest.len())] = Vec3::NAN;
+            }
+            let ready = if rng.bool() { nodes.count() } else { rng.u32(..nodes.count()) };
+            let shrinkage = if rng.bool() { 0.0 } else { 1.01 };
+            let mut measured = |longest: u32| {
+                let mut pass = Pass::new();
+                let error = loop {
+                    let (next, work) = (pass.next, rng.u32(1..=longest));
+                    match pass.advance(&nodes, frame.as_slice(), ready, shrinkage, work) {
+                        Ok(_) if pass.next > next => (),
+                        other => break other.err(),
+                    }
+                };
+                let sizes = pass.sizes.map(f32::to_bits);
+                (pass.next, pass.squared.to_bits(), pass.worst, sizes, std::format!("{error:?}"))
+            };
+            // Fewer than four at a time are measured one after another.
+            let (one, four) = (measured(3), measured(60));
+            assert_eq!(one, four);
+            let error = &one.4;
+            outcomes[["None", "Some(ElementE", "Some(I", "Some(ElementsS"]
+                .iter()
+                .position(|start| error.starts_with(start))
+                .expect("a stretch error")] += 1;
+        }
+        assert!(outcomes.iter().all(|&count| count > 20), "{outcomes:?}");
     }
 }
