@@ -1,5 +1,5 @@
 //! Builds the tree of the README's control loop, which is a documentation example of this package, from a generated
-//! mesh instead of a file; and a tree with modes, for their tests. Tests on real meshes are ignored where the meshes
+//! mesh instead of a file; and trees with modes and with nodes, for their tests. Tests on real meshes are ignored where the meshes
 //! are absent.
 
 /// Real meshes, beside the repository.
@@ -27,6 +27,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let tree = dibs_build::tree(mesh.clone()).stretch(1.5).try_emit("heart")?;
     let fit = dibs_build::modes::ModalFit::new(&mesh, &motion)?;
     let out = std::env::var("OUT_DIR")?;
+    let volume = dibs_build::Volume::lattice(&mesh, [3, 4, 5])?;
+    dibs_build::tree(mesh.clone())
+        .stretch(1.3)
+        .with(|builder| builder.nodes(&volume))
+        .try_emit("embedded_heart")?;
     tree.with_modes(&fit, 2)?.write_rust(format!("{out}/modal_heart.rs"), "modal_heart")?;
     Ok(())
 }

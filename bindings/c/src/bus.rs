@@ -58,7 +58,7 @@ pub extern "C" fn dibs_bus_init(
         storage.make(size, bus, || {
             let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?.read()?);
             surface.check_guarded(tree.tree.vertex_count())?;
-            let tree = (&tree.tree, TreeBytes::new(tree.bytes));
+            let tree = (&tree.tree, TreeBytes::new(tree.bytes), &());
             let bus = surface.with_writer(|writer| {
                 Ok(TheBus::new(&surface.notes, writer, tree, &limits, NoMac)?)
             });

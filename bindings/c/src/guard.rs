@@ -63,7 +63,7 @@ pub extern "C" fn dibs_guard_init(
         storage.make(size, guard, || {
             let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?.read()?);
             surface.check_guarded(tree.tree.vertex_count())?;
-            let tree = (&tree.tree, TreeBytes::new(tree.bytes));
+            let tree = (&tree.tree, TreeBytes::new(tree.bytes), ());
             let guard = surface
                 .with_reader(|reader| Ok(TheGuard::new(&surface.notes, reader, tree, &limits)?));
             Ok(dibs_guard(guard?))

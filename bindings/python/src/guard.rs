@@ -6,11 +6,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use dibs_nostd::constraint::{ConstraintForce, ConstraintState, SpringDamper};
 use dibs_nostd::failsafe::LimitError;
 use dibs_nostd::filter::FilterError;
-use dibs_nostd::guard::{Bus, GuardLimits, Notes};
+use dibs_nostd::guard::{Bus, Embedded, GuardLimits, Notes, Rows, Vertices};
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::{Event, NoMac};
 use dibs_nostd::{
-    Advance, Budget, Buffer, Buffers, Error, Head, Index, Millis, Position, Progress, TreeBytes,
-    constraint, guard,
+    Advance, Budget, Buffer, Buffers, Error, Head, Index, Millis, PathKind, Position, Progress,
+    TreeBytes, constraint, guard,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyBytes};
@@ -18,7 +19,7 @@ use pyo3::types::{PyByteArray, PyBytes};
 use crate::record::push_answer;
 use crate::tool::AnyTool;
 use crate::tracker::{Admitted, Filter, Tracked, motion, named, record};
-use crate::tree::{Owned, Tree, View};
+use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, error, invalid};
 
 /// As much as any tree needs.
@@ -38,7 +39,8 @@ struct Memory {
 
 impl Memory {
     fn new(tree: Arc<Owned>) -> Self {
-        let rows = tree.order.len();
+        let nodes = of_any_width!(tree.view(), tree => Nodes::of(tree));
+        let rows = nodes.map_or(tree.order.len(), |nodes| nodes.count() as usize);
         let positions = || (0..rows).map(|_| Position::new()).collect();
         Self {
             tree,
@@ -51,12 +53,12 @@ impl Memory {
 }
 
 /// The bus's end and the control tick's.
-struct Pair<'m, I> {
-    bus: Bus<'m, 'm, I>,
-    guard: guard::Guard<'m, 'm, I, STACK, OPENED>,
+struct Pair<'m, I: Index, R: Rows> {
+    bus: Bus<'m, 'm, I, NoMac, R>,
+    guard: guard::Guard<'m, 'm, I, STACK, OPENED, R>,
 }
 
-impl<'m, I: Index> Pair<'m, I> {
+impl<'m, I: Index, R: Rows> Pair<'m, I, R> {
     fn new(
         memory: &'m Memory,
         tree: &dibs_nostd::Tree<'m, I>,
@@ -66,17 +68,19 @@ impl<'m, I: Index> Pair<'m, I> {
             |number: usize| Buffer { head: &memory.heads[number], rows: &memory.rows[number] };
         let buffers = Buffers::new(&memory.state, [buffer(0), buffer(1)], Some(buffer(2)));
         let (writer, reader) = buffers.ends();
-        let tree = (tree, TreeBytes::new(memory.tree.bytes()));
-        let bus = Bus::new(&memory.notes, writer, tree, limits, NoMac)?;
-        let guard = guard::Guard::new(&memory.notes, reader, tree, limits)?;
+        let (rows, bytes) = (R::of(tree)?, TreeBytes::new(memory.tree.bytes()));
+        let bus = Bus::new(&memory.notes, writer, (tree, bytes, &rows), limits, NoMac)?;
+        let guard = guard::Guard::new(&memory.notes, reader, (tree, bytes, rows), limits)?;
         Ok(Box::new(Self { bus, guard }))
     }
 }
 
-/// A pair of either width.
+/// A pair of either width, for frames of vertices or of nodes.
 enum Ends<'m> {
-    Narrow(Box<Pair<'m, u16>>),
-    Wide(Box<Pair<'m, u32>>),
+    Narrow(Box<Pair<'m, u16, Vertices>>),
+    Wide(Box<Pair<'m, u32, Vertices>>),
+    NarrowNodes(Box<Pair<'m, u16, Embedded>>),
+    WideNodes(Box<Pair<'m, u32, Embedded>>),
 }
 
 self_cell::self_cell!(
@@ -87,12 +91,14 @@ self_cell::self_cell!(
     }
 );
 
-/// `$body` with the ends of either width.
+/// `$body` with the ends of any kind.
 macro_rules! with_ends {
     ($guard:expr, $pair:ident => $body:expr) => {
         $guard.lock().with_dependent_mut(|_, ends| match ends {
             Ends::Narrow($pair) => $body,
             Ends::Wide($pair) => $body,
+            Ends::NarrowNodes($pair) => $body,
+            Ends::WideNodes($pair) => $body,
         })
     };
 }
@@ -129,6 +135,12 @@ impl Guard {
         let limits = if is_without_transit { limits.without_transit() } else { limits };
         let both = Loop::try_new(Memory::new(Arc::clone(&tree.0)), |memory| {
             Ok(match memory.tree.view() {
+                View::Narrow(tree) if tree.paths() == PathKind::Volume => {
+                    Ends::NarrowNodes(Pair::new(memory, tree, &limits)?)
+                }
+                View::Wide(tree) if tree.paths() == PathKind::Volume => {
+                    Ends::WideNodes(Pair::new(memory, tree, &limits)?)
+                }
                 View::Narrow(tree) => Ends::Narrow(Pair::new(memory, tree, &limits)?),
                 View::Wide(tree) => Ends::Wide(Pair::new(memory, tree, &limits)?),
             })

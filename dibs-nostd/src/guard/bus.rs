@@ -1,12 +1,12 @@
 //! The bus's end: bytes in, published frames and statuses out.
 
-use super::GuardLimits;
 use super::surface::Notes;
+use super::{GuardLimits, Rows, Vertices};
 use crate::surface::FrameView;
 use crate::wire::{Counters, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use crate::{
-    Advance, Assembler, Error, FrameWriter, Index, Millis, Progress, ReceiveError, Scrub,
-    StretchMonitor, Tree, TreeBytes,
+    Advance, Assembler, Error, FrameWriter, Index, Millis, Progress, ReceiveError, Scrub, Tree,
+    TreeBytes,
 };
 
 /// Largest packet on a byte stream; a network's packets can be larger.
@@ -21,7 +21,7 @@ const INTERVAL: Millis = Millis(100);
 /// Bytes of the tree that an idle slice checks for each unit of its work.
 const SCRUBBED: u32 = 2;
 
-type Receiver<'s, 't, I, M> = Assembler<'s, StretchMonitor<'t, I, 2>, M>;
+type Receiver<'s, 't, I, M, R> = Assembler<'s, <R as Rows>::Gate<'t, I>, M>;
 
 /// The bus's end of a [`Surface`](super::Surface): it takes packets, checks complete frames in slices, publishes them,
 /// watches the tree's bytes, and makes the statuses that go back.
@@ -29,10 +29,10 @@ type Receiver<'s, 't, I, M> = Assembler<'s, StretchMonitor<'t, I, 2>, M>;
 /// Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
 /// control tick's priority. RAM: less than 3 kB.
 #[derive(Debug)]
-pub struct Bus<'s, 't, I, M: Mac = NoMac> {
+pub struct Bus<'s, 't, I: Index, M: Mac = NoMac, R: Rows = Vertices> {
     notes: &'s Notes,
     deframer: Deframer<MTU>,
-    assembler: Receiver<'s, 't, I, M>,
+    assembler: Receiver<'s, 't, I, M, R>,
     scrub: Scrub<'t>,
     /// Time of the last status.
     reported: Millis,
@@ -40,7 +40,7 @@ pub struct Bus<'s, 't, I, M: Mac = NoMac> {
     has_news: bool,
 }
 
-impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
+impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
     /// Bytes of a status on a byte stream before its framing, and room enough on a network.
     pub const STATUS_BYTES: usize = STATUS;
 
@@ -56,16 +56,16 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
     pub fn new(
         notes: &'s Notes,
         writer: FrameWriter<'s>,
-        (tree, bytes): (&Tree<'t, I>, TreeBytes<'t, I>),
+        (tree, bytes, rows): (&Tree<'t, I>, TreeBytes<'t, I>, &R::Of<'t>),
         limits: &GuardLimits,
         mac: M,
     ) -> Result<Self, Error> {
-        let limits = limits.surface(tree)?;
-        let monitor = StretchMonitor::continuous(tree)?.limits(limits);
+        let limits = limits.surface::<I, R>(tree, rows)?;
+        let gate = R::gate(tree, rows, limits)?;
         Ok(Self {
             notes,
             deframer: Deframer::new(),
-            assembler: Assembler::with_mac(writer, monitor, tree.mesh_id(), limits.reach, mac),
+            assembler: Assembler::with_mac(writer, gate, tree.mesh_id(), limits.reach, mac),
             scrub: bytes.scrub(),
             reported: Millis(0),
             has_news: false,
@@ -150,7 +150,7 @@ impl<'s, 't, I: Index, M: Mac> Bus<'s, 't, I, M> {
         (self.reported, self.has_news) = (now, false);
         let status = self.assembler.status(now, self.notes.safety());
         let (counters, mac) = (self.assembler.counters(), self.assembler.mac());
-        let mesh_id = self.assembler.gate().tree().mesh_id();
+        let mesh_id = self.assembler.mesh_id();
         Some(encode_status(mesh_id, &status, counters, mac, packet))
     }
 

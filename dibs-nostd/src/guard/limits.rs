@@ -1,5 +1,6 @@
 //! The limits of a controller: numbers that only its user knows.
 
+use super::Rows;
 use crate::failsafe::{LimitError, Limits, Watch};
 use crate::{Budget, Index, Millis, Options, SurfaceLimits, Tree};
 
@@ -28,7 +29,7 @@ impl GuardLimits {
     /// source and the transit time. From three quarters of the age on the state is degraded, beyond it safe.
     ///
     /// By default the control loop runs at 1 kHz, an operator acknowledges the end of a safe state, the transit time is
-    /// watched by the status that each frame echoes ([`Bus::status`](super::Bus::status)), vertices keep within four
+    /// watched by the status that each frame echoes ([`Bus::status`](super::Bus::status)), rows keep within four
     /// sizes of the rest shape, and a tick's budget is not limited.
     #[must_use]
     pub const fn new(speed_mm_per_s: f32, age: Millis) -> Self {
@@ -109,22 +110,23 @@ impl GuardLimits {
     }
 
     /// The published surfaces' limits.
-    pub(super) fn surface<I: Index>(
+    pub(super) fn surface<I: Index, R: Rows>(
         &self,
         tree: &Tree<'_, I>,
+        rows: &R::Of<'_>,
     ) -> Result<SurfaceLimits, LimitError> {
         match self.surface {
             Some(limits) => Ok(limits),
-            None => Ok(SurfaceLimits::reach_mm(reach(tree)?).speed(self.speed)),
+            None => Ok(SurfaceLimits::reach_mm(reach::<I, R>(tree, rows)?).speed(self.speed)),
         }
     }
 }
 
-/// The farthest coordinate of a surface that moves by its own size.
-fn reach<I: Index>(tree: &Tree<'_, I>) -> Result<f32, LimitError> {
+/// The farthest coordinate of rows that move by their own size.
+fn reach<I: Index, R: Rows>(tree: &Tree<'_, I>, rows: &R::Of<'_>) -> Result<f32, LimitError> {
     let mut corners = None;
-    for row in 0..tree.vertex_count() {
-        let at = tree.rest_position(row).ok_or(LimitError::NoReach)?;
+    for row in 0..R::count(tree, rows) {
+        let at = R::rest(tree, rows, row).ok_or(LimitError::NoReach)?;
         let (low, high) = corners.unwrap_or((at, at));
         corners = Some((at.min(low), at.max(high)));
     }

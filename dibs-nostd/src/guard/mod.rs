@@ -34,12 +34,18 @@
 mod answer;
 mod bus;
 mod limits;
+mod rows;
 mod surface;
 mod tick;
 
 pub use answer::{Answer, Searched};
 pub use bus::Bus;
 pub use limits::GuardLimits;
+#[cfg(feature = "nodes")]
+pub use rows::Embedded;
+/// The kinds of rows, for [`Bus`], [`Guard`] and [`Surface`].
+#[doc(hidden)]
+pub use rows::{Rows, Vertices};
 /// For the C interface. They may change with any version.
 #[doc(hidden)]
 pub use surface::Notes;

@@ -1,29 +1,33 @@
 //! The memory that both ends share.
 
+use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::{Bus, Guard, GuardLimits};
+use super::{Bus, Guard, GuardLimits, Rows, Vertices};
 use crate::failsafe::{LinkStatus, State};
 use crate::wire::{Mac, NoMac};
 use crate::{Error, Frames, Index, QueryError, TreeBytes};
 
-/// The vertices of a surface as they are now, and the notes of its two ends for one another. Meant for a `static`; the
+/// The `N` vertices of a surface as they are now, and the notes of its two ends for one another. Meant for a `static`; the
 /// module that [`include_tree!`](crate::include_tree) includes has its type as `Surface`.
 ///
-/// Neither end waits for the other. RAM: 36 bytes a vertex, and less than 400.
+/// With `Embedded` as `R` the rows are the nodes that carry the surface.
+///
+/// Neither end waits for the other. RAM: 36 bytes a row, and less than 400.
 #[derive(Debug)]
-pub struct Surface<const N: usize> {
+pub struct Surface<const N: usize, R = Vertices> {
     frames: Frames<N, 3>,
     notes: Notes,
+    rows: PhantomData<R>,
 }
 
-impl<const N: usize> Surface<N> {
+impl<const N: usize, R: Rows> Surface<N, R> {
     /// No frame was published yet.
     #[cfg(not(loom))]
     #[must_use]
     #[expect(clippy::new_without_default, reason = "it is too large for a stack")]
     pub const fn new() -> Self {
-        Self { frames: Frames::new(), notes: Notes::new() }
+        Self { frames: Frames::new(), notes: Notes::new(), rows: PhantomData }
     }
 
     /// Validates the tree, and makes the two ends, once. `STACK` is the tree's [`TreeBytes::stack`] at least, and the
@@ -32,14 +36,14 @@ impl<const N: usize> Surface<N> {
     /// Cost: linear in the tree, for start-up.
     ///
     /// # Errors
-    /// [`Error`], with the damage of the tree, its number of vertices where that is not `N`, the limit that is out of
+    /// [`Error`], with the damage of the tree, its number of rows where that is not `N`, the limit that is out of
     /// range, or that the ends were taken before.
     #[inline(always)]
     pub fn start<'t, I: Index, const STACK: usize, const OPENED: usize>(
         &self,
         tree: TreeBytes<'t, I>,
         limits: GuardLimits,
-    ) -> Result<(Bus<'_, 't, I>, Guard<'_, 't, I, STACK, OPENED>), Error> {
+    ) -> Result<Ends<'_, 't, I, NoMac, R, STACK, OPENED>, Error> {
         self.start_with_mac(tree, limits, NoMac)
     }
 
@@ -53,20 +57,25 @@ impl<const N: usize> Surface<N> {
         bytes: TreeBytes<'t, I>,
         limits: GuardLimits,
         mac: M,
-    ) -> Result<(Bus<'_, 't, I, M>, Guard<'_, 't, I, STACK, OPENED>), Error> {
+    ) -> Result<Ends<'_, 't, I, M, R, STACK, OPENED>, Error> {
         let tree = bytes.validate()?;
-        let (expected, found) = (tree.vertex_count(), N as u32);
+        let rows = R::of(&tree)?;
+        let (expected, found) = (R::count(&tree, &rows), N as u32);
         if expected != found {
             return Err(QueryError::VertexCount { expected, found }.into());
         }
         // A start that fails on a limit takes no end.
         limits.failsafe()?;
         let (writer, reader) = self.frames.split()?;
-        let bus = Bus::new(&self.notes, writer, (&tree, bytes), &limits, mac)?;
-        let guard = Guard::new(&self.notes, reader, (&tree, bytes), &limits)?;
+        let bus = Bus::new(&self.notes, writer, (&tree, bytes, &rows), &limits, mac)?;
+        let guard = Guard::new(&self.notes, reader, (&tree, bytes, rows), &limits)?;
         Ok((bus, guard))
     }
 }
+
+/// The two ends of a surface.
+type Ends<'s, 't, I, M, R, const STACK: usize, const OPENED: usize> =
+    (Bus<'s, 't, I, M, R>, Guard<'s, 't, I, STACK, OPENED, R>);
 
 /// The notes of the two ends for one another. Public for surfaces of a size that no type has: see
 /// [`Buffers`](crate::Buffers).

@@ -3,13 +3,12 @@
 use glam::Vec3;
 
 use super::surface::Notes;
-use super::{Answer, GuardLimits, Searched};
+use super::{Answer, GuardLimits, Rows, Searched, Vertices};
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation, State, Verdict};
 use crate::filter::{Admitted, Filter, FilterError, Motion, Uncertainty};
-use crate::surface::FrameView;
 use crate::{
-    Error, FrameAge, FrameReader, Index, Millis, Options, SurfaceBlend, Tool, Tracker,
-    TrackerAnswer, Tree, TreeBytes, Unavailable, VertexTable,
+    Error, FrameAge, FrameReader, Index, Millis, Options, Tool, Tracker, TrackerAnswer, Tree,
+    TreeBytes, Unavailable, VertexTable,
 };
 
 /// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the surface as it is now,
@@ -17,7 +16,7 @@ use crate::{
 ///
 /// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` slots, and less than 500 bytes.
 #[derive(Debug)]
-pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize> {
+pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize, R: Rows = Vertices> {
     notes: &'s Notes,
     reader: FrameReader<'s>,
     tree: TreeBytes<'t, I>,
@@ -29,10 +28,8 @@ pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize> {
     /// The tissue's largest speed, in mm a millisecond.
     speed: f32,
     before: Option<Pose>,
+    rows: R::Of<'t>,
 }
-
-/// A surface between its last two frames, or beyond.
-type Blend<'f> = SurfaceBlend<'f, FrameView<'f>, FrameView<'f>>;
 
 /// The tool's axis at a tick.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +55,9 @@ impl Pose {
     }
 }
 
-impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I, STACK, OPENED> {
+impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows>
+    Guard<'s, 't, I, STACK, OPENED, R>
+{
     /// The control tick's end of buffers in anybody's memory, of which there are three.
     ///
     /// # Errors
@@ -68,7 +67,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
     pub fn new(
         notes: &'s Notes,
         reader: FrameReader<'s>,
-        (tree, bytes): (&Tree<'t, I>, TreeBytes<'t, I>),
+        (tree, bytes, rows): (&Tree<'t, I>, TreeBytes<'t, I>, R::Of<'t>),
         limits: &GuardLimits,
     ) -> Result<Self, Error> {
         Ok(Self {
@@ -81,6 +80,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
             rate: limits.rate,
             speed: limits.speed,
             before: None,
+            rows,
         })
     }
 
@@ -125,30 +125,33 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
 
     /// The answer of this tick, and what `then` makes of the surface that was searched and of the trust in it.
     #[inline(always)]
-    fn on_latest<T: Tool, R>(
+    fn on_latest<T: Tool, A>(
         &mut self,
         tool: &T,
         now: Millis,
-        then: impl FnOnce(&mut Tracker<'t, I, STACK, OPENED>, &Blend<'_>, &Verdict) -> R,
-    ) -> (Answer, Option<R>) {
-        let Self { notes, reader, tree, tracker, failsafe, options, rate, before, .. } = self;
+        then: impl FnOnce(&mut Tracker<'t, I, STACK, OPENED>, &R::Surface<'_>, &Verdict) -> A,
+    ) -> (Answer, Option<A>) {
+        let Self { notes, reader, tree, tracker, failsafe, options, rate, before, rows, .. } = self;
         let latest = reader.latest(now);
         let frame = latest.frame();
         let published = latest.of_any_age();
-        let surface = published.as_ref().map(|published| published.extrapolated());
+        let blend = published.as_ref().map(|published| published.extrapolated());
+        let room = &mut R::Room::default();
+        let surface = blend.as_ref().map(|blend| (blend, R::surface(rows, blend, room)));
         // The fail-safe machine decides how old a surface may be.
-        let (searched, tracked) = match (frame, &surface) {
-            (Some(frame), Ok(surface)) => {
+        let (searched, tracked) = match (frame, surface) {
+            (Some(frame), Ok((blend, surface))) => {
                 let tracked = tracker.closest(surface, tool, options);
                 let searched = Searched {
                     frame,
-                    before: surface.before().epoch().unwrap_or(frame.epoch),
-                    t: surface.t(),
+                    before: blend.before().epoch().unwrap_or(frame.epoch),
+                    t: blend.t(),
                     position_error: surface.position_error(),
-                    residual: surface.residual(),
-                    lag: surface.lag(),
+                    residual: blend.residual(),
+                    lag: blend.lag(),
                     velocity: tracked.map_or(Vec3::ZERO, |tracked| {
-                        surface.velocity(tracked.closest.corners, tracked.closest.barycentric)
+                        let closest = tracked.closest;
+                        R::velocity(rows, blend, closest.corners, closest.barycentric)
                     }),
                 };
                 (Some(searched), tracked.map_err(Unavailable::Query))
@@ -165,8 +168,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize> Guard<'s, 't, I,
         };
         let is_corrupt = notes.is_tree_corrupt() || tracker.tree().check(tree.bytes()).is_err();
         let answer = judge(notes, failsafe, is_corrupt, (frame, searched, tracked), velocity, now);
-        let after = match &surface {
-            Ok(surface) if searched.is_some() => Some(then(tracker, surface, &answer.trust)),
+        let after = match surface {
+            Ok((_, surface)) if searched.is_some() => Some(then(tracker, surface, &answer.trust)),
             _ => None,
         };
         (answer, after)

@@ -329,6 +329,11 @@ impl Collector {
         self.finish().map(Some)
     }
 
+    #[cfg(feature = "control")]
+    pub const fn mesh_id(&self) -> u32 {
+        self.mesh_id
+    }
+
     /// Whether the frame is complete. Drops a complete frame whose rows or digest are wrong.
     #[inline]
     fn finish(&mut self) -> Result<bool, ReceiveError> {

@@ -299,6 +299,12 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         if is_modal { facts } else { SurfaceFacts { vertices: self.writer.len(), ..facts } }
     }
 
+    /// The mesh whose frames are taken.
+    #[cfg(feature = "control")]
+    pub(crate) const fn mesh_id(&self) -> u32 {
+        self.collector.mesh_id()
+    }
+
     /// Name of the frame published last.
     #[must_use]
     pub fn published(&self) -> Option<FrameId> {

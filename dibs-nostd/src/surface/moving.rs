@@ -191,13 +191,13 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
         self.before
     }
 
-    /// The velocity (mm/s) of a point of a triangle, by its corners and their weights: that from one frame to the
-    /// other; zero for a surface that is held, one of a [`Step`], and corners outside of the table.
+    /// The velocity (mm/s) of a point, by vertices and their weights: that from one frame to the other; zero for a surface
+    /// that is held, one of a [`Step`], and vertices outside of the table.
     #[must_use]
-    pub fn velocity(&self, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
+    pub fn velocity<const N: usize>(&self, vertices: [u32; N], weights: [f32; N]) -> Vec3 {
         let mut step = Vec3::ZERO;
         if self.rate > 0.0 {
-            for (corner, weight) in corners.into_iter().zip(weights) {
+            for (corner, weight) in vertices.into_iter().zip(weights) {
                 let (before, after) = (self.before.position(corner), self.after.position(corner));
                 let moved = before.zip(after).map_or(Vec3::ZERO, |(before, after)| after - before);
                 step += moved * weight;

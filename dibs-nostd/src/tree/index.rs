@@ -8,7 +8,7 @@ mod sealed {
 
 /// Width of the vertex indices and radius codes of a tree: `u16` for up to 65,536 vertices, `u32`
 /// for larger meshes. Sealed: the format knows these two.
-pub trait Index: sealed::Sealed + Copy + 'static {
+pub trait Index: core::fmt::Debug + sealed::Sealed + Copy + 'static {
     /// Bytes an index takes in the tree.
     const BYTES: usize;
     /// Largest radius code. The code converts to `f32` without rounding in both widths.

@@ -1,0 +1,172 @@
+//! The two kinds of rows of which a guard's frames may consist.
+
+use glam::Vec3;
+
+use crate::surface::FrameView;
+use crate::{Error, Gate, Index, MovingSurface, StretchMonitor, SurfaceBlend, SurfaceLimits, Tree};
+
+/// Rows between the last two frames, or beyond.
+pub(super) type Blend<'f> = SurfaceBlend<'f, FrameView<'f>, FrameView<'f>>;
+
+/// What the rows of a [`Surface`](super::Surface)'s frames are.
+#[doc(hidden)]
+pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
+    /// What a tree says of its rows.
+    type Of<'t>: Copy + core::fmt::Debug;
+    /// The check of a frame.
+    type Gate<'t, I: Index>: Gate + core::fmt::Debug;
+    /// The surface that rows make.
+    type Surface<'f>: MovingSurface;
+    /// Room for it, where the rows are not the surface.
+    type Room<'f>: Default;
+
+    /// Reads a tree.
+    #[doc(hidden)]
+    fn of<'t, I: Index>(tree: &Tree<'t, I>) -> Result<Self::Of<'t>, Error>;
+
+    /// The number of a frame's rows.
+    #[doc(hidden)]
+    fn count<I: Index>(tree: &Tree<'_, I>, of: &Self::Of<'_>) -> u32;
+
+    /// A row at rest.
+    #[doc(hidden)]
+    fn rest<I: Index>(tree: &Tree<'_, I>, of: &Self::Of<'_>, row: u32) -> Option<Vec3>;
+
+    /// The check of frames and of their extrapolations.
+    #[doc(hidden)]
+    fn gate<'t, I: Index>(
+        tree: &Tree<'t, I>,
+        of: &Self::Of<'t>,
+        limits: SurfaceLimits,
+    ) -> Result<Self::Gate<'t, I>, Error>;
+
+    /// The surface that rows make.
+    #[doc(hidden)]
+    fn surface<'s, 'f: 's, 't: 'f>(
+        of: &'f Self::Of<'t>,
+        rows: &'f Blend<'f>,
+        room: &'s mut Self::Room<'f>,
+    ) -> &'s Self::Surface<'f>;
+
+    /// The velocity (mm/s) of a point of a triangle: see [`SurfaceBlend::velocity`].
+    #[doc(hidden)]
+    fn velocity(of: &Self::Of<'_>, rows: &Blend<'_>, corners: [u32; 3], weights: [f32; 3]) -> Vec3;
+}
+
+mod sealed {
+    pub trait Sealed {}
+
+    impl Sealed for super::Vertices {}
+    #[cfg(feature = "nodes")]
+    impl Sealed for super::Embedded {}
+}
+
+/// Frames of vertices.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct Vertices;
+
+impl Rows for Vertices {
+    type Of<'t> = ();
+    type Gate<'t, I: Index> = StretchMonitor<'t, I, 2>;
+    type Surface<'f> = Blend<'f>;
+    type Room<'f> = ();
+
+    #[inline(always)]
+    fn of<'t, I: Index>(_: &Tree<'t, I>) -> Result<(), Error> {
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn count<I: Index>(tree: &Tree<'_, I>, (): &()) -> u32 {
+        tree.vertex_count()
+    }
+
+    #[inline(always)]
+    fn rest<I: Index>(tree: &Tree<'_, I>, (): &(), row: u32) -> Option<Vec3> {
+        tree.rest_position(row)
+    }
+
+    #[inline(always)]
+    fn gate<'t, I: Index>(
+        tree: &Tree<'t, I>,
+        (): &(),
+        limits: SurfaceLimits,
+    ) -> Result<StretchMonitor<'t, I, 2>, Error> {
+        Ok(StretchMonitor::continuous(tree)?.limits(limits))
+    }
+
+    #[inline(always)]
+    fn surface<'s, 'f: 's, 't: 'f>(
+        (): &'f (),
+        rows: &'f Blend<'f>,
+        (): &'s mut (),
+    ) -> &'s Blend<'f> {
+        rows
+    }
+
+    #[inline(always)]
+    fn velocity((): &(), rows: &Blend<'_>, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        rows.velocity(corners, weights)
+    }
+}
+
+/// Frames of the nodes that carry an embedded surface: the second parameter of a [`Surface`](super::Surface) whose tree was
+/// built with [nodes](crate::nodes).
+#[cfg(feature = "nodes")]
+#[derive(Clone, Copy, Debug)]
+pub struct Embedded;
+
+#[cfg(feature = "nodes")]
+impl Rows for Embedded {
+    type Of<'t> = crate::nodes::Nodes<'t>;
+    type Gate<'t, I: Index> = crate::nodes::NodeMonitor<'t, 2>;
+    type Surface<'f> = crate::nodes::EmbeddedSurface<'f, 'f, Blend<'f>>;
+    type Room<'f> = Option<Self::Surface<'f>>;
+
+    fn of<'t, I: Index>(tree: &Tree<'t, I>) -> Result<Self::Of<'t>, Error> {
+        Ok(crate::nodes::Nodes::of(tree)?)
+    }
+
+    fn count<I: Index>(_: &Tree<'_, I>, nodes: &Self::Of<'_>) -> u32 {
+        nodes.count()
+    }
+
+    fn rest<I: Index>(_: &Tree<'_, I>, nodes: &Self::Of<'_>, row: u32) -> Option<Vec3> {
+        nodes.rest_position(row)
+    }
+
+    fn gate<'t, I: Index>(
+        _: &Tree<'t, I>,
+        nodes: &Self::Of<'t>,
+        limits: SurfaceLimits,
+    ) -> Result<Self::Gate<'t, I>, Error> {
+        Ok(crate::nodes::NodeMonitor::continuous(nodes).limits(limits))
+    }
+
+    #[inline(always)]
+    fn surface<'s, 'f: 's, 't: 'f>(
+        nodes: &'f Self::Of<'t>,
+        rows: &'f Blend<'f>,
+        room: &'s mut Self::Room<'f>,
+    ) -> &'s Self::Surface<'f> {
+        room.insert(nodes.surface(rows))
+    }
+
+    fn velocity(
+        nodes: &Self::Of<'_>,
+        rows: &Blend<'_>,
+        corners: [u32; 3],
+        weights: [f32; 3],
+    ) -> Vec3 {
+        let mut velocity = Vec3::ZERO;
+        for (corner, weight) in corners.into_iter().zip(weights) {
+            let parts = nodes.weights(corner).unwrap_or_default();
+            let [a, b, c, d] = parts;
+            let part = |(_, part): (u32, u32)| part as f32 * (1.0 / crate::nodes::WHOLE as f32);
+            let parts = [part(a), part(b), part(c), part(d)];
+            velocity += rows.velocity([a.0, b.0, c.0, d.0], parts) * weight;
+        }
+        velocity
+    }
+}
