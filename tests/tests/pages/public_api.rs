@@ -64,7 +64,7 @@ fn every_item_of_the_root_is_in_an_example_or_a_product() {
     let items: BTreeSet<&str> = items.filter(|item| !item.contains(':')).collect();
     let mut words = BTreeSet::new();
     for place in USES {
-        read_words(&Path::new(REPOSITORY).join(place), |text| text.to_owned(), &mut words);
+        read_words(&Path::new(REPOSITORY).join(place), str::to_owned, &mut words);
     }
     // The core itself counts by the examples in its documentation.
     read_words(&Path::new(REPOSITORY).join("dibs-nostd/src"), documented_code, &mut words);
