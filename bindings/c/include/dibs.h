@@ -1734,7 +1734,7 @@ typedef struct {
    */
   dibs_link link;
   /**
-   * The surface that was searched, and the pair on it, whatever it is trusted: for records.
+   * The surface that was searched, and the pair on it, trusted or not: for records.
    */
   dibs_searched searched;
 } dibs_answer;
