@@ -7,6 +7,7 @@
 
 pub mod bus;
 pub mod filter;
+pub mod nodes;
 pub mod receive;
 pub mod tick;
 pub mod track;

@@ -23,6 +23,7 @@ mod interleavings;
 mod link;
 mod miri;
 mod modes;
+mod nodes;
 pub mod other_processors;
 mod path;
 mod python;
@@ -72,6 +73,7 @@ pub const CHECKS: &[Check] = &[
     receive::CHECK,
     modes::CHECK,
     tracked_modes::CHECK,
+    nodes::CHECK,
     sanitizers::ADDRESS,
     sanitizers::THREAD,
     miri::CHECK,
