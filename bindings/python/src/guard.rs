@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use dibs_nostd::constraint::{ConstraintForce, ConstraintState, SpringDamper};
 use dibs_nostd::failsafe::LimitError;
 use dibs_nostd::filter::FilterError;
-use dibs_nostd::guard::{Bus, Embedded, GuardLimits, Notes, Rows, Vertices};
+use dibs_nostd::guard::{Bus, GuardLimits, Notes, Rows, Vertices};
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::{Event, NoMac};
 use dibs_nostd::{
@@ -79,8 +79,8 @@ impl<'m, I: Index, R: Rows> Pair<'m, I, R> {
 enum Ends<'m> {
     Narrow(Box<Pair<'m, u16, Vertices>>),
     Wide(Box<Pair<'m, u32, Vertices>>),
-    NarrowNodes(Box<Pair<'m, u16, Embedded>>),
-    WideNodes(Box<Pair<'m, u32, Embedded>>),
+    NarrowNodes(Box<Pair<'m, u16, Nodes<'static>>>),
+    WideNodes(Box<Pair<'m, u32, Nodes<'static>>>),
 }
 
 self_cell::self_cell!(

@@ -218,7 +218,7 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
 
 /// The two ends of a surface whose frames are vertices, or nodes.
 fn guard_source(is_embedded: bool) -> String {
-    let embedded = "::dibs_nostd::guard::Embedded";
+    let embedded = "::dibs_nostd::nodes::Nodes<'static>";
     let (rows, bus, guard) = if is_embedded {
         (
             format!("NODES, {embedded}"),

@@ -41,8 +41,6 @@ mod tick;
 pub use answer::{Answer, Searched};
 pub use bus::Bus;
 pub use limits::GuardLimits;
-#[cfg(feature = "nodes")]
-pub use rows::Embedded;
 /// The kinds of rows, for [`Bus`], [`Guard`] and [`Surface`].
 #[doc(hidden)]
 pub use rows::{Rows, Vertices};

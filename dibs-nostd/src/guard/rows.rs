@@ -58,7 +58,7 @@ mod sealed {
 
     impl Sealed for super::Vertices {}
     #[cfg(feature = "nodes")]
-    impl Sealed for super::Embedded {}
+    impl Sealed for crate::nodes::Nodes<'static> {}
 }
 
 /// Frames of vertices.
@@ -111,14 +111,9 @@ impl Rows for Vertices {
     }
 }
 
-/// Frames of the nodes that carry an embedded surface: the second parameter of a [`Surface`](super::Surface) whose tree was
-/// built with [nodes](crate::nodes).
+/// Frames of the nodes that carry an embedded surface.
 #[cfg(feature = "nodes")]
-#[derive(Clone, Copy, Debug)]
-pub struct Embedded;
-
-#[cfg(feature = "nodes")]
-impl Rows for Embedded {
+impl Rows for crate::nodes::Nodes<'static> {
     type Of<'t> = crate::nodes::Nodes<'t>;
     type Gate<'t, I: Index> = crate::nodes::NodeMonitor<'t, 2>;
     type Surface<'f> = crate::nodes::EmbeddedSurface<'f, 'f, Blend<'f>>;

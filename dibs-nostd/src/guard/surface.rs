@@ -11,7 +11,7 @@ use crate::{Error, Frames, Index, QueryError, TreeBytes};
 /// The `N` vertices of a surface as they are now, and the notes of its two ends for one another. Meant for a `static`; the
 /// module that [`include_tree!`](crate::include_tree) includes has its type as `Surface`.
 ///
-/// With `Embedded` as `R` the rows are the nodes that carry the surface.
+/// With [`Nodes`](crate::nodes::Nodes)`<'static>` as `R` the rows are the nodes that carry the surface.
 ///
 /// Neither end waits for the other. RAM: 36 bytes a row, and less than 400.
 #[derive(Debug)]

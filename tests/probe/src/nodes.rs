@@ -3,7 +3,7 @@
 //! A script is a tree with its nodes, then packets and ticks, all little-endian words; `cargo xtask guarantees` makes it.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{Bus, Embedded, Guard, GuardLimits, Surface};
+use dibs_nostd::guard::{Bus, Guard, GuardLimits, Surface};
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::NoMac;
 use dibs_nostd::{
@@ -44,9 +44,9 @@ const STACK: usize = 128;
 /// Opened nodes that the tracker remembers.
 pub const OPENED: usize = 256;
 
-type Rows = Surface<NODES, Embedded>;
-type Receiver = Bus<'static, 'static, u16, NoMac, Embedded>;
-type Follower = Guard<'static, 'static, u16, STACK, OPENED, Embedded>;
+type Rows = Surface<NODES, Nodes<'static>>;
+type Receiver = Bus<'static, 'static, u16, NoMac, Nodes<'static>>;
+type Follower = Guard<'static, 'static, u16, STACK, OPENED, Nodes<'static>>;
 
 /// The rows of the frames.
 pub static HEART: Rows = Rows::new();

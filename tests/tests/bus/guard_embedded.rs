@@ -3,7 +3,7 @@
 use dibs_build::{Builder, Volume, generate};
 use dibs_nostd::filter::{Filter, Motion, Reason};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{Embedded, GuardLimits, Surface};
+use dibs_nostd::guard::{GuardLimits, Surface};
 use dibs_nostd::nodes::{Nodes, NodesError};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness};
 use dibs_nostd::{
@@ -125,13 +125,13 @@ fn a_start_names_the_wrong_kind_of_rows() {
     let volume = Volume::lattice(&heart, [5, 2, 8]).expect("a lattice");
     let embedded = Builder::new().nodes(&volume).build(&heart).expect("held");
     let limits = GuardLimits::new(20.0, Millis(100));
-    let nodes: &Surface<162, Embedded> = Box::leak(Box::new(Surface::new()));
+    let nodes: &Surface<162, Nodes<'static>> = Box::leak(Box::new(Surface::new()));
     let vertices: &Surface<162> = Box::leak(Box::new(Surface::new()));
     let start = |blob| nodes.start::<u16, 64, 96>(TreeBytes::new(blob), limits).err();
     assert_eq!(start(plain.blob()), Some(Error::Nodes(NodesError::Absent)));
     let mistaken = vertices.start::<u16, 64, 96>(TreeBytes::new(embedded.blob()), limits).err();
     assert_eq!(mistaken, Some(Error::Stretch(StretchError::NoMetric)));
-    let other: &Surface<161, Embedded> = Box::leak(Box::new(Surface::new()));
+    let other: &Surface<161, Nodes<'static>> = Box::leak(Box::new(Surface::new()));
     let other = other.start::<u16, 64, 96>(TreeBytes::new(embedded.blob()), limits).err();
     let expected = QueryError::VertexCount { expected: 162, found: 161 };
     assert_eq!(other, Some(Error::Query(expected)));
@@ -162,7 +162,7 @@ fn frames_of_vertices_are_refused() {
 }
 
 fn refusal<const N: usize>(blob: &[u8], frame: &[Vec3]) -> &'static str {
-    let surface: &Surface<N, Embedded> = Box::leak(Box::new(Surface::new()));
+    let surface: &Surface<N, Nodes<'static>> = Box::leak(Box::new(Surface::new()));
     let limits = GuardLimits::new(20.0, Millis(100));
     let (mut bus, _) = surface.start::<u16, 64, 96>(TreeBytes::new(blob), limits).expect("valid");
     let mesh_id = Tree::<u16>::from_bytes(blob).expect("valid").mesh_id();
