@@ -1,6 +1,6 @@
 //! What the pushes of a simulated hand came to: against the wall's force, and by commands that a filter admits.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
 use controller::telemetry::{Push, Tick};
@@ -22,6 +22,10 @@ use super::sender::{Link, Sent};
 /// half of it.
 const SLACK: f64 = 0.02;
 
+/// How deep (mm) the hand may get against the wall's force: the force ends at 5 N, so a wall that comes faster than 25 mm/s
+/// against a push of 4.5 N is not left fast enough.
+const YIELDS: f64 = 1.0;
+
 /// The energy (mJ) that the wall may give to the hand, and the largest step of its force (N): the controller's account.
 const TANK: f64 = 1.0;
 const STEP: f32 = 0.5;
@@ -40,6 +44,9 @@ const REASONS: [&str; 8] = [
     "no safe motion",
     "nothing admitted",
 ];
+
+/// The first of them that promises nothing.
+const UNSAFE: u32 = 6;
 
 /// A tick in which the surface was trusted.
 #[derive(Clone, Copy)]
@@ -148,10 +155,22 @@ impl Hand {
             .filter(|checked| at(checked.tick).is_some())
             .map(|checked| (checked.tick, checked.separation))
             .collect();
+        // A push by commands begins where one by force ended, maybe too near: it counts from the first safe motion on.
+        let mut is_settled = false;
+        let mut unsettled = BTreeSet::new();
+        for moment in &moments {
+            if !moment.is_commanded() {
+                is_settled = false;
+            } else if !is_settled {
+                unsettled.insert(moment.tick.tick);
+                is_settled = moment.push.outcome < UNSAFE;
+            }
+        }
         let way = |is_commanded: bool| {
             let is_of = |moment: &&Moment| moment.is_commanded() == is_commanded;
+            let counts = |tick: u32| at(tick).filter(is_of).is_some() && !unsettled.contains(&tick);
             let least = |of: &[(u32, f64)]| {
-                let own = of.iter().filter(|(tick, _)| at(*tick).filter(is_of).is_some());
+                let own = of.iter().filter(|(tick, _)| counts(*tick));
                 own.fold((0, f64::INFINITY), |(count, least), (_, apart)| {
                     (count + 1, least.min(*apart))
                 })
@@ -169,7 +188,7 @@ impl Hand {
         let near = separations.iter().filter(|(tick, apart)| {
             // The motion was admitted in the tick before.
             let Some(before) = tick.checked_sub(1).and_then(at) else { return false };
-            let says = before.push.outcome == 6;
+            let says = before.push.outcome >= UNSAFE;
             let least =
                 f64::from(STAND_OFF) - SLACK - at(*tick).map_or(0.0, |now| accuracy(&now.tick));
             before.is_commanded() && !says && *apart < least
@@ -218,9 +237,8 @@ impl Hand {
         promise(deepest <= SLACK, format!("by commands the instrument got {deepest:.3} mm in"));
         let near = self.admitted_too_near;
         promise(near == 0, format!("{near} admitted motions came too near without a word"));
-        // What the spring's margin leaves: nothing gets in.
         let deepest = self.by_force.penetration_max_mm;
-        promise(deepest <= SLACK, format!("by force the instrument got {deepest:.3} mm in"));
+        promise(deepest <= YIELDS, format!("by force the instrument got {deepest:.3} mm in"));
         let given = self.energy_given_max_mj;
         promise(given <= TANK + ROUNDING, format!("the wall gave {given:.3} mJ to the hand"));
         let step = self.push_force_step_max_n;
