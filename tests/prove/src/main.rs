@@ -32,7 +32,7 @@ enum Task {
         /// Seconds of the controller's time in the demo.
         #[arg(long)]
         demo_seconds: u32,
-        /// Also a few mutants of the lines that changed.
+        /// Also the checks on request, and a few mutants of the lines that changed.
         #[arg(long)]
         whole: bool,
         /// Where to list the steps.
@@ -60,7 +60,8 @@ fn main() -> ExitCode {
         }),
         Task::Test { demo_seconds, whole, steps: file } => {
             let mut steps = Steps::default();
-            harness::test(&Effort { demo_seconds, ..Effort::TEST }, &mut steps);
+            let effort = Effort { demo_seconds, is_whole: whole, ..Effort::TEST };
+            harness::test(&effort, &mut steps);
             steps.run("processors", processors::check);
             if whole {
                 steps.run("mutants of changed lines", mutants::sample);

@@ -43,6 +43,8 @@ pub struct Effort {
     pub fuzz_seconds: u32,
     /// Whether the records go to the documents, unlike those of a run of the tests.
     pub is_record: bool,
+    /// Whether the checks on request are among them.
+    pub is_whole: bool,
     /// Divisor of the full size's cases.
     pub share: u32,
 }
@@ -71,6 +73,7 @@ impl Effort {
         flood_seconds: 20,
         fuzz_seconds: 60,
         is_record: true,
+        is_whole: true,
         share: 1,
     };
     /// The sizes for every run of the tests.
@@ -96,6 +99,7 @@ impl Effort {
         flood_seconds: 4,
         fuzz_seconds: 8,
         is_record: false,
+        is_whole: false,
         share: 0,
     };
 

@@ -14,7 +14,7 @@ pub mod run;
 use anyhow::{Result, ensure};
 use xtask::steps::{Outcome, Steps};
 
-use crate::checks::{BESIDE, CHECKS};
+use crate::checks::{BESIDE, CHECKS, ON_REQUEST};
 pub use effort::Effort;
 use figures::Figures;
 use lanes::Beside;
@@ -126,7 +126,9 @@ fn run(effort: &Effort, only: Option<&str>, steps: &mut Steps) -> Measured {
         return measured;
     }
     let beside = Beside::start(effort);
-    measured.run_each(effort, |name| !BESIDE.contains(&name), steps);
+    let is_late = |name: &str| !effort.is_whole && ON_REQUEST.contains(&name);
+    measured.run_each(effort, |name| !BESIDE.contains(&name) && !is_late(name), steps);
+    measured.skipped.extend(ON_REQUEST.into_iter().filter(|name| is_late(name)));
     if let Err(error) = beside.and_then(|beside| beside.join(&mut measured, steps)) {
         steps.run("the checks beside", || Err(error));
     }
