@@ -200,7 +200,7 @@ pub struct Push {
     pub kind: u32,
     /// Number of the tick.
     pub tick: u32,
-    /// 0 where the hand moves the instrument against the wall's force; where it commands, what the filter made of that:
+    /// 0 while the hand moves the instrument against the wall's force; by commands the filter's reason as
     /// [`reason_code`].
     pub outcome: u32,
     /// 1 while the hand pushes inwards, else 0: it draws back.

@@ -41,7 +41,7 @@ pub struct SweepAnswer {
 /// let beside = Sphere::new(Vec3::new(90.0, 0.0, 0.0), 2.0)?;
 /// let sweep = Sweep { step: &step, t: [0.5, 1.0], tools: [beside, Sphere::new(Vec3::ZERO, 2.0)?] };
 /// let SweepAnswer { clear_until, contact, .. } = tracker.sweep(&sweep, 1.0, 32, &Options::new())?;
-/// assert!((0.1..1.0).contains(&clear_until), "met on the way, and not before this time");
+/// assert!((0.1..1.0).contains(&clear_until), "apart at least until this time");
 /// assert!(contact.is_none_or(|first| first >= clear_until));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

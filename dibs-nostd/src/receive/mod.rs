@@ -68,7 +68,7 @@ use step::{Earlier, Step};
 /// assert_eq!(assembler.advance(100), Ok(Advance::Published { epoch: 1 }));
 /// assert_eq!(reader.read().unwrap().position(2), Some(Vec3::Z));
 ///
-/// // Beside it, what the bus interrupt itself may want to know.
+/// // In the bus interrupt: the published surface, the health of the bus, the last heartbeat.
 /// let published: FrameView<'_> = assembler.surface().unwrap();
 /// assert_eq!(published.position(0), Some(Vec3::X));
 /// let BusHealth { packet, rejections, .. } = assembler.health();

@@ -253,7 +253,7 @@ impl FrontMut<'_> {
         Some(())
     }
 
-    /// Moves the hand on by one place. The node there and its first deadline, if it may be closed: opened, below a root,
+    /// Moves the clock hand on by one slot. The node there and its first deadline, if it may be closed: opened, below a root,
     /// all children with bounds.
     pub fn next_closable(&mut self) -> Option<(u16, Deadline)> {
         *self.hand = if *self.hand + 1 < *self.end { *self.hand + 1 } else { 0 };
