@@ -83,10 +83,17 @@ pub const CHECKS: &[Check] = &[
     python::CHECK,
 ];
 
-/// Names of the checks that `cargo xtask test` runs with `--whole` only: the first two build one more program each, and
-/// the others take half a minute besides checks of the same parts.
-pub const ON_REQUEST: [&str; 4] =
-    [filter_board::CHECK.name, nodes::CHECK.name, flood::CHECK.name, tracked_modes::CHECK.name];
+/// Names of the checks that `cargo xtask test` runs with `--whole` only: each builds one more program, or takes half a
+/// minute besides checks of the same parts, or runs the tests once more under an instrument.
+pub const ON_REQUEST: [&str; 7] = [
+    filter_board::CHECK.name,
+    nodes::CHECK.name,
+    flood::CHECK.name,
+    tracked_modes::CHECK.name,
+    other_processors::CHECK.name,
+    sanitizers::ADDRESS.name,
+    fuzz::CHECK.name,
+];
 
 /// Names of the checks on the other core: most without an emulator, the demo in C, the other processors,
 /// and the boards.

@@ -106,7 +106,11 @@ impl Measured {
     fn run_each(&mut self, effort: &Effort, is_wanted: impl Fn(&str) -> bool, steps: &mut Steps) {
         for check in CHECKS.iter().filter(|check| is_wanted(check.name)) {
             steps.run(check.name, || {
-                let outcome = (check.run)(effort, &mut self.figures)?;
+                let outcome = if !effort.is_whole && ON_REQUEST.contains(&check.name) {
+                    Outcome::Skipped("on request, `cargo xtask test --whole`".to_owned())
+                } else {
+                    (check.run)(effort, &mut self.figures)?
+                };
                 if matches!(outcome, Outcome::Skipped(_)) {
                     self.skipped.push(check.name);
                 }
@@ -122,13 +126,13 @@ impl Measured {
 fn run(effort: &Effort, only: Option<&str>, steps: &mut Steps) -> Measured {
     let mut measured = Measured::new(Run::now(effort.size()));
     if let Some(only) = only {
+        // Its name is a request.
+        let effort = &Effort { is_whole: true, ..*effort };
         measured.run_each(effort, |name| name.contains(only), steps);
         return measured;
     }
     let beside = Beside::start(effort);
-    let is_late = |name: &str| !effort.is_whole && ON_REQUEST.contains(&name);
-    measured.run_each(effort, |name| !BESIDE.contains(&name) && !is_late(name), steps);
-    measured.skipped.extend(ON_REQUEST.into_iter().filter(|name| is_late(name)));
+    measured.run_each(effort, |name| !BESIDE.contains(&name), steps);
     if let Err(error) = beside.and_then(|beside| beside.join(&mut measured, steps)) {
         steps.run("the checks beside", || Err(error));
     }
