@@ -60,6 +60,9 @@ pub struct Args {
     /// Error of the registration of robot and surface
     #[arg(long, value_name = "MM", default_value_t = 0.0, allow_negative_numbers = true)]
     registration: f32,
+    /// Time in which the tool may use up its distance from the stand-off, for an approach without jumps; 0 for none
+    #[arg(long, value_name = "MS", default_value_t = 0.0, allow_negative_numbers = true)]
+    approach: f32,
     /// Instructions of a Cortex-M7 that the queries of a tick may take, by the fit of plain queries: deep in the tissue they
     /// take up to twice as many
     #[arg(long, value_name = "N", default_value_t = 200_000)]
@@ -197,6 +200,7 @@ fn filter<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
         ("--tissue-speed", tissue),
         ("--age", age as f32),
         ("--registration", args.registration),
+        ("--approach", args.approach),
     ] {
         if !(value >= 0.0 && value.is_finite()) {
             bail!("{name} is {value}: give a number of at least 0");
@@ -204,6 +208,7 @@ fn filter<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     }
     let filter = Filter::new(args.stand_off, robot)
         .map_err(|_| anyhow!("--robot-speed is {robot}: give a speed above 0"))?
+        .approach(args.approach / 1_000.0)?
         .budget(args.budget, Cost::M7_CAPSULE);
     // Rounded up.
     let behind = (f64::from(tissue) * age / 1_000.0 * (1.0 + 2e-7)) as f32;

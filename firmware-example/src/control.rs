@@ -43,6 +43,9 @@ pub const STAND_OFF: f32 = 0.5;
 /// The robot's largest speed, in mm/s.
 const ROBOT_SPEED: f32 = 300.0;
 
+/// Time constant, in s, with which the instrument nears its stand-off: about a frame's, so that none makes it jump.
+const APPROACH: f32 = 0.02;
+
 /// Limit on a vertex's speed, in mm/s: twice the generated heart's top speed in real time, 1.57 mm in a thirtieth of a
 /// second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
 const SPEED: f32 = 100.0;
@@ -64,7 +67,7 @@ pub fn start<R: Robot>(
         surface::start(surface, limits.options(options).trust(trust.limits()?))?;
     let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
     let wall = ForbiddenRegion::new(spring, MARGIN)?;
-    let filter = Filter::new(STAND_OFF, ROBOT_SPEED)?;
+    let filter = Filter::new(STAND_OFF, ROBOT_SPEED)?.approach(APPROACH)?;
     let control = Control { guard, wall, filter, robot, bus, tick: Ticks(0) };
     Ok((Receiver::new(receiver, bus), control))
 }

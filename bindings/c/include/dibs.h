@@ -514,7 +514,7 @@ enum dibs_code
    */
   DIBS_CODE_LIMIT_UNTRIPPABLE = 506,
   /**
-   * A stand-off, speed, lever, period or uncertainty of a filter is out of range.
+   * A stand-off, speed, lever, approach, period or uncertainty of a filter is out of range.
    */
   DIBS_CODE_FILTER = 507,
 };
@@ -1497,6 +1497,11 @@ typedef struct {
    * reference point to the farthest end of a tool's axis.
    */
   float lever;
+  /**
+   * A tool comes nearer to its stand-off at no more than its distance from there divided by this time (s), at least 0; 0 for
+   * no such limit.
+   */
+  float approach;
   /**
    * Most instructions of all queries of a tick, by `cost`.
    */

@@ -160,7 +160,7 @@ pub enum dibs_code {
     Acknowledge = 505,
     /// A limit is so high that its input never exceeds it.
     LimitUntrippable = 506,
-    /// A stand-off, speed, lever, period or uncertainty of a filter is out of range.
+    /// A stand-off, speed, lever, approach, period or uncertainty of a filter is out of range.
     Filter = 507,
 }
 

@@ -30,6 +30,9 @@ pub struct dibs_filter {
     /// A rotation by one radian counts as much as a translation by this length (mm), at least 1; 0 for the distance from the
     /// reference point to the farthest end of a tool's axis.
     pub lever: f32,
+    /// A tool comes nearer to its stand-off at no more than its distance from there divided by this time (s), at least 0; 0 for
+    /// no such limit.
+    pub approach: f32,
     /// Most instructions of all queries of a tick, by `cost`.
     pub instructions: u32,
     /// A `dibs_cost`.
@@ -51,6 +54,7 @@ impl dibs_filter {
         };
         let filter = Filter::new(self.stand_off, self.speed)?;
         let filter = if self.lever == 0.0 { filter } else { filter.lever(self.lever)? };
+        let filter = filter.approach(self.approach)?;
         Ok(filter.budget(self.instructions, *cost_of(self.cost)?).options(options))
     }
 }
@@ -62,7 +66,8 @@ impl dibs_filter {
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_filter_of(stand_off: f32, speed: f32) -> dibs_filter {
     let (instructions, cost) = (200_000, dibs_cost::M7Capsule as u32);
-    dibs_filter { stand_off, speed, lever: 0.0, instructions, cost, depth_tolerance: 0.0 }
+    let (lever, approach, depth_tolerance) = (0.0, 0.0, 0.0);
+    dibs_filter { stand_off, speed, lever, approach, instructions, cost, depth_tolerance }
 }
 
 /// The motion of a rigid instrument in a period: its reference point goes straight, and the instrument turns about it.

@@ -78,6 +78,7 @@ fn admitted_motions_have_the_same_bits() {
         let instructions = if tick % 5 == 4 { 30_000 } else { 200_000 };
         let filter = Filter::new(1.0, 400.0).expect("a filter");
         let filter = filter.budget(instructions, Cost::M7_CAPSULE);
+        let filter = if tick % 3 == 2 { filter.approach(0.02).expect("a time") } else { filter };
         let filter = if tick % 7 == 6 { filter.lever(50.0).expect("a lever") } else { filter };
         let mut pairs = [(&mut first, surface, &tools[0]), (&mut second, surface, &tools[1])];
         let tissue = Uncertainty::new(20.0).error(0.05);

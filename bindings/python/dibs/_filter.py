@@ -123,21 +123,30 @@ class Filter:
 
     It keeps every tool `stand_off` (mm) from the tissue, for a robot that moves its reference point with at most `speed`
     (mm/s). A rotation by one radian counts as much as a translation by the `lever` (mm), by default the distance from the
-    reference point to the farthest end of a tool's axis. `instructions` bounds the queries of a tick, of a Cortex-M7 by the
+    reference point to the farthest end of a tool's axis. A tool comes nearer to its stand-off at no more than its distance
+    from there divided by the `approach` (s), if that is not 0. `instructions` bounds the queries of a tick, of a Cortex-M7 by the
     fitted cost of plain queries, which is too low for shafts deep in the tissue, by up to a half: what is not verified
     then is not admitted.
     """
 
     def __init__(
-        self, tree: Tree, stand_off: float, speed: float, *, lever: Optional[float] = None, instructions: int = 200_000
+        self,
+        tree: Tree,
+        stand_off: float,
+        speed: float,
+        *,
+        lever: Optional[float] = None,
+        approach: float = 0.0,
+        instructions: int = 200_000,
     ) -> None:
         stand_off = _at_least("stand_off", stand_off, 0)
         speed = _arrays.number("speed", speed)
         if speed <= 0:
             raise ValueError(f"speed: {speed} is not above 0")
         lever = None if lever is None else _at_least("lever", lever, 1)
+        approach = _at_least("approach", approach, 0)
         budget = _whole("instructions", instructions)
-        self._native = _dibs.Filter(_tree(tree)._native, stand_off, speed, lever, budget)
+        self._native = _dibs.Filter(_tree(tree)._native, stand_off, speed, lever, approach, budget)
 
     def admit(
         self,

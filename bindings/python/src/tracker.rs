@@ -232,6 +232,7 @@ impl Filter {
         stand_off: f32,
         speed: f32,
         lever: Option<f32>,
+        approach: f32,
         instructions: u32,
     ) -> PyResult<Self> {
         let filter = filter::Filter::new(stand_off, speed).map_err(named)?;
@@ -239,6 +240,7 @@ impl Filter {
             Some(lever) => filter.lever(lever).map_err(named)?,
             None => filter,
         };
+        let filter = filter.approach(approach).map_err(named)?;
         let filter = filter.budget(instructions, Cost::M7_CAPSULE);
         Ok(Self { ticks: on(tree), filter, tree: Arc::clone(&tree.0) })
     }

@@ -128,6 +128,7 @@ class Filters(WithProgram):
             ("speed", ValueError, lambda: dibs.Filter(TREE, 1, 0)),
             ("speed", TypeError, lambda: dibs.Filter(TREE, 1, "fast")),
             ("lever", ValueError, lambda: dibs.Filter(TREE, 1, 200, lever=0.5)),
+            ("approach", ValueError, lambda: dibs.Filter(TREE, 1, 200, approach=-0.1)),
             ("instructions", ValueError, lambda: dibs.Filter(TREE, 1, 200, instructions=-1)),
             ("instructions", TypeError, lambda: tracker.closest(TOOL, TREE, instructions=0.5)),
             ("margin", ValueError, lambda: tracker.closest(TOOL, TREE, margin=-1)),

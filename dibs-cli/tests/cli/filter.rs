@@ -50,6 +50,10 @@ fn admitted_poses_keep_the_stand_off() {
         assert!(!is_commanded || is_whole, "{line} {command}");
     }
     assert!(reasons.into_iter().all(|count| count > 200), "{reasons:?}");
+    // Eased, it is slowed sooner.
+    let eased = lines(folder, "--approach 20");
+    let commanded = eased.iter().filter(|line| line["reason"] == "commanded").count();
+    assert!(commanded > 200 && commanded < reasons[1], "{commanded} of {}", reasons[1]);
     // The pose at the end of a tick begins the next: the tracker sees the tissue there.
     let poses = |poses: &[String]| write(folder.join("poses.csv"), poses.join("\n")).unwrap();
     let least = || {
@@ -113,6 +117,7 @@ fn bad_input_is_named() {
         ("--stand-off 1 --robot-speed 0", "--robot-speed is 0"),
         ("--stand-off 1 --tissue-speed inf", "--tissue-speed is inf"),
         ("--stand-off 1 --age -1", "--age is -1"),
+        ("--stand-off 1 --approach -1", "--approach is -1"),
         ("--stand-off 1 --registration nan", "--registration is NaN"),
     ] {
         let error = fails(folder, &format!("{line} {options}"));

@@ -18,8 +18,8 @@ use crate::{Fault, Machine, point, put, word};
 pub mod command {
     /// End of the script.
     pub const END: u32 = 0;
-    /// A walk, whose trackers start anew: stand-off (mm), the robot's speed (mm/s), instructions of a tick, period (s), and 1
-    /// for queries with the measured stretch.
+    /// A walk, whose trackers start anew: stand-off (mm), the robot's speed (mm/s), the approach's time constant (s),
+    /// instructions of a tick, period (s), and 1 for queries with the measured stretch.
     pub const WALK: u32 = 1;
     /// The next frame: three `f32` for each of the tree's vertices.
     pub const FRAME: u32 = 2;
@@ -110,9 +110,10 @@ fn walk<const OPENED: usize>(
     Trackers(trackers): &mut Trackers<OPENED>,
     machine: &mut impl Machine,
 ) -> Result<u32, Fault> {
-    let [stand_off, robot] = [number(machine)?, number(machine)?];
+    let [stand_off, robot, approach] = [number(machine)?, number(machine)?, number(machine)?];
     let instructions = word(machine)?;
     let filter = Filter::new(stand_off, robot).map_err(|_| Fault)?;
+    let filter = filter.approach(approach).map_err(|_| Fault)?;
     let filter = filter.budget(instructions, Cost::M7_CAPSULE);
     let walk = Walk { filter, period: number(machine)? };
     let is_measured = word(machine)? == 1;

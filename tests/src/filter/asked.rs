@@ -10,6 +10,8 @@ pub struct Settings {
     pub stand_off: f32,
     /// The robot's largest speed (mm/s).
     pub robot: f32,
+    /// Time constant of the approach (s).
+    pub approach: f32,
     /// Instructions of a tick's queries.
     pub instructions: u32,
     /// s.

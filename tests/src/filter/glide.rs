@@ -80,6 +80,7 @@ pub fn glide_told(
     listener.walk(&Settings {
         stand_off: STAND_OFF,
         robot: ROBOT,
+        approach: 0.0,
         instructions: INSTRUCTIONS,
         period: TICK,
         is_measured: true,

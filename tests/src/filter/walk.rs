@@ -42,6 +42,8 @@ pub struct Episode {
     pub instructions: u32,
     /// Whether each command is the worst of several.
     pub climbs: bool,
+    /// Time constant of the approach (s).
+    pub approach: f32,
 }
 
 impl Episode {
@@ -58,6 +60,7 @@ impl Episode {
             registration: rng.choice([0.0, 0.0, 0.5]).expect("three"),
             instructions: rng.choice([30_000, 60_000, 200_000, 200_000]).expect("four"),
             climbs: rng.u32(..8) == 0,
+            approach: rng.choice([0.0, 0.0, 0.005, 0.05]).expect("four"),
         }
     }
 }
@@ -184,6 +187,7 @@ pub fn walk_told(
     listener.walk(&Settings {
         stand_off: episode.stand_off,
         robot: episode.robot,
+        approach: episode.approach,
         instructions: episode.instructions,
         period: episode.period as f32,
         is_measured: false,
@@ -192,6 +196,7 @@ pub fn walk_told(
     let tree = scene.tree.tree::<u16>().expect("16-bit indices");
     let filter = Filter::new(episode.stand_off, episode.robot).expect("in range");
     let filter = filter.budget(episode.instructions, Cost::M7_CAPSULE);
+    let filter = filter.approach(episode.approach).expect("in range");
     let mut trackers = [(); 2].map(|()| Follower::new(&tree).expect("deep enough"));
     let course = Course::any(scene, f64::from(episode.tissue), &mut rng);
     let radii = [0.5 + 2.0 * rng.f32(), 1.0];

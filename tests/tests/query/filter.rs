@@ -123,6 +123,9 @@ fn bad_input_is_named() {
         assert_eq!(named(bench.ask(&tool, &step).unwrap_err()), "period", "{bad}");
         assert_eq!(named(Filter::new(1.0, bad).unwrap_err()), "speed", "{bad}");
         assert_eq!(named(bench.filter.lever(bad).unwrap_err()), "lever", "{bad}");
+        if bad != 0.0 {
+            assert_eq!(named(bench.filter.approach(bad).unwrap_err()), "approach", "{bad}");
+        }
     }
     bench.period = 0.001;
     for bad in [-1.0, f32::NAN, f32::INFINITY] {
@@ -237,4 +240,37 @@ fn nothing_unverified_is_admitted() {
         admitted += usize::from(is_admitted);
     }
     assert!((1..5).contains(&admitted), "{admitted}");
+}
+
+/// Straight against a wall, with a time constant of 20 ms: the speed falls with the distance, and reaches the stand-off;
+/// along the wall and away from it nothing changes.
+#[test]
+fn an_approach_takes_its_time() {
+    const TIME: f32 = 0.02;
+    let mut bench = Bench::new(&sheet(20, 60.0, |_, _| 0.0), 1.0);
+    bench.filter = bench.filter.approach(TIME).expect("in range");
+    let at = |height: f32| capsule(Vec3::new(0.0, 0.0, height), Vec3::new(0.0, 0.0, height + 40.0));
+    let asked = |height: f32, step: Vec3| {
+        bench.ask(&at(height), &Motion::translation(step)).expect("an answer")
+    };
+    let push = Vec3::Z * -0.2;
+    let (mut height, mut eased) = (10.0, 0);
+    for _ in 0..400 {
+        // Above the stand-off, by the tool's radius.
+        let room = height - 2.0;
+        let most = room * bench.period / TIME;
+        let admitted = asked(height, push);
+        let step = -admitted.motion.translation.z;
+        if most > 0.2 + 0.002 {
+            assert_eq!(admitted.reason, Reason::Commanded, "{height}");
+        } else {
+            assert!(step <= most + 1e-3 && step >= most - 2e-3, "{height}: {step}, {most}");
+            eased += 1;
+        }
+        height -= step;
+    }
+    assert!(eased > 100 && (height - 2.0).abs() < 0.02, "{eased} {height}");
+    for step in [Vec3::X * 0.2, Vec3::Z * 0.2] {
+        assert_eq!(asked(height, step).motion.translation, step);
+    }
 }

@@ -76,7 +76,8 @@ int main(int argc, char **argv) {
             }
             last = number;
         }
-        /* A small budget now and then, and a lever of the caller's. */
+        /* A small budget now and then, a slow approach, and a lever of the caller's. */
+        filter.approach = tick % 3 == 2 ? 0.02f : 0.0f;
         filter.instructions = tick % 5 == 4 ? 30000 : 200000;
         filter.lever = tick % 7 == 6 ? 50.0f : 0.0f;
         dibs_admitted admitted;

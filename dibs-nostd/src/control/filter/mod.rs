@@ -97,6 +97,8 @@ pub struct Filter {
     speed: f32,
     /// mm; `None` for the tools' size.
     lever: Option<f32>,
+    /// s.
+    approach: f32,
     instructions: u32,
     cost: Cost,
     options: Options,
@@ -114,6 +116,7 @@ impl Filter {
             stand_off: checked("stand_off", stand_off, stand_off >= 0.0)?,
             speed: checked("speed", speed, speed > 0.0)?,
             lever: None,
+            approach: 0.0,
             instructions: INSTRUCTIONS,
             cost: Cost::M7_CAPSULE,
             options: Options::new(),
@@ -127,6 +130,18 @@ impl Filter {
     /// [`FilterError::Parameter`] if it is less than 1, or not finite.
     pub fn lever(self, lever: f32) -> Result<Self, FilterError> {
         Ok(Self { lever: Some(checked("lever", lever, lever >= LEAST_LEVER)?), ..self })
+    }
+
+    /// The same with a time constant (s, at least 0) of the approach: a tool comes nearer to its stand-off at no more than
+    /// its distance from there divided by this, so that it does not jump where a new frame gives way a little. By default it
+    /// is 0: a period may use up the whole distance. Motions along the wall and away from it keep their speed; a wall that
+    /// recedes is followed from its speed times this. It eases the approach to a tool's closest pair only, and is no promise.
+    /// (The discrete control barrier function of Agrawal & Sreenath 2017, their gamma: the period divided by this.)
+    ///
+    /// # Errors
+    /// [`FilterError::Parameter`] if it is negative or not finite.
+    pub fn approach(self, time: f32) -> Result<Self, FilterError> {
+        Ok(Self { approach: checked("approach", time, time >= 0.0)?, ..self })
     }
 
     /// The same with a budget: the instructions of all queries of a tick, by a [`Cost`]; 200,000 of a Cortex-M7 by default. Where it

@@ -93,6 +93,8 @@ pub(super) struct Session<'f> {
     /// How far (mm) the tissue may be from the surface at the start, and how much farther at the end.
     margin: f32,
     grow: f32,
+    /// The share of a distance beyond the least that rows let a motion use up.
+    share: f32,
     queries: u32,
     instructions: u32,
 }
@@ -123,6 +125,7 @@ impl<'f> Session<'f> {
             most,
             margin: uncertainty.now,
             grow: uncertainty.grown(period),
+            share: if filter.approach > period { period / filter.approach } else { 1.0 },
             queries: 0,
             instructions: 0,
         })
@@ -201,6 +204,9 @@ impl<'f> Session<'f> {
         let farthest = distance + self.most;
         let wanted = kept + self.grow;
         let wanted = if is_below && farthest < wanted { farthest } else { wanted };
+        let room = distance - wanted;
+        let wanted =
+            if room > 0.0 && room < f32::INFINITY { distance - room * self.share } else { wanted };
         let number = self.states.len();
         if let Some(found) = found
             && distance < wanted + 4.0 * self.most

@@ -62,9 +62,9 @@ impl Script {
 
 impl Listener for Script {
     fn walk(&mut self, settings: &Settings) {
-        let &Settings { stand_off, robot, instructions, period, is_measured } = settings;
+        let &Settings { stand_off, robot, approach, instructions, period, is_measured } = settings;
         self.words.push(command::WALK);
-        self.put(&[stand_off, robot]);
+        self.put(&[stand_off, robot, approach]);
         self.words.push(instructions);
         self.put(&[period]);
         self.words.push(u32::from(is_measured));
