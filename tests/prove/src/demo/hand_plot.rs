@@ -22,12 +22,8 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let of = |name, ink, moments: &[&Moment], value: fn(&Moment) -> f32| {
         Curve::new(name, ink, moments, |moment| at(moment.tick.tick, value(moment).into()))
     };
-    let picture = folder.join("hand.svg");
-    let root = SVGBackend::new(&picture, (900, 960)).into_drawing_area();
-    root.fill(&WHITE).map_err(failed)?;
-    let areas = root.split_evenly((4, 1));
     let push = |moment: &Moment| Vec3::from(moment.push.push).length();
-    let rows = [
+    let mut rows = vec![
         (
             "separation (mm)",
             vec![
@@ -50,14 +46,19 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
                 of("admitted", ORANGE_INK, &commanded, |m| m.speeds()[1]),
             ],
         ),
-        (
-            "instructions",
-            vec![
-                of("of the closest pair", BLUE_INK, &pushed, |m| m.instructions() as f32),
-                of("with the filter", ORANGE_INK, &commanded, |m| m.instructions() as f32),
-            ],
-        ),
     ];
+    // They are counted in the emulator only.
+    if moments.iter().any(|moment| moment.instructions() > 0) {
+        let curves = vec![
+            of("of the closest pair", BLUE_INK, &pushed, |m| m.instructions() as f32),
+            of("with the filter", ORANGE_INK, &commanded, |m| m.instructions() as f32),
+        ];
+        rows.push(("instructions", curves));
+    }
+    let picture = folder.join("hand.svg");
+    let root = SVGBackend::new(&picture, (900, 240 * rows.len() as u32)).into_drawing_area();
+    root.fill(&WHITE).map_err(failed)?;
+    let areas = root.split_evenly((rows.len(), 1));
     for (area, (name, rows)) in areas.iter().zip(&rows) {
         curves(area, &time, name, rows)?;
     }

@@ -20,6 +20,10 @@ const POINTS: usize = 1_500;
 /// Seconds without a value that interrupt a curve.
 const GAP: f64 = 0.1;
 
+/// Room around a chart, and for the labels on its left, in pixels.
+const MARGIN: i32 = 12;
+const LABELS: i32 = 70;
+
 /// Bars of a histogram.
 const BINS: usize = 80;
 
@@ -145,9 +149,10 @@ pub fn curves(
     let room = if top > low { (top - low) * 0.05 } else { 1.0 };
     let low = if low < 0.0 { low - room } else { 0.0 };
     let mut chart = ChartBuilder::on(area)
-        .margin(12)
+        .margin(MARGIN)
+        .margin_top(if curves.len() > 1 { 2 * MARGIN } else { MARGIN })
         .x_label_area_size(36)
-        .y_label_area_size(70)
+        .y_label_area_size(LABELS)
         .build_cartesian_2d(time.clone(), low..top + room)
         .map_err(failed)?;
     chart
@@ -161,27 +166,33 @@ pub fn curves(
         let zero = [(time.start, 0.0), (time.end, 0.0)];
         chart.draw_series(LineSeries::new(zero, RED_INK)).map_err(failed)?;
     }
-    for &Curve { name, ink, ref points } in curves {
+    for &Curve { ink, ref points, .. } in curves {
         // A time without a value is a gap.
         let runs = points.chunk_by(|before, after| after.0 - before.0 < GAP);
         let paths = runs.map(|run| PathElement::new(run, ink));
-        let drawn = chart.draw_series(paths).map_err(failed)?;
-        if curves.len() > 1 {
-            drawn
-                .label(name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], ink.stroke_width(2)));
-        }
+        chart.draw_series(paths).map_err(failed)?;
     }
     if curves.len() > 1 {
-        let legend = &mut chart.configure_series_labels();
-        // Away from most of the curve: a tool in the surface is below zero, and a force is mostly at its largest.
-        let place = if low < 0.0 {
-            SeriesLabelPosition::UpperRight
-        } else {
-            SeriesLabelPosition::LowerRight
-        };
-        let legend = legend.position(place).background_style(WHITE);
-        legend.border_style(BLACK.mix(0.3)).draw().map_err(failed)?;
+        names(area, curves)?;
+    }
+    Ok(())
+}
+
+/// The curves' names, in a row above their chart, where they hide none of it.
+fn names(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    curves: &[Curve],
+) -> Result<()> {
+    const DASH: i32 = 16;
+    let style = TextStyle::from(("sans-serif", 12)).pos(Pos::new(HPos::Left, VPos::Center));
+    let (mut x, y) = (MARGIN + LABELS, MARGIN);
+    for Curve { name, ink, .. } in curves {
+        let dash = PathElement::new([(x, y), (x + DASH, y)], ink.stroke_width(2));
+        area.draw(&dash).map_err(failed)?;
+        x += DASH + 6;
+        area.draw_text(name, &style, (x, y)).map_err(failed)?;
+        let (width, _) = area.estimate_text_size(name, &style).map_err(failed)?;
+        x += width as i32 + 24;
     }
     Ok(())
 }
