@@ -1,13 +1,14 @@
 //! `dibs build`: a mesh file becomes a blob or Rust source.
 
+use crate::construction::ConstructionArgs;
 use crate::mesh_file::{self, MeshArgs};
 use crate::nodes::{self, VolumeSpec};
 use crate::{modes, overwrite, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
-    Beyond, Builder, BuiltTree, Construction, Group, Import, IndexWidth, Mesh, Needed, Paths,
-    Volume, check_winding, crossing_parts, orient, read_labels, read_limits,
+    Beyond, Builder, BuiltTree, Group, Import, IndexWidth, Mesh, Needed, Volume, check_winding,
+    crossing_parts, orient, read_labels, read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -31,10 +32,10 @@ pub struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// The largest stretch that the tree must cover: a factor of at least 1
-    #[arg(long, default_value_t = 1.5)]
+    #[arg(long, default_value_t = 1.5, allow_negative_numbers = true)]
     stretch: f32,
     /// A limit for each triangle instead, as `dibs stretch` writes them
-    #[arg(long, value_name = "FILE", conflicts_with = "stretch")]
+    #[arg(long, value_name = "LIMITS", conflicts_with = "stretch")]
     limits: Option<PathBuf>,
     /// A volume whose nodes move the surface: a file of tetrahedra around it (.msh, .vtk, .vtu), or lattice:NX,NY,NZ, a box
     /// of so many cells. Frames are the nodes then, and --stretch limits each tetrahedron
@@ -42,15 +43,14 @@ pub struct Args {
     nodes: Option<VolumeSpec>,
     /// A label for each face of the file or triangle of the mesh, say of its tissue: text, one number from 0 to 255 a
     /// line, in the file's order
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "LABELS")]
     labels: Option<PathBuf>,
     /// Labels from the file's own groups: OBJ's g and usemtl, numbered from 0; Gmsh's physical groups by their numbers; VTK's
     /// cell data `label`, `labels` or `RegionId`
     #[arg(long, conflicts_with = "labels")]
     labels_from_groups: bool,
-    /// How sections are pinned, measured and split
-    #[arg(long, value_enum, default_value = "default")]
-    construction: ConstructionName,
+    #[command(flatten)]
+    construction: ConstructionArgs,
     /// Bits of an index; by default 16 up to 65,536 vertices, else 32
     #[arg(long, value_enum)]
     index: Option<Bits>,
@@ -65,20 +65,13 @@ pub struct Args {
     /// Add displacement modes fitted to the motion, so that as many weights drive the surface
     #[arg(long, value_name = "COUNT", requires = "motion")]
     modes: Option<usize>,
-    /// A recorded motion of the mesh (.pc2, .npy or a series heart_%03d.vtp): fail if it stretches the surface beyond the limits
+    /// A recorded motion of the surface, or of the nodes that move it (.pc2, .npy or a series heart_%03d.vtp): fail if it
+    /// stretches the surface beyond the limits
     #[arg(long)]
     motion: Option<PathBuf>,
     /// Print a JSON object
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum ConstructionName {
-    /// Geodesic split
-    Default,
-    /// As published: mid-range pin, section-restricted paths, split by a plane
-    Paper,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -184,11 +177,7 @@ pub fn run(args: &Args) -> Result<()> {
 /// An error unless the limits cover a recorded motion: the controller would reject its frames.
 fn check_covered(args: &Args, mesh: &Mesh, path: &Path, limits: &[f32]) -> Result<()> {
     let motion = args.reading.lengths.motion(path, mesh.origin)?;
-    let paths = match args.construction {
-        ConstructionName::Default => Paths::default(),
-        ConstructionName::Paper => Paths::Edges,
-    };
-    let needed = stretch::measure(mesh, &motion, path, paths)?;
+    let needed = stretch::measure(mesh, &motion, path, args.construction.paths())?;
     let Some(Beyond { needed: worst, limit, .. }) = needed.beyond(limits) else { return Ok(()) };
     let is_beyond = |(n, limit): &(&Needed, &f32)| n.stretch > f64::from(**limit);
     let beyond = needed.triangles().iter().zip(limits).filter(is_beyond);
@@ -227,10 +216,7 @@ fn build(
         None => builder,
     };
     let tree = builder
-        .construction(match args.construction {
-            ConstructionName::Default => Construction::Geodesic,
-            ConstructionName::Paper => Construction::Paper,
-        })
+        .construction(args.construction.construction())
         .index(match args.index {
             None => IndexWidth::Fitting,
             Some(Bits::Bits16) => IndexWidth::Bits16,

@@ -8,8 +8,9 @@ use dibs_build::glam::DVec3;
 use dibs_nostd::filter::{Admitted, Filter, Motion, Reason, Uncertainty};
 use dibs_nostd::{Capsule, Cost, Index, MovingSurface, Odometer, Options, Tracker, Tree};
 
-use crate::query::{STACK, ToolSpec};
-use crate::recorded::{Moving, Recorded, tools};
+use crate::query::STACK;
+use crate::recorded::{Moving, Recorded};
+use crate::tool::{self, ToolSpec};
 use crate::tree_file::{self, AnyTree};
 use crate::{output, overwrite};
 
@@ -42,8 +43,8 @@ certain.")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
-    /// The tool's pose commanded for the end of each tick: a line is what `dibs query --tool` takes
-    #[arg(long)]
+    /// The tool's pose commanded for the end of each tick: a line is what `dibs query --tool` takes; `-` is standard input
+    #[arg(long, value_name = "TOOLS")]
     path: PathBuf,
     /// Least separation of tool and tissue
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
@@ -73,8 +74,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let Moving { tree, motion, .. } = &args.moving;
-    overwrite::check([tree, motion, &args.path], [])?;
+    let tree = &args.moving.tree;
+    overwrite::check([tree, args.moving.motion()?, &args.path], [])?;
     let bytes = tree_file::load(tree)?;
     match tree_file::validate(&bytes, tree)? {
         AnyTree::Narrow(tree) => filter(args, &tree),
@@ -141,7 +142,7 @@ struct Commands {
 
 impl Commands {
     fn read(args: &Args, origin: DVec3) -> Result<Self> {
-        let tools = tools(&args.path, |tool| tool.local(origin).map(|_| tool))?;
+        let tools = tool::path(&args.path, |tool| tool.local(origin).map(|_| tool))?;
         let (first, radius, is_sphere) = Axis::of(&tools[0], origin);
         let mut axes = Vec::with_capacity(tools.len());
         for (number, tool) in (1..).zip(&tools) {

@@ -4,21 +4,26 @@
 mod output;
 
 mod build;
+mod construction;
 mod filter;
 mod generate;
 mod inspect;
 mod manual;
 mod mesh_file;
 mod modes;
+mod motion;
 mod nodes;
 mod overwrite;
 mod query;
 mod recorded;
 mod stream;
 mod stretch;
+mod tool;
 mod track;
 mod tree_file;
 mod view;
+#[cfg(test)]
+mod words;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -61,11 +66,11 @@ const EXAMPLES: &str = "\
 Examples:
   dibs generate heart --triangles 10272 -o heart.ply --motion heart.pc2
   dibs build heart.ply -o heart.dibs --stretch 1.5
-  dibs stretch heart.ply heart.pc2 --limits heart.limits
+  dibs stretch heart.ply --motion heart.pc2 --limits heart.limits
   dibs inspect heart.dibs
   dibs query heart.dibs --tool capsule:0,0,60,0,0,200,4 --vertices heart.pc2 --frame 9
-  dibs view heart.dibs heart.pc2 -o heart.html
-  dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --loop
+  dibs view heart.dibs --motion heart.pc2 -o heart.html
+  dibs stream heart.dibs --motion heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --loop
 
 Lengths are in millimetres. Warnings and progress go to standard error, results to
 standard output; --json makes them one JSON object. Bad input ends with exit code 1.";

@@ -25,7 +25,7 @@ Examples:
   dibs man -o ~/.local/share/man/man1")]
 pub struct Man {
     /// Write a page for the program and one for each of its commands into this folder
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long)]
     output: Option<PathBuf>,
 }
 

@@ -1,29 +1,28 @@
-//! A recorded motion in a tree's rows, played over and over, and a tool's path beside it.
+//! A recorded motion in a tree's rows, played over and over.
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, anyhow, bail};
-use dibs_build::SurfaceRows;
+use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::Vec3;
+use dibs_build::{Motion, SurfaceRows};
 use dibs_nostd::{Index, MeasuredStretch, PathKind, Tree};
 
 use crate::mesh_file::Lengths;
-use crate::query::{ToolSpec, parse_tool, rows};
+use crate::motion::{MotionFile, MotionRate};
+use crate::query::rows;
 
 /// The surface in its motion, and the ticks of a loop.
 #[derive(clap::Args)]
+#[command(mut_arg("motion", |motion| motion.required(true)))]
 pub struct Moving {
     /// A tree file that `dibs build` wrote
     pub tree: PathBuf,
-    /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh, or of
-    /// the nodes that move it
-    #[arg(long)]
-    pub motion: PathBuf,
-    /// Frames a second of the motion; by default the number in its file
-    #[arg(long, value_name = "HZ")]
-    motion_rate: Option<f32>,
-    /// Ticks a second
-    #[arg(long, default_value_t = 1_000.0, allow_negative_numbers = true)]
+    #[command(flatten)]
+    motion: MotionFile,
+    #[command(flatten)]
+    motion_rate: MotionRate,
+    /// Ticks a second of the control loop
+    #[arg(long, value_name = "HZ", default_value_t = 1_000.0, allow_negative_numbers = true)]
     rate: f64,
     #[command(flatten)]
     lengths: Lengths,
@@ -39,29 +38,18 @@ impl Moving {
         Ok(rate)
     }
 
+    /// The motion's file.
+    pub fn motion(&self) -> Result<&PathBuf> {
+        self.motion.required()
+    }
+
     /// Reads the motion's file.
     pub fn read<I: Index>(&self, tree: &Tree<'_, I>) -> Result<Recorded> {
-        Recorded::read(tree, &self.motion, &self.lengths, self.motion_rate)
+        let path = self.motion()?;
+        let motion = self.lengths.motion_of(tree, path)?;
+        let rate = self.motion_rate.of(&motion, path)?;
+        Recorded::new(tree, path, &motion, rate)
     }
-}
-
-/// The tool at each tick, as `each` has it.
-pub fn tools<T>(path: &Path, each: impl Fn(ToolSpec) -> Result<T>) -> Result<Vec<T>> {
-    let name = path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: cannot be read"))?;
-    let tools: Vec<T> = (1..)
-        .zip(text.lines())
-        .filter(|(_, line)| !line.trim().is_empty())
-        .map(|(number, line)| {
-            parse_tool(line.trim())
-                .and_then(&each)
-                .map_err(|error| anyhow!("{name}, line {number}: {error}"))
-        })
-        .collect::<Result<_>>()?;
-    if tools.is_empty() {
-        bail!("{name}: no line, and so no tick; give a tool for each tick");
-    }
-    Ok(tools)
 }
 
 /// The frames of a motion, at least one, within the tree's stretch limit.
@@ -76,20 +64,8 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Reads a motion's file. `rate` replaces the number in it.
-    fn read<I: Index>(
-        tree: &Tree<'_, I>,
-        path: &Path,
-        lengths: &Lengths,
-        rate: Option<f32>,
-    ) -> Result<Self> {
-        let motion = lengths.motion_of(tree, path)?;
-        let rate = rate.unwrap_or(motion.rate);
+    fn new<I: Index>(tree: &Tree<'_, I>, path: &Path, motion: &Motion, rate: f64) -> Result<Self> {
         let name = path.display();
-        if !(rate > 0.0) || motion.frames.is_empty() {
-            let count = motion.frames.len();
-            bail!("{name}: has {count} frames at {rate} a second; give --motion-rate");
-        }
         let frames: Vec<Vec<Vec3>> = (0..)
             .zip(&motion.frames)
             .map(|(number, frame)| rows(tree, path, number, frame))
@@ -107,7 +83,7 @@ impl Recorded {
             rows.push(surface.positions().to_vec());
             stretches.push(measured);
         }
-        Ok(Self { frames: rows, nodes, stretches, rate: f64::from(rate) })
+        Ok(Self { frames: rows, nodes, stretches, rate })
     }
 
     /// The stretch of the surface after a frame, if it goes on as it came from another one; an error beyond the limit.

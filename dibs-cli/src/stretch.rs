@@ -1,6 +1,8 @@
 //! `dibs stretch`: the stretch limits that a recorded motion needs.
 
+use crate::construction::ConstructionArgs;
 use crate::mesh_file::{self, MeshArgs};
+use crate::motion::MotionFile;
 use crate::overwrite;
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::{Mesh, Motion, MotionStretch, Needed, Paths, write_atomically, write_limits};
@@ -8,31 +10,33 @@ use plotters::prelude::*;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-#[command(after_help = "\
+#[command(mut_arg("motion", |motion| motion.required(true)), after_help = "\
 Examples:
-  dibs stretch heart.ply heart.pc2
-  dibs stretch heart.ply heart.pc2 --margin 0.1 --limits heart.limits --picture stretch.svg
+  dibs stretch heart.ply --motion heart.pc2
+  dibs stretch heart.ply --motion heart.pc2 --margin 0.1 --limits heart.limits --picture stretch.svg
   dibs build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2
 
 A triangle's stretch is the largest singular value of its deformation gradient against the mesh file, or
-with --edges the longest of its edges over that edge's length there. Give the same options for reading
+with --construction paper the longest of its edges over that edge's length there. Give the same options for reading
 the mesh as to `dibs build`.")]
 pub struct Args {
     /// The rest shape, a mesh file as for `dibs build`
     mesh: PathBuf,
-    /// The recorded motion of the mesh: .pc2, .npy or a series (heart_%03d.vtp)
-    motion: PathBuf,
+    #[command(flatten)]
+    motion: MotionFile,
     /// What limits leave above the recorded stretch (0.1: a tenth of it)
-    #[arg(long, default_value_t = 0.1)]
+    #[arg(long, default_value_t = 0.1, allow_negative_numbers = true)]
     margin: f32,
     /// Write a limit for each triangle, for `dibs build --limits`
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "LIMITS")]
     limits: Option<PathBuf>,
     /// Draw how many triangles stretch how far, SVG
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
-    /// Measure edges, as trees of edge paths do (--construction paper)
     #[arg(long)]
+    picture: Option<PathBuf>,
+    #[command(flatten)]
+    construction: ConstructionArgs,
+    /// `--construction paper`, as it was given before
+    #[arg(long, hide = true, conflicts_with = "construction")]
     edges: bool,
     #[command(flatten)]
     reading: MeshArgs,
@@ -54,22 +58,23 @@ pub fn run(args: &Args) -> Result<()> {
             args.margin
         );
     }
-    overwrite::check([&args.mesh, &args.motion], args.limits.iter().chain(&args.picture))?;
+    let path = args.motion.required()?;
+    overwrite::check([&args.mesh, path], args.limits.iter().chain(&args.picture))?;
     let import = mesh_file::read(&args.mesh, &args.reading, false)?;
     let mesh = &import.mesh;
-    let motion = args.reading.lengths.motion(&args.motion, mesh.origin)?;
-    let paths = if args.edges { Paths::Edges } else { Paths::default() };
-    let needed = measure(mesh, &motion, &args.motion, paths)?;
+    let motion = args.reading.lengths.motion(path, mesh.origin)?;
+    let paths = if args.edges { Paths::Edges } else { args.construction.paths() };
+    let needed = measure(mesh, &motion, path, paths)?;
     let ranked = needed.ranked();
     let limits = needed.limits(args.margin);
-    if let Some(path) = &args.limits {
+    if let Some(limits_file) = &args.limits {
         let comment = format!(
             "Stretch limits of the triangles of {}: what {} needs, and {} of it more.",
             args.mesh.display(),
-            args.motion.display(),
+            path.display(),
             args.margin
         );
-        write_limits(path, mesh, &limits, &comment)?;
+        write_limits(limits_file, mesh, &limits, &comment)?;
     }
     if let Some(path) = &args.picture {
         let picture = draw(&ranked).with_context(|| path.display().to_string())?;
@@ -91,7 +96,7 @@ pub fn run(args: &Args) -> Result<()> {
         return Ok(());
     }
     println!("read     {}: {}", args.mesh.display(), import.report);
-    println!("motion   {}: {} frames", args.motion.display(), motion.frames.len());
+    println!("motion   {}: {} frames", path.display(), motion.frames.len());
     for (share, stretch) in percentiles {
         println!("stretch  {share:6} % of the triangles stretch by at most {stretch:.4}");
     }

@@ -1,7 +1,8 @@
 //! `dibs track`: a tool on its path about a moving surface, tick by tick.
 
-use crate::query::{ContactRecord, LocalTool, STACK, Touch, side_name, vector};
-use crate::recorded::{Moving, Recorded, tools};
+use crate::query::{ContactRecord, STACK, Touch, side_name, vector};
+use crate::recorded::{Moving, Recorded};
+use crate::tool::{self, LocalTool};
 use crate::tree_file::{self, AnyTree};
 use crate::{output, overwrite};
 use anyhow::{Context, Result, bail};
@@ -27,7 +28,7 @@ Examples:
   dibs track heart.dibs --motion heart.pc2 --path tools.csv --surface extrapolated --full
   dibs track heart.dibs --motion heart.pc2 --path tools.csv --budget 60000 --contacts 5 --json
 
-A frame arrives when its time has come; the motion is played over and over. SurfaceBlend frames the surface is that
+A frame arrives when its time has come; the motion is played over and over. Between frames the surface is that
 of the last frame (held), on its way there from the one before (interpolated: late by a frame), or beyond it as
 it moved before (extrapolated). One line a tick on standard output, and what it took on standard error.
 
@@ -38,8 +39,8 @@ tissue: there a tick took up to twice as many instructions.")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
-    /// The tool at each tick: a line is what `dibs query --tool` takes
-    #[arg(long)]
+    /// The tool at each tick: a line is what `dibs query --tool` takes; `-` is standard input
+    #[arg(long, value_name = "TOOLS")]
     path: PathBuf,
     /// The surface between frames
     #[arg(long, value_enum, default_value_t = Surface::Interpolated)]
@@ -51,7 +52,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     budget: Option<u32>,
     /// List all locally closest pairs whose separation is at most this, too: at most 64
-    #[arg(long, value_name = "MARGIN", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     contacts: Option<f32>,
     /// Print a JSON object a line, and another one of the means on standard error
     #[arg(long)]
@@ -66,8 +67,8 @@ enum Surface {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let Moving { tree, motion, .. } = &args.moving;
-    overwrite::check([tree, motion, &args.path], [])?;
+    let tree = &args.moving.tree;
+    overwrite::check([tree, args.moving.motion()?, &args.path], [])?;
     if let Some(margin) = args.contacts
         && !(margin >= 0.0 && margin.is_finite())
     {
@@ -82,7 +83,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let origin: DVec3 = tree.origin().into();
-    let tools = tools(&args.path, |tool| tool.local(origin))?;
+    let tools = tool::path(&args.path, |tool| tool.local(origin))?;
     let rate = args.moving.rate()?;
     let recorded = args.moving.read(tree)?;
     let Recorded { frames, stretches, .. } = &recorded;

@@ -14,7 +14,7 @@ initSync({ module: await readFile(join(sessionFolder, "session_bg.wasm")) });
 
 // The data elements alone, as `dibs view` puts them into a page.
 await writeFile(join(folder, "empty.html"), "<!--data-->");
-const view = ["view", "heart.dibs", "heart.pc2", "--page", "empty.html", "-o", "data.html"];
+const view = ["view", "heart.dibs", "--motion", "heart.pc2", "--page", "empty.html", "-o", "data.html"];
 execFileSync(program(folder), view, { cwd: folder });
 const data = await readFile(join(folder, "data.html"), "utf8");
 const text = (id) => data.match(new RegExp(`id="${id}">([^<]*)<`))[1];

@@ -241,7 +241,7 @@ async function replay(browser) {
     return `capsule:${way},-20,40,${way + 70},-50,70,3`;
   });
   await writeFile(join(folder, "tools.csv"), lines.join("\n"));
-  dibs("view", "heart.dibs", "heart.pc2", "--path", "tools.csv", "-o", "replay.html");
+  dibs("view", "heart.dibs", "--motion", "heart.pc2", "--path", "tools.csv", "-o", "replay.html");
   for (const [name, between] of [["held", "0"], ["interpolated", "1"], ["extrapolated", "2"]]) {
     const printed = dibs("track", "heart.dibs", "--motion", "heart.pc2", "--path", "tools.csv", "--surface", name, "--full", "--json");
     const track = printed.trim().split("\n").map((line) => JSON.parse(line));
@@ -413,7 +413,7 @@ async function scenes(browser) {
   await page.close();
 }
 
-dibs("view", "heart.dibs", "heart.pc2", "-o", "heart.html");
+dibs("view", "heart.dibs", "--motion", "heart.pc2", "-o", "heart.html");
 const { size } = await stat(join(folder, "heart.html"));
 assert(size <= 3e6, `heart.html has ${size} bytes`);
 const browser = await launch(SOFTWARE_GL);

@@ -112,7 +112,7 @@ fn subject() -> Result<PathBuf> {
     let dibs = workspace::target().join("release/dibs");
     let tasks = [
         "generate heart --triangles 10272 -o heart.ply --motion heart.pc2",
-        "stretch heart.ply heart.pc2 --margin 0.1 --limits heart.limits",
+        "stretch heart.ply --motion heart.pc2 --margin 0.1 --limits heart.limits",
         "build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2",
     ];
     for task in tasks {

@@ -2,22 +2,17 @@
 
 mod answer;
 mod bulk;
-mod pose;
 mod scene;
-mod tool;
 
 pub use answer::{ContactRecord, Touch, side_name, vector};
 pub use scene::{STACK, rows};
-pub use tool::{LocalTool, ToolSpec, parse_tool};
 
 use crate::mesh_file::Lengths;
+use crate::tool::{self, ToolSpec};
 use crate::{overwrite, tree_file};
 use anyhow::{Result, bail};
 use scene::{Room, Surface};
 use std::path::PathBuf;
-
-/// Most tools of a chain.
-const MOST_TOOLS: usize = 8;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -29,28 +24,28 @@ Examples:
   dibs query heart.dibs --poses poses.csv -o answers.jsonl
   produce | dibs query heart.dibs --poses - | consume
 
-A line of poses is one of these, and each gives one JSON object on a line:
-  0,0,150,5                                          a sphere: X,Y,Z,R
-  0,0,60,0,0,200,4                                   a capsule: X1,Y1,Z1,X2,Y2,Z2,R
-  sphere:0,0,150,5 capsule:0,0,150,0,0,200,4         a chain
-  {\"sphere\": [0, 0, 150, 5]}
+A tool is one of these, in --tool as in a line of --poses, or of --path of other commands:
+  0,0,150,5           sphere:0,0,150,5               {\"sphere\": [0, 0, 150, 5]}
+  0,0,60,0,0,200,4    capsule:0,0,60,0,0,200,4       {\"capsule\": [0, 0, 60, 0, 0, 200, 4]}
+that is X,Y,Z,R or X1,Y1,Z1,X2,Y2,Z2,R. A line of --poses may be a chain, too, and gives one JSON object on a line:
+  sphere:0,0,150,5 capsule:0,0,150,0,0,200,4
   [{\"sphere\": [0, 0, 150, 5]}, {\"capsule\": [0, 0, 150, 0, 0, 200, 4]}]
 A first line of column names is skipped, and so are empty lines.")]
 pub struct Args {
     /// Tree files that `dibs build` wrote, at most 16: a scene
     #[arg(required = true, value_name = "TREE", num_args = 1..=16)]
     trees: Vec<PathBuf>,
-    /// sphere:X,Y,Z,R or capsule:X1,Y1,Z1,X2,Y2,Z2,R; up to eight of them are a chain
-    #[arg(long, value_parser = parse_tool, allow_hyphen_values = true, required_unless_present = "poses")]
+    /// A tool: X,Y,Z,R, a sphere, or X1,Y1,Z1,X2,Y2,Z2,R, a capsule; up to eight of them are a chain
+    #[arg(long, value_parser = tool::one, allow_hyphen_values = true, required_unless_present = "poses")]
     tool: Vec<ToolSpec>,
     /// Answer every line of this file, CSV or JSON lines, by a JSON line; `-` is standard input
-    #[arg(long, value_name = "FILE", conflicts_with = "tool")]
+    #[arg(long, value_name = "POSES", conflicts_with = "tool")]
     poses: Option<PathBuf>,
     /// The file of the answers to --poses, written as a whole or not at all; `-` is standard output
-    #[arg(short, long, value_name = "FILE", default_value = "-", requires = "poses")]
+    #[arg(short, long, default_value = "-", requires = "poses")]
     output: PathBuf,
     /// List all locally closest pairs whose separation is at most this, too: at most 64 of each tool and surface
-    #[arg(long, value_name = "MARGIN")]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     contacts: Option<f32>,
     /// Current positions, one for each vertex of the built mesh: a mesh file, or a motion with
     /// --frame; by default the rest shape. In a scene, once for each tree, in their order
@@ -61,7 +56,7 @@ pub struct Args {
     frame: Option<usize>,
     /// Fail if the surface is stretched by more than this, and search with the stretch that it has
     /// instead of the tree's limit
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     stretch: Option<f32>,
     #[command(flatten)]
     lengths: Lengths,
@@ -71,7 +66,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    check_chain(&args.tool)?;
+    tool::check_chain(&args.tool)?;
     let (trees, vertices) = (args.trees.len(), args.vertices.len());
     if vertices != 0 && vertices != trees {
         bail!(
@@ -105,13 +100,6 @@ pub fn run(args: &Args) -> Result<()> {
         println!("{}", serde_json::to_string_pretty(&answer.record(None))?);
     } else {
         answer.print(trees, args.tool.len());
-    }
-    Ok(())
-}
-
-fn check_chain(tools: &[ToolSpec]) -> Result<()> {
-    if tools.len() > MOST_TOOLS {
-        bail!("{} tools are no chain of at most {MOST_TOOLS}", tools.len());
     }
     Ok(())
 }

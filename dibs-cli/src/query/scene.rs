@@ -1,8 +1,8 @@
 //! The surfaces of a query, each with its positions, and the closest pair between them and a chain of tools.
 
 use super::answer::{Answer, Touch};
-use super::{LocalTool, ToolSpec};
 use crate::mesh_file::Lengths;
+use crate::tool::{LocalTool, ToolSpec};
 use crate::tree_file::{self, AnyTree};
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::Vec3;

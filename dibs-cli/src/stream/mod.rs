@@ -6,6 +6,7 @@ mod player;
 mod report;
 
 use crate::mesh_file::Lengths;
+use crate::motion::{MotionFile, MotionRate};
 use crate::tree_file::{self, AnyTree};
 use crate::{modes, overwrite};
 use anyhow::{Context, Result, anyhow, bail};
@@ -19,41 +20,40 @@ use player::Player;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-#[command(after_help = "\
+#[command(mut_arg("motion", |motion| motion.required(true)), mut_arg("motion_rate", |rate| rate.alias("rate")), after_help = "\
 Examples:
-  dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --partial 0.05 --loop
-  dibs stream heart.dibs heart.pc2 --to tcp:192.168.1.20:5000 --rate 40
-  dibs stream heart.dibs heart.pc2 --to udp:192.168.1.20:5000 --rate 1000 --modes
-  dibs stream heart.ply heart.pc2 --to unix:/tmp/uart --frames 100 --json
-  dibs stream heart.dibs heart.pc2 --to serial:/dev/ttyUSB0 --key heart.key
-  dibs stream heart.dibs heart.pc2 --to udp:192.168.1.20:5000@5001 --key heart.key --receiver 3
+  dibs stream heart.dibs --motion heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --partial 0.05 --loop
+  dibs stream heart.dibs --motion heart.pc2 --to tcp:192.168.1.20:5000 --motion-rate 40
+  dibs stream heart.dibs --motion heart.pc2 --to udp:192.168.1.20:5000 --motion-rate 1000 --weights
+  dibs stream heart.ply --motion heart.pc2 --to unix:/tmp/uart --frames 100 --json
+  dibs stream heart.dibs --motion heart.pc2 --to serial:/dev/ttyUSB0 --key heart.key
+  dibs stream heart.dibs --motion heart.pc2 --to udp:192.168.1.20:5000@5001 --key heart.key --receiver 3
 
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
 pub struct Args {
     /// The tree that the receiver has (NAME.dibs), or its mesh, of which `dibs build` with default
     /// options makes the same tree
-    surface: PathBuf,
-    /// The motion, with a position for each of the mesh's vertices in every frame: .pc2, .npy or a series (heart_%03d.vtp)
-    motion: PathBuf,
+    tree: PathBuf,
+    #[command(flatten)]
+    motion: MotionFile,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
     /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next one
     #[arg(long)]
     to: Target,
-    /// Frames a second; by default the motion's own rate
-    #[arg(long, value_name = "HZ")]
-    rate: Option<f64>,
+    #[command(flatten)]
+    motion_rate: MotionRate,
     /// 6 bytes a vertex instead of 12, in a box around each frame
     #[arg(long)]
     quantise: bool,
     /// Send only the vertices that moved by more than this (in the mesh's unit)
-    #[arg(long, value_name = "TOLERANCE")]
+    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
     partial: Option<f32>,
     /// Send the weights of the displacement modes that the tree was built with, instead of positions
-    #[arg(long, conflicts_with_all = ["quantise", "partial"])]
-    modes: bool,
+    #[arg(long, alias = "modes", conflicts_with_all = ["quantise", "partial"])]
+    weights: bool,
     /// Put a tag on every packet, by the 128-bit key in this file: 32 hexadecimal digits. Waits for the
     /// receiver's challenge
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "KEY")]
     key: Option<PathBuf>,
     /// The receiver's challenge, where it has no way to report one: 0, if it was made with none
     #[arg(long, value_name = "NUMBER", requires = "key")]
@@ -84,32 +84,23 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    overwrite::check([&args.surface, &args.motion].into_iter().chain(&args.key), [])?;
+    let path = args.motion.required()?;
+    overwrite::check([&args.tree, path].into_iter().chain(&args.key), [])?;
     let key = args.key.as_deref().map(key::read).transpose()?;
-    let (order, origin) = order(&args.surface, &args.lengths)?;
-    let motion = args.lengths.motion(&args.motion, origin)?;
-    let name = args.motion.display();
-    if motion.frames.is_empty() {
-        bail!("{name}: the motion has no frame");
-    }
+    let (order, origin) = order(&args.tree, &args.lengths)?;
+    let motion = args.lengths.motion(path, origin)?;
+    let rate = args.motion_rate.of(&motion, path)?;
+    let name = path.display();
     order.check_faces(&motion.faces).map_err(|error| anyhow!("{name}: {error}"))?;
     for (number, frame) in motion.frames.iter().enumerate() {
         order.to_rows(frame).map_err(|error| anyhow!("{name}, frame {number}: {error}"))?;
-    }
-    let rate = match (args.rate, motion.rate) {
-        (Some(rate), _) => rate,
-        (None, recorded) if recorded > 0.0 => f64::from(recorded),
-        _ => bail!("{name}: the file does not say how fast it was recorded; give --rate"),
-    };
-    if !(1e-3..=1e5).contains(&rate) {
-        bail!("--rate {rate}: a rate is 0.001 to 100000 frames a second");
     }
     if args.partial.is_some_and(|tolerance| !(tolerance >= 0.0 && tolerance.is_finite())) {
         bail!("--partial: a tolerance is a length of at least 0");
     }
     let weights =
-        if args.modes { Some(modes::weights(&args.surface, &order, &motion)?) } else { None };
-    let recording = Recording { frames: motion.frames, weights, rate };
+        if args.weights { Some(modes::weights(&args.tree, &order, &motion)?) } else { None };
+    let recording = Recording { name: name.to_string(), frames: motion.frames, weights, rate };
     if args.mtu == "64" {
         connect::<64>(args, key, order, &recording)
     } else {
@@ -119,6 +110,8 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// The surface to send.
 struct Recording {
+    /// The motion's file.
+    name: String,
     /// Positions, in the mesh's order.
     frames: Vec<Vec<Vec3>>,
     /// The weights of each frame, if weights are sent.

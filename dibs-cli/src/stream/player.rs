@@ -167,7 +167,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                 self.display.show(&self.sender, &sent);
             }
             Err(SendError::Line(error)) => self.reconnect(&error)?,
-            Err(error) => return Err(anyhow!("{}: {error}", self.args.motion.display())),
+            Err(error) => return Err(anyhow!("{}: {error}", self.recording.name)),
         }
         Ok(())
     }

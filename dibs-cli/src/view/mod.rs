@@ -3,9 +3,10 @@
 mod pack;
 
 use crate::mesh_file::Lengths;
+use crate::motion::{MotionFile, MotionRate};
 use crate::query::rows;
 use crate::tree_file::{self, AnyTree};
-use crate::{overwrite, recorded::tools};
+use crate::{overwrite, tool};
 use anyhow::{Context, Result, bail, ensure};
 use dibs_build::glam::Vec3;
 use dibs_build::write_atomically;
@@ -19,29 +20,28 @@ const PAGE: &str = "dibs-viewer.html";
 const MARK: &str = "<!--data-->";
 
 #[derive(clap::Args)]
-#[command(after_help = "\
+#[command(mut_arg("motion_rate", |rate| rate.requires("motion")), after_help = "\
 Examples:
-  dibs view heart.dibs heart.pc2 -o heart.html
-  dibs view heart.dibs heart.pc2 --path tools.csv -o replay.html
+  dibs view heart.dibs --motion heart.pc2 -o heart.html
+  dibs view heart.dibs --motion heart.pc2 --path tools.csv -o replay.html
 
 The file needs nothing else and no network: a browser opens it. The query in it is the one of this program, compiled
 to WebAssembly.")]
 pub struct Args {
     /// A tree file that `dibs build` wrote
     tree: PathBuf,
-    /// The surface's motion: .pc2, .npy or a series (heart_%03d.vtp) of the built mesh; by default the rest shape
-    motion: Option<PathBuf>,
+    #[command(flatten)]
+    motion: MotionFile,
     /// The HTML file to write
     #[arg(short, long)]
     output: PathBuf,
-    /// The instrument at each millisecond, as `dibs track` takes it; otherwise it is in the viewer's hand
+    /// The instrument at each millisecond, as `dibs track` takes it: `-` is standard input; otherwise it is in the viewer's hand
     #[arg(long, value_name = "TOOLS")]
     path: Option<PathBuf>,
-    /// Frames a second of the motion; by default the number in its file
-    #[arg(long, value_name = "HZ", requires = "motion")]
-    motion_rate: Option<f32>,
+    #[command(flatten)]
+    motion_rate: MotionRate,
     /// The page without data; by default dibs-viewer.html beside this program
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "PAGE")]
     page: Option<PathBuf>,
     #[command(flatten)]
     lengths: Lengths,
@@ -51,7 +51,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let inputs = [&args.tree].into_iter().chain(&args.motion).chain(&args.path);
+    let inputs = [&args.tree].into_iter().chain(args.motion.given()).chain(&args.path);
     let page = page_path(args.page.as_deref())?;
     overwrite::check(inputs.chain([&page]), [&args.output])?;
     let page = read_page(&page)?;
@@ -102,16 +102,16 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
             args.tree.display()
         );
     }
-    let (frames, rate) = match &args.motion {
+    let (frames, rate) = match args.motion.given() {
         Some(path) => motion(args, tree, path)?,
         None => (Vec::new(), 1.0),
     };
-    if args.motion.is_none() && tree.vertex_count() > 0 && tree.rest_position(0).is_none() {
-        bail!("{}: the tree has no rest shape, give a motion", args.tree.display());
+    if args.motion.given().is_none() && tree.vertex_count() > 0 && tree.rest_position(0).is_none() {
+        bail!("{}: the tree has no rest shape, give --motion", args.tree.display());
     }
     let origin = tree.origin().into();
     let path = match &args.path {
-        Some(path) => tools(path, |tool| tool.numbers(origin))?,
+        Some(path) => tool::path(path, |tool| tool.numbers(origin))?,
         None => Vec::new(),
     };
     let facts = json!({
@@ -133,13 +133,10 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
 }
 
 /// The frames of a motion in the order of the tree's rows, none of them stretched too far.
-fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec<Vec<Vec3>>, f32)> {
+fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec<Vec<Vec3>>, f64)> {
     let name = path.display();
     let motion = args.lengths.motion_of(tree, path)?;
-    let rate = args.motion_rate.unwrap_or(motion.rate);
-    if !(rate > 0.0 && rate.is_finite()) || motion.frames.is_empty() {
-        bail!("{name}: has {} frames at {rate} a second; give --motion-rate", motion.frames.len());
-    }
+    let rate = args.motion_rate.of(&motion, path)?;
     let mut frames = Vec::with_capacity(motion.frames.len());
     for (number, frame) in motion.frames.iter().enumerate() {
         let frame = rows(tree, path, number, frame)?;

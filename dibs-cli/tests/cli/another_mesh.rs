@@ -105,7 +105,7 @@ fn a_motion_of_another_mesh_or_unit_is_refused_before_anything_is_sent() {
     for line in [
         "query heart.dibs --vertices large.pc2 --frame 3 --tool sphere:0,0,150,5 --json",
         "track heart.dibs --motion large.pc2 --path path.csv",
-        "stream heart.dibs large.pc2 --to udp:127.0.0.1:9 --frames 1",
+        "stream heart.dibs --motion large.pc2 --to udp:127.0.0.1:9 --frames 1",
     ] {
         let error = fails(folder, line);
         assert!(
@@ -116,7 +116,7 @@ fn a_motion_of_another_mesh_or_unit_is_refused_before_anything_is_sent() {
     for line in [
         "query metres.dibs --vertices heart.pc2 --frame 3 --tool sphere:0,0,150,5 --json",
         "track metres.dibs --motion heart.pc2 --path path.csv",
-        "stream metres.dibs heart.pc2 --to udp:127.0.0.1:9 --frames 1",
+        "stream metres.dibs --motion heart.pc2 --to udp:127.0.0.1:9 --frames 1",
     ] {
         let error = fails(folder, line);
         assert!(error.starts_with("heart.pc2") && error.contains("--unit m"), "{line}: {error}");
@@ -125,7 +125,7 @@ fn a_motion_of_another_mesh_or_unit_is_refused_before_anything_is_sent() {
         folder,
         "query metres.dibs --unit m --vertices heart.pc2 --frame 3 --tool sphere:0,0,150000,5 --json",
     );
-    assert!(fails(folder, "stretch heart.ply large.pc2").contains("vertices"));
+    assert!(fails(folder, "stretch heart.ply --motion large.pc2").contains("vertices"));
 }
 
 /// Each file of a series has the numbers of another mesh of as many vertices.
@@ -145,14 +145,14 @@ fn the_files_of_a_series_have_the_triangles_of_the_tree() {
     let right = json(folder, &format!("query rest.dibs --vertices own_%03d.obj --frame 1 {TOOL}"));
     assert!((right["separation"].as_f64().unwrap() - 7.0).abs() < 1e-3, "{right}");
     succeeds(folder, "track rest.dibs --motion own_%03d.obj --motion-rate 9 --path path.csv");
-    succeeds(folder, "stretch rest.obj own_%03d.obj");
+    succeeds(folder, "stretch rest.obj --motion own_%03d.obj");
     succeeds(folder, "build rest.obj -o more.dibs --motion own_%03d.obj");
     for line in [
         &format!("query rest.dibs --vertices other_%03d.obj --frame 1 {TOOL}"),
         "track rest.dibs --motion other_%03d.obj --motion-rate 9 --path path.csv",
-        "stream rest.dibs other_%03d.obj --to udp:127.0.0.1:9 --rate 9 --frames 1",
-        "stream rest.obj other_%03d.obj --to udp:127.0.0.1:9 --rate 9 --frames 1",
-        "stretch rest.obj other_%03d.obj",
+        "stream rest.dibs --motion other_%03d.obj --to udp:127.0.0.1:9 --motion-rate 9 --frames 1",
+        "stream rest.obj --motion other_%03d.obj --to udp:127.0.0.1:9 --motion-rate 9 --frames 1",
+        "stretch rest.obj --motion other_%03d.obj",
         "build rest.obj -o more.dibs --motion other_%03d.obj",
         "build rest.obj -o more.dibs --motion other_%03d.obj --modes 2",
     ] {
@@ -259,7 +259,7 @@ fn the_rest_shape_is_not_stretched() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     succeeds(folder, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
-    succeeds(folder, "stretch heart.ply heart.pc2 --limits heart.limits --margin 0.1");
+    succeeds(folder, "stretch heart.ply --motion heart.pc2 --limits heart.limits --margin 0.1");
     succeeds(folder, "build heart.ply -o heart.dibs --limits heart.limits");
     let answer = json(folder, "query heart.dibs --tool sphere:0,0,150,5 --json");
     assert!((answer["stretch"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{answer}");

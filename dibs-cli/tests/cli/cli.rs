@@ -180,7 +180,7 @@ fn results_that_nobody_reads_or_no_disk_holds() {
         "generate heart --triangles 320 -o other.ply --motion other.pc2",
         "build heart.ply -o other.dibs --json",
         "build heart.ply -o other.dibs",
-        "stretch heart.ply heart.pc2 --limits other.limits",
+        "stretch heart.ply --motion heart.pc2 --limits other.limits",
         "inspect heart.dibs",
         "inspect heart.dibs --json",
         "query heart.dibs --tool sphere:0,0,150,5 --json",
@@ -191,7 +191,7 @@ fn results_that_nobody_reads_or_no_disk_holds() {
         "man",
         "--version",
         "query --help",
-        &format!("stream heart.dibs heart.pc2 {to} --frames 3 --json"),
+        &format!("stream heart.dibs --motion heart.pc2 {to} --frames 3 --json"),
     ] {
         let run = |stdout: std::process::Stdio| {
             let words = line.split_whitespace();

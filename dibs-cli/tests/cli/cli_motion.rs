@@ -60,8 +60,11 @@ fn weights_are_streamed() {
     succeeds(folder, "build heart.ply -o heart.dibs --motion heart.pc2 --modes 2");
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
-    let to = format!("--to udp:{} --modes", socket.local_addr().unwrap());
-    let sent = json(folder, &format!("stream heart.dibs heart.pc2 {to} --rate 500 --json"));
+    let to = format!("--to udp:{} --weights", socket.local_addr().unwrap());
+    let sent = json(
+        folder,
+        &format!("stream heart.dibs --motion heart.pc2 {to} --motion-rate 500 --json"),
+    );
     assert_eq!(sent["frames"], 25);
     // A begin of 64 bytes, two weights in 32, and a commit of 32.
     assert!(sent["bytes_per_frame"].as_f64().unwrap() >= 128.0, "{sent}");
@@ -90,9 +93,9 @@ fn weights_are_streamed() {
     assert_eq!(published, 25);
 
     succeeds(folder, "build heart.ply -o bare.dibs");
-    let error = fails(folder, &format!("stream bare.dibs heart.pc2 {to}"));
+    let error = fails(folder, &format!("stream bare.dibs --motion heart.pc2 {to}"));
     assert!(error.contains("--motion and --modes"), "{error}");
-    let error = fails(folder, &format!("stream heart.ply heart.pc2 {to}"));
+    let error = fails(folder, &format!("stream heart.ply --motion heart.pc2 {to}"));
     assert!(error.contains("heart.ply"), "{error}");
 }
 
@@ -101,8 +104,7 @@ fn limits_are_learned_from_a_motion_and_hold_it() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
-    let line =
-        "stretch heart.ply heart.pc2 --margin 0.05 --limits heart.limits --picture heart.svg";
+    let line = "stretch heart.ply --motion heart.pc2 --margin 0.05 --limits heart.limits --picture heart.svg";
     let learned = json(folder, &format!("{line} --json"));
     let worst = &learned["worst"][0];
     let (largest, uniform) =
@@ -110,7 +112,10 @@ fn limits_are_learned_from_a_motion_and_hold_it() {
     assert!((largest * 1.05 - uniform.unwrap()).abs() < 1e-3, "{learned}");
     assert_eq!(learned["percentiles"][5][1], worst["stretch"]);
     assert!(std::fs::read_to_string(folder.join("heart.svg")).unwrap().contains("<svg"));
-    assert!(succeeds(folder, "stretch heart.ply heart.pc2 --edges").contains("worst    triangle"));
+    assert!(
+        succeeds(folder, "stretch heart.ply --motion heart.pc2 --construction paper")
+            .contains("worst    triangle")
+    );
 
     // The learned limits hold the motion. Lower ones do not: the error names a triangle and the remedy.
     let built = json(
@@ -141,7 +146,7 @@ fn limits_that_cannot_be_used_are_named() {
     let folder = folder.path();
     succeeds(folder, "generate heart --triangles 1000 -o heart.ply --motion heart.pc2");
     succeeds(folder, "generate heart --triangles 998 -o other.ply --motion other.pc2");
-    succeeds(folder, "stretch heart.ply heart.pc2 --limits heart.limits");
+    succeeds(folder, "stretch heart.ply --motion heart.pc2 --limits heart.limits");
     let text = std::fs::read_to_string(folder.join("heart.limits")).unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
     let lines: Vec<&str> = text.lines().collect();
@@ -154,8 +159,8 @@ fn limits_that_cannot_be_used_are_named() {
         ("build heart.ply -o t.dibs --limits low.limits", "'0.5' is not a limit"),
         ("build heart.ply -o t.dibs --limits none.limits", "no file of stretch limits"),
         ("build heart.ply -o t.dibs --limits missing.limits", "cannot be read"),
-        ("stretch heart.ply other.pc2", "vertices and the mesh has"),
-        ("stretch heart.ply heart.pc2 --margin=-1", "a margin of -1 makes no sense"),
+        ("stretch heart.ply --motion other.pc2", "vertices and the mesh has"),
+        ("stretch heart.ply --motion heart.pc2 --margin=-1", "a margin of -1 makes no sense"),
         ("build heart.ply -o t.dibs --stretch 0.5", "a stretch limit of 0.5 makes no sense"),
     ] {
         let error = fails(folder, line);

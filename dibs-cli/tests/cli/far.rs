@@ -169,7 +169,7 @@ fn a_heart_far_away_is_answered_as_one_nearby() {
             let error = tick["separation"].as_f64().unwrap() + 2.0 - heart.distance(shape, centre);
             assert!(error.abs() <= 2e-3, "{tick}: off by {error}");
         }
-        let stretches = json(folder, &format!("stretch heart.obj f%d.obj {unit} --json"));
+        let stretches = json(folder, &format!("stretch heart.obj --motion f%d.obj {unit} --json"));
         assert!((1.0..1.7).contains(&stretches["uniform_limit"].as_f64().unwrap()));
     }
 }
@@ -191,8 +191,8 @@ fn a_far_motion_is_sent_from_the_origin() {
             listener.accept().unwrap().0.read_to_end(&mut bytes).unwrap();
             bytes
         });
-        let to = format!("--to tcp:127.0.0.1:{port} --rate 20 --frames 1");
-        succeeds(folder, &format!("stream {surface} f%d.obj {to} --json"));
+        let to = format!("--to tcp:127.0.0.1:{port} --motion-rate 20 --frames 1");
+        succeeds(folder, &format!("stream {surface} --motion f%d.obj {to} --json"));
         let frames = Frames::<N>::new();
         let (writer, mut reader) = frames.split().unwrap();
         let monitor = StretchMonitor::new(&tree).unwrap();

@@ -17,5 +17,6 @@ mod overwrite;
 mod pace;
 mod program;
 mod stream;
+mod tools;
 mod track;
 mod view;

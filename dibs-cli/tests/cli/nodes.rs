@@ -155,7 +155,10 @@ fn nodes_are_streamed() {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
     let to = format!("--to udp:{}", socket.local_addr().unwrap());
-    let sent = json(folder, &format!("stream heart.dibs nodes.pc2 {to} --rate 500 --json"));
+    let sent = json(
+        folder,
+        &format!("stream heart.dibs --motion nodes.pc2 {to} --motion-rate 500 --json"),
+    );
     assert_eq!(sent["frames"], 12);
 
     let blob: &'static [u8] = std::fs::read(folder.join("heart.dibs")).unwrap().leak();

@@ -22,7 +22,7 @@ fn inputs() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     succeeds(at, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
-    succeeds(at, "stretch heart.ply heart.pc2 --limits heart.limits");
+    succeeds(at, "stretch heart.ply --motion heart.pc2 --limits heart.limits");
     succeeds(at, "build heart.ply -o tree.dibs --limits heart.limits");
     // A mesh is told by its content, not by its name.
     fs::copy(at.join("heart.ply"), at.join("mesh.dibs")).unwrap();
@@ -54,17 +54,20 @@ fn no_output_replaces_an_input() {
         ("build heart.ply --labels labels.dibs -o labels.dibs", "labels.dibs"),
         ("build heart.ply --limits limits.dibs -o limits.dibs", "limits.dibs"),
         ("build heart.ply --motion motion.dibs -o motion.dibs", "motion.dibs"),
-        ("stretch heart.ply heart.pc2 --limits heart.ply", "heart.ply"),
-        ("stretch heart.ply heart.pc2 --picture heart.pc2", "heart.pc2"),
-        ("stretch heart.ply frame_%d.ply --limits frame_2.ply", "frame_2.ply"),
-        ("stretch scene.gltf heart.pc2 --limits scene.gltf", "scene.gltf"),
+        ("stretch heart.ply --motion heart.pc2 --limits heart.ply", "heart.ply"),
+        ("stretch heart.ply --motion heart.pc2 --picture heart.pc2", "heart.pc2"),
+        ("stretch heart.ply --motion frame_%d.ply --limits frame_2.ply", "frame_2.ply"),
+        ("stretch scene.gltf --motion heart.pc2 --limits scene.gltf", "scene.gltf"),
         ("query tree.dibs --poses poses.csv -o poses.csv", "poses.csv"),
         ("query tree.dibs --poses poses.csv -o tree.dibs", "tree.dibs"),
         ("query tree.dibs --poses poses.csv --vertices heart.ply -o heart.ply", "heart.ply"),
         ("view tree.dibs --page page.html -o tree.dibs", "tree.dibs"),
-        ("view tree.dibs heart.pc2 --page page.html -o heart.pc2", "heart.pc2"),
+        ("view tree.dibs --motion heart.pc2 --page page.html -o heart.pc2", "heart.pc2"),
         ("view tree.dibs --page page.html -o page.html", "page.html"),
-        ("view tree.dibs heart.pc2 --path poses.csv --page page.html -o poses.csv", "poses.csv"),
+        (
+            "view tree.dibs --motion heart.pc2 --path poses.csv --page page.html -o poses.csv",
+            "poses.csv",
+        ),
     ] {
         let error = fails(at, line);
         assert!(
@@ -96,8 +99,8 @@ fn no_output_replaces_another() {
     for line in [
         "generate heart --triangles 320 -o new.ply --motion new.ply",
         "generate heart --triangles 320 -o new.ply --motion ./new.ply",
-        "stretch heart.ply heart.pc2 --limits new --picture new",
-        "stretch heart.ply heart.pc2 --limits poses.csv --picture ./poses.csv",
+        "stretch heart.ply --motion heart.pc2 --limits new --picture new",
+        "stretch heart.ply --motion heart.pc2 --limits poses.csv --picture ./poses.csv",
     ] {
         let error = fails(at, line);
         assert!(error.contains("same file as the output"), "{line}: {error}");

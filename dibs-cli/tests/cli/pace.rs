@@ -92,7 +92,9 @@ fn datagrams_of_a_frame_are_spread() {
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
     let to = format!("--to udp:{}", socket.local_addr().unwrap());
-    let line = format!("stream heart.ply heart.pc2 {to} --rate 10 --frames 9 --mtu 64 --json");
+    let line = format!(
+        "stream heart.ply --motion heart.pc2 {to} --motion-rate 10 --frames 9 --mtu 64 --json"
+    );
     let mut spans = BTreeMap::new();
     thread::scope(|scope| {
         let stream = scope.spawn(|| json(folder, &line));

@@ -19,7 +19,7 @@ fn a_page_is_written_whole_or_not_at_all() {
     fs::write(folder.join("tools.csv"), "sphere:-0,0.1,90,2\ncapsule:0,0,90,0,0,120,2.5\n")
         .unwrap();
 
-    let view = "view <i>.dibs heart.pc2 --page page.html -o out.html";
+    let view = "view <i>.dibs --motion heart.pc2 --page page.html -o out.html";
     assert!(succeeds(folder, &format!("{view} --path tools.csv")).starts_with("written  out.html"));
     let page = fs::read_to_string(folder.join("out.html")).unwrap();
     assert!(page.starts_with("<p>before</p><script") && page.ends_with("</script>\n<p>after</p>"));
@@ -44,7 +44,7 @@ fn a_page_is_written_whole_or_not_at_all() {
     let error = fails(folder, &format!("{view} --path tools.csv"));
     assert!(error.contains("tools.csv, line 2"), "{error}");
     succeeds(folder, "build heart.ply -o tight.dibs --stretch 1.01");
-    let error = fails(folder, "view tight.dibs heart.pc2 --page page.html -o out.html");
+    let error = fails(folder, "view tight.dibs --motion heart.pc2 --page page.html -o out.html");
     assert!(error.contains("frame ") && error.contains("--stretch"), "{error}");
     assert!(!folder.join("out.html").exists());
 }

@@ -213,8 +213,8 @@ fn pipes_devices_and_folders_are_refused_at_once() {
         ("build folder.ply -o a.dibs", "it is a folder"),
         ("build m.obj -o a.dibs --labels pipe.ply", "pipe or a device"),
         ("build m.obj -o a.dibs --limits zero.ply", "pipe or a device"),
-        ("stretch m.obj zero.ply", "pipe or a device"),
-        ("stretch m.obj %dpe.ply", "no file has this name"),
+        ("stretch m.obj --motion zero.ply", "pipe or a device"),
+        ("stretch m.obj --motion %dpe.ply", "no file has this name"),
     ] {
         let message = fails(at, line);
         assert!(message.contains(says), "{line}: {message}");

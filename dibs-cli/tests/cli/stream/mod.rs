@@ -43,7 +43,7 @@ fn heart() -> tempfile::TempDir {
 }
 
 fn stream(folder: &Path, line: &str) -> Child {
-    program(folder, &format!("stream heart.dibs heart.pc2 --json {line}"))
+    program(folder, &format!("stream heart.dibs --motion heart.pc2 --json {line}"))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -81,7 +81,7 @@ fn assert_all(seen: &Seen, totals: &Value) {
 #[test]
 fn floats_over_tcp_arrive_to_the_bit() {
     let folder = heart();
-    let (seen, output) = over_tcp(folder.path(), "--rate 200", NoMac);
+    let (seen, output) = over_tcp(folder.path(), "--motion-rate 200", NoMac);
     let totals = totals(&output);
     assert_all(&seen, &totals);
     assert_eq!((seen.error, seen.stated), (0.0, 0.0));
@@ -94,7 +94,7 @@ fn floats_over_tcp_arrive_to_the_bit() {
 #[test]
 fn quantised_frames_are_half_as_long_and_keep_their_stated_error() {
     let folder = heart();
-    let (seen, output) = over_tcp(folder.path(), "--rate 200 --quantise", NoMac);
+    let (seen, output) = over_tcp(folder.path(), "--motion-rate 200 --quantise", NoMac);
     let totals = totals(&output);
     assert_all(&seen, &totals);
     assert!(seen.error > 0.0 && seen.stated < 0.01, "{} of {}", seen.error, seen.stated);
@@ -106,7 +106,7 @@ fn quantised_frames_are_half_as_long_and_keep_their_stated_error() {
 fn partial_frames_carry_what_moved() {
     let folder = heart();
     let (seen, output) =
-        over_tcp(folder.path(), "--rate 100 --quantise --partial 1 --mtu 64", NoMac);
+        over_tcp(folder.path(), "--motion-rate 100 --quantise --partial 1 --mtu 64", NoMac);
     let totals = totals(&output);
     assert_all(&seen, &totals);
     assert_eq!(seen.largest, 64);
@@ -121,7 +121,7 @@ fn unix_socket_and_loop() {
     let folder = heart();
     let path = folder.path().join("bus");
     let listener = std::os::unix::net::UnixListener::bind(&path).unwrap();
-    let child = stream(folder.path(), "--to unix:bus --rate 200 --loop --frames 40");
+    let child = stream(folder.path(), "--to unix:bus --motion-rate 200 --loop --frames 40");
     let (socket, _) = listener.accept().unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
     let (seen, output) = receive(folder.path(), &mut Bytes::new(socket), NoMac, child);
@@ -134,7 +134,7 @@ fn datagrams() {
     let folder = heart();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
-    let line = format!("--to udp:{} --rate 100 --quantise", socket.local_addr().unwrap());
+    let line = format!("--to udp:{} --motion-rate 100 --quantise", socket.local_addr().unwrap());
     let child = stream(folder.path(), &line);
     let (seen, output) = receive(folder.path(), &mut Datagrams(socket), NoMac, child);
     assert_all(&seen, &totals(&output));
@@ -145,7 +145,7 @@ fn datagrams() {
 fn the_rate_is_kept() {
     let folder = heart();
     let start = Instant::now();
-    let (seen, output) = over_tcp(folder.path(), "--rate 20 --quantise", NoMac);
+    let (seen, output) = over_tcp(folder.path(), "--motion-rate 20 --quantise", NoMac);
     assert_all(&seen, &totals(&output));
     let last = seen.last_begun.expect("frames came");
     assert!(last - start >= Duration::from_millis(50 * (FRAMES as u64 - 1)));
@@ -172,7 +172,7 @@ fn with_a_key_the_receiver_believes_and_without_it_nothing() {
     share_with_nobody(&folder.join("other.key"));
     let mac = || AesCmac::new(&KEY, 0, 0xC0FFEE);
     for line in ["--key heart.key --quantise", "--key heart.key --quantise --mtu 64"] {
-        let (seen, output) = over_tcp(folder, &format!("--rate 200 {line}"), mac());
+        let (seen, output) = over_tcp(folder, &format!("--motion-rate 200 {line}"), mac());
         assert_all(&seen, &totals(&output));
     }
 
@@ -182,12 +182,13 @@ fn with_a_key_the_receiver_believes_and_without_it_nothing() {
     assert!(error.contains("has it the same key?") && error.lines().count() == 1, "{error}");
     // Sent all the same, under the right challenge and a wrong key; and without one.
     for line in ["--key other.key --challenge 12648430", ""] {
-        let (seen, _) = over_tcp(folder, &format!("--rate 500 {line}"), mac());
+        let (seen, _) = over_tcp(folder, &format!("--motion-rate 500 {line}"), mac());
         assert_eq!(seen.published, 0);
         assert!(seen.rejected > 100, "{} rejected", seen.rejected);
     }
     // A receiver without a way back: the challenge is given.
-    let (seen, output) = over_tcp(folder, "--rate 200 --key heart.key --challenge 12648430", mac());
+    let (seen, output) =
+        over_tcp(folder, "--motion-rate 200 --key heart.key --challenge 12648430", mac());
     assert_all(&seen, &totals(&output));
 }
 
@@ -209,10 +210,13 @@ fn what_cannot_be_streamed_is_one_sentence() {
         (format!("{to} --key text.key"), "text.key: a key file holds 32 hexadecimal digits"),
         #[cfg(unix)]
         (format!("{to} --key open.key"), "open.key: other users can read"),
-        (format!("{to} --rate 0"), "--rate 0: a rate is 0.001 to 100000 frames a second"),
-        (format!("{to} --rate 1e-30"), "a rate is 0.001 to 100000 frames a second"),
+        (
+            format!("{to} --motion-rate 0"),
+            "heart.pc2: 0 frames a second; give a --motion-rate from 0.001 to 100000",
+        ),
+        (format!("{to} --motion-rate 1e-30"), "a --motion-rate from 0.001 to 100000"),
         (format!("{to} --partial=-1"), "--partial: a tolerance"),
-        (format!("{to} --modes"), "--motion and --modes"),
+        (format!("{to} --weights"), "--motion and --modes"),
         ("--to unix:absent/bus".to_owned(), "unix:absent/bus: cannot be opened"),
     ];
     for (line, part) in cases {
@@ -242,7 +246,7 @@ fn datagrams_with_a_key() {
             to += &format!("@{}", free.port());
             socket.connect(free).unwrap();
         }
-        let line = format!("--to {to} --rate 100 --quantise --key heart.key --receiver 3");
+        let line = format!("--to {to} --motion-rate 100 --quantise --key heart.key --receiver 3");
         let child = stream(folder, &line);
         let mac = AesCmac::new(&KEY, 3, 0xC0FFEE);
         let (seen, output) = receive(folder, &mut Datagrams(socket), mac, child);
@@ -255,7 +259,7 @@ fn datagrams_with_a_key() {
 fn an_interrupt_prints_the_totals() {
     let folder = heart();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let line = format!("--to tcp:{} --rate 100 --loop", listener.local_addr().unwrap());
+    let line = format!("--to tcp:{} --motion-rate 100 --loop", listener.local_addr().unwrap());
     let child = stream(folder.path(), &line);
     let (mut socket, _) = listener.accept().unwrap();
     let mut some = [0; 20_000];
@@ -273,7 +277,7 @@ fn a_broken_connection_is_made_again() {
     let folder = heart();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let to = format!("--to tcp:{}", listener.local_addr().unwrap());
-    let child = stream(folder.path(), &format!("{to} --rate 50 --loop --frames 75"));
+    let child = stream(folder.path(), &format!("{to} --motion-rate 50 --loop --frames 75"));
     let (mut first, _) = listener.accept().unwrap();
     first.read_exact(&mut [0; 20_000]).unwrap();
     drop(first);
@@ -285,7 +289,7 @@ fn a_broken_connection_is_made_again() {
     assert!(seen.published > 30 && totals["acknowledged"] == 75, "{totals}");
 
     // Nobody comes back.
-    let child = stream(folder.path(), &format!("{to} --rate 50 --loop --retry 1"));
+    let child = stream(folder.path(), &format!("{to} --motion-rate 50 --loop --retry 1"));
     drop(listener.accept().unwrap());
     drop(listener);
     let output = child.wait_with_output().unwrap();
@@ -301,7 +305,7 @@ fn a_broken_connection_is_made_again() {
 fn a_receiver_that_reads_nothing_is_named() {
     let folder = heart();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let to = format!("--to tcp:{} --rate 100000 --loop", listener.local_addr().unwrap());
+    let to = format!("--to tcp:{} --motion-rate 100000 --loop", listener.local_addr().unwrap());
     let given_up = stream(folder.path(), &format!("{to} --retry 0"));
     let interrupted = stream(folder.path(), &to);
     let _unread = [listener.accept().unwrap(), listener.accept().unwrap()];
@@ -334,7 +338,7 @@ fn an_interrupt_ends_a_stuck_stream_at_once() {
     let unix = std::os::unix::net::UnixListener::bind(folder.path().join("bus")).unwrap();
     let targets = [format!("tcp:{}", tcp.local_addr().unwrap()), "unix:bus".to_owned()];
     let children =
-        targets.map(|to| stream(folder.path(), &format!("--to {to} --rate 100000 --loop")));
+        targets.map(|to| stream(folder.path(), &format!("--to {to} --motion-rate 100000 --loop")));
     let _unread = (tcp.accept().unwrap(), unix.accept().unwrap());
     std::thread::sleep(Duration::from_secs(2));
     for mut child in children {
@@ -356,7 +360,7 @@ fn datagrams_that_come_back_are_an_error_at_the_end() {
     let folder = heart();
     let closed = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     for frames in [1, 20] {
-        let line = format!("--to udp:{closed} --rate 100 --frames {frames}");
+        let line = format!("--to udp:{closed} --motion-rate 100 --frames {frames}");
         let output = stream(folder.path(), &line).wait_with_output().unwrap();
         let error = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{error}");
@@ -372,7 +376,7 @@ fn datagrams_that_come_back_are_an_error_at_the_end() {
         std::thread::sleep(Duration::from_secs(4));
         drop(socket);
     });
-    let line = format!("--to udp:{closed} --rate 100 --frames 350");
+    let line = format!("--to udp:{closed} --motion-rate 100 --frames 350");
     let output = stream(folder.path(), &line).wait_with_output().unwrap();
     assert!(totals(&output)["refused"].as_u64().unwrap() > 0);
     late.join().unwrap();
@@ -383,7 +387,7 @@ fn datagrams_that_come_back_are_an_error_at_the_end() {
 fn a_receiver_that_acknowledges_nothing_is_named() {
     let folder = heart();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let line = format!("--to tcp:{} --rate 100 --frames 3", listener.local_addr().unwrap());
+    let line = format!("--to tcp:{} --motion-rate 100 --frames 3", listener.local_addr().unwrap());
     let child = stream(folder.path(), &line);
     let (socket, _) = listener.accept().unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();

@@ -168,7 +168,7 @@ pub fn report_of(Run { seconds, faults, c, hand }: Run) -> Result<Value> {
         seconds,
         faults,
         c,
-        path: !hand,
+        script: !hand,
         seed: 1,
         board_only: true,
         output: Some(output.clone()),

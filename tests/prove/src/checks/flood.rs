@@ -75,7 +75,7 @@ pub const CHECK: Check = Check {
 };
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let options = Options { board_only: true, path: true, ..Options::default() };
+    let options = Options { board_only: true, script: true, ..Options::default() };
     let scene = Scene::load(&options)?;
     let machine = Machine::prepare(&options, &scene)?;
     let folder = tempfile::tempdir()?;

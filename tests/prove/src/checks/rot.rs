@@ -43,7 +43,7 @@ pub const CHECK: Check = Check {
 const SECONDS: u32 = 3;
 
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let options = Options { board_only: true, path: true, ..Options::default() };
+    let options = Options { board_only: true, script: true, ..Options::default() };
     let scene = Scene::load(&options)?;
     let machine = Machine::prepare(&options, &scene)?;
     let Machine::Board { program, .. } = &machine else { bail!("no board") };

@@ -44,17 +44,20 @@ pub struct Options {
     /// if absent.
     #[arg(long, requires = "motion")]
     pub mesh: Option<PathBuf>,
-    /// Its motion: a PC2 file with a position for each of the mesh's vertices in every frame.
+    /// Its motion: .pc2, .npy or a series (heart_%03d.vtp), with a position for each of the mesh's vertices in every frame.
     #[arg(long, requires = "mesh")]
     pub motion: Option<PathBuf>,
+    /// Frames a second of the motion; by default the number in its file, or 25 without one.
+    #[arg(long, value_name = "HZ", requires = "motion", allow_negative_numbers = true)]
+    pub motion_rate: Option<f32>,
     /// Limit on stretch of every triangle. By default the generated heart has 1.5, and a mesh of your own has limits
     /// learned from its motion, with a tenth to spare.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub stretch: Option<f32>,
     /// A script moves the instrument instead of the hand, around the surface and through it: nothing stops it, so every
     /// force is seen. With `--c` and `--faults` it does, too.
-    #[arg(long)]
-    pub path: bool,
+    #[arg(long, alias = "path")]
+    pub script: bool,
     /// Seconds of the controller's time to run.
     #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=3600))]
     pub seconds: u32,
@@ -75,7 +78,7 @@ pub struct Options {
     #[arg(long, default_value_t = 1, requires = "faults")]
     pub seed: u64,
     /// Folder for the report and the pictures; `demo` in Cargo's target folder if absent.
-    #[arg(long)]
+    #[arg(short, long)]
     pub output: Option<PathBuf>,
     /// Whether the board may be replaced by this computer where it cannot be had.
     #[arg(skip)]
@@ -88,7 +91,7 @@ pub struct Options {
 impl Options {
     /// What moves the instrument.
     pub const fn robot(&self) -> Robot {
-        if self.path || self.c || self.faults { Robot::Script } else { Robot::Hand }
+        if self.script || self.c || self.faults { Robot::Script } else { Robot::Hand }
     }
 }
 
@@ -124,6 +127,6 @@ pub fn run(options: &Options) -> Result<()> {
 
 /// The demo of `cargo xtask test`, on this computer: the script.
 pub fn on_host(seconds: u32) -> Result<Outcome> {
-    run(&Options { seconds, host: true, path: true, is_built: true, ..Options::default() })
+    run(&Options { seconds, host: true, script: true, is_built: true, ..Options::default() })
         .map(|()| Outcome::Passed)
 }

@@ -38,8 +38,10 @@ pub fn write(scene: &Scene, ticks: &[Tick], folder: &Path) -> Result<()> {
     scene.motion.write_pc2(folder.join("heart.pc2"))?;
     let rate = scene.rate.to_string();
     let mut view = Command::new(&dibs);
-    view.args(["view", "heart.dibs", "heart.pc2", "--path", "tools.csv", "-o", "replay.html"]);
-    view.args(["--motion-rate", &rate, "--page"]).arg(&page).current_dir(folder);
+    view.args(["view", "heart.dibs", "--motion", "heart.pc2", "--path", "tools.csv"]);
+    view.args(["-o", "replay.html", "--motion-rate", &rate, "--page"])
+        .arg(&page)
+        .current_dir(folder);
     let said = quiet(&mut view, Duration::from_mins(1)).context("the replay was not written")?;
     print!("{said}");
     Ok(())

@@ -11,6 +11,8 @@ use super::Options;
 
 /// Triangles of the generated heart: those of the paper's.
 const HEART_TRIANGLES: u32 = 10_272;
+/// Frames a second where a motion's file does not say it.
+const RATE: f32 = 25.0;
 /// Margin of the limits that are learned from a motion.
 const MARGIN: f32 = 0.1;
 
@@ -55,6 +57,12 @@ impl Scene {
              another unit, and its motion"
         );
         ensure!(!motion.frames.is_empty(), "the motion has no frame");
+        let recorded = if motion.rate > 0.0 { motion.rate } else { RATE };
+        let rate = options.motion_rate.unwrap_or(recorded);
+        ensure!(
+            rate > 0.0 && rate.is_finite(),
+            "{rate} frames a second; give a --motion-rate above 0"
+        );
         let (limits, builder) = match (options.stretch, &options.mesh) {
             (None, Some(_)) => {
                 let needed = MotionStretch::new(&mesh, &motion, Paths::default(), &|_| ())
@@ -79,7 +87,7 @@ impl Scene {
         Ok(Self {
             name: given.unwrap_or_else(|| "generated heart".to_owned()),
             surface: Surface { mesh: path, limits },
-            rate: if motion.rate > 0.0 { motion.rate } else { 25.0 },
+            rate,
             triangles: mesh.triangles.iter().map(|t| t.map(|v| row[v as usize])).collect(),
             tree,
             motion,

@@ -5,3 +5,4 @@ mod path;
 mod processors;
 mod proofs;
 mod records;
+mod words;

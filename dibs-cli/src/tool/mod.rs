@@ -1,8 +1,19 @@
-//! A tool in words, `sphere:0,0,150,5`, or as the numbers alone.
+//! A tool, in one grammar wherever a command takes one: `--tool`, `--poses`, `--path`.
 
-use anyhow::{Result, anyhow, bail};
+mod grammar;
+mod lines;
+
+pub use grammar::{chain, one};
+pub use lines::{Lines, path};
+
+use anyhow::{Result, bail};
 use dibs_build::glam::DVec3;
 use dibs_nostd::{Capsule, Sphere};
+
+/// Most tools of a chain.
+const MOST: usize = 8;
+
+const REMEDY: &str = "give X,Y,Z,R for a sphere or X1,Y1,Z1,X2,Y2,Z2,R for a capsule";
 
 /// A tool in the coordinates of the mesh's file, which f32 may not hold.
 #[derive(Clone, Copy, Debug)]
@@ -53,22 +64,8 @@ impl ToolSpec {
     }
 }
 
-/// `sphere:X,Y,Z,R` or `capsule:X1,Y1,Z1,X2,Y2,Z2,R`.
-pub fn parse_tool(text: &str) -> Result<ToolSpec> {
-    let (shape, numbers) = text.split_once(':').ok_or_else(|| anyhow!("no ':' after the shape"))?;
-    let numbers: Vec<f64> = numbers
-        .split(',')
-        .map(|n| n.trim().parse().map_err(|_| anyhow!("'{n}' is not a number")))
-        .collect::<Result<_>>()?;
-    match (shape, numbers.as_slice()) {
-        ("sphere", numbers @ [_, _, _, _]) => tool(numbers),
-        ("capsule", numbers @ [_, _, _, _, _, _, _]) => tool(numbers),
-        _ => bail!("expected sphere:X,Y,Z,R or capsule:X1,Y1,Z1,X2,Y2,Z2,R"),
-    }
-}
-
 /// Four numbers are a sphere, seven a capsule.
-pub fn tool(numbers: &[f64]) -> Result<ToolSpec> {
+fn of_numbers(numbers: &[f64]) -> Result<ToolSpec> {
     let tool = match *numbers {
         [x, y, z, radius] => {
             ToolSpec::Sphere { centre: DVec3::new(x, y, z), radius: radius as f32 }
@@ -77,12 +74,17 @@ pub fn tool(numbers: &[f64]) -> Result<ToolSpec> {
             let (start, end) = (DVec3::new(x1, y1, z1), DVec3::new(x2, y2, z2));
             ToolSpec::Capsule { start, end, radius: radius as f32 }
         }
-        _ => bail!(
-            "{} numbers are no tool: give X,Y,Z,R for a sphere or X1,Y1,Z1,X2,Y2,Z2,R for a capsule",
-            numbers.len()
-        ),
+        _ => bail!("{} numbers are no tool: {REMEDY}", numbers.len()),
     };
     // Wherever the tree is, its numbers must be finite, and its radius and length possible.
     tool.local(if tool.start().is_finite() { tool.start() } else { DVec3::ZERO })?;
     Ok(tool)
+}
+
+/// An error where there are too many tools.
+pub fn check_chain(tools: &[ToolSpec]) -> Result<()> {
+    if tools.len() > MOST {
+        bail!("{} tools are no chain of at most {MOST}", tools.len());
+    }
+    Ok(())
 }

@@ -1,0 +1,37 @@
+//! How a tree is built, in the same words for every command.
+
+use clap::ValueEnum;
+use dibs_build::{Construction, Paths};
+
+/// How a tree is built.
+#[derive(clap::Args)]
+pub struct ConstructionArgs {
+    /// How sections are pinned, measured and split
+    #[arg(long, value_enum, default_value = "default")]
+    construction: Name,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Name {
+    /// Geodesic split
+    Default,
+    /// As published: mid-range pin, section-restricted paths along edges, split by a plane
+    Paper,
+}
+
+impl ConstructionArgs {
+    pub fn construction(&self) -> Construction {
+        match self.construction {
+            Name::Default => Construction::Geodesic,
+            Name::Paper => Construction::Paper,
+        }
+    }
+
+    /// The paths whose stretch counts.
+    pub fn paths(&self) -> Paths {
+        match self.construction {
+            Name::Default => Paths::default(),
+            Name::Paper => Paths::Edges,
+        }
+    }
+}
