@@ -3,7 +3,7 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-use crate::{Builder, BuiltTree, Mesh, ReadOptions, RestSurface, read_labels, read_limits};
+use crate::{Builder, BuiltTree, Mesh, ReadOptions, RestSurface, Unit, read_labels, read_limits};
 
 /// Begins the tree of a build script, from a mesh file or a [`Mesh`]; [`TreeScript::emit`] builds it.
 ///
@@ -100,9 +100,21 @@ impl TreeScript {
         self
     }
 
+    /// The unit of the lengths in the mesh file, which become millimetres: [`ReadOptions::unit`].
+    ///
+    /// ```no_run
+    /// dibs_build::tree("heart.stl").unit(dibs_build::Unit::Metre).emit("heart");
+    /// ```
+    pub fn unit(mut self, unit: Unit) -> Self {
+        self.reading.unit = Some(unit);
+        self
+    }
+
     /// How the mesh file is read.
     pub fn reading(mut self, options: ReadOptions) -> Self {
-        self.reading = ReadOptions { groups: options.groups || self.reading.groups, ..options };
+        let (groups, unit) =
+            (options.groups || self.reading.groups, options.unit.or(self.reading.unit));
+        self.reading = ReadOptions { groups, unit, ..options };
         self
     }
 

@@ -9,11 +9,13 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 
 /// Options of the command line that its sentences advise, and their names here.
-const OPTIONS: [(&str, &str); 6] = [
+const OPTIONS: [(&str, &str); 8] = [
     ("`dibs build --orient` turns them", "orient=True turns them"),
     ("without --strict", "with strict=False"),
     ("--largest-component", "largest_component=True"),
     ("--weld 0", "weld=0"),
+    ("--unit m", "unit='m'"),
+    ("--unit um", "unit='um'"),
     ("--stretch", "stretch"),
     ("--limits", "limits"),
 ];

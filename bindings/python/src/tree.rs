@@ -9,6 +9,7 @@ use dibs_nostd::{FormatError, StretchError, TriangleRow, VertexTable};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::error::sentence;
 use crate::surface::Surface;
 use crate::{bytes, invalid};
 
@@ -99,7 +100,8 @@ impl Tree {
 
     fn warnings(&self) -> Vec<String> {
         let bytes = self.0.bytes().len();
-        of_any_width!(self.0.view(), tree => summarise(tree, bytes)).warnings().collect()
+        let summary = of_any_width!(self.0.view(), tree => summarise(tree, bytes));
+        summary.warnings().map(sentence).collect()
     }
 
     /// The surface with these positions, or at rest, whose vertices move at these velocities.

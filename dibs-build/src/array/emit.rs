@@ -120,6 +120,12 @@ pub struct ModesSummary {
     pub flash_bytes_per_vertex: f64,
 }
 
+/// Least extent (mm) of a surface that is no mistake: an organ in metres that is taken for one in millimetres has less.
+const LEAST_SIZE: f32 = 1.0;
+
+/// Largest such extent (mm): an organ in micrometres has more.
+const LARGEST_SIZE: f32 = 10_000.0;
+
 impl Summary {
     /// Warnings for a user, one sentence each.
     pub fn warnings(&self) -> impl Iterator<Item = String> + use<> {
@@ -130,7 +136,23 @@ impl Summary {
                  controller's stretch check, which would refuse every frame: weld or drop them"
             )
         });
-        sentence.into_iter()
+        sentence.into_iter().chain(self.implausible())
+    }
+
+    /// A warning of a size that no organ has: lengths were read in another unit than theirs.
+    fn implausible(&self) -> Option<String> {
+        let [low, high] = self.bounding_box?;
+        let size = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
+        let (what, unit) = match size {
+            size if size < LEAST_SIZE => ("small", Unit::Metre),
+            size if size > LARGEST_SIZE => ("large", Unit::Micrometre),
+            _ => return None,
+        };
+        let read = self.unit.unwrap_or(Unit::Millimetre.symbol());
+        Some(format!(
+            "the surface is {size:.3} mm across, too {what} for an organ, with lengths taken to be in {read}: give their \
+             unit, as in --unit {unit}, or scale the mesh"
+        ))
     }
 }
 

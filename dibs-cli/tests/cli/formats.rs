@@ -271,6 +271,7 @@ fn units_scale_and_are_shown() {
         let built = json(folder, &format!("build {unit}.ply -o {unit}.dibs {line}"));
         let inspected = json(folder, &format!("inspect {unit}.dibs --json"));
         assert_eq!(built["tree"], inspected);
+        assert!(!built["warnings"].to_string().contains("an organ"), "{built}");
         let bounds: [[f64; 3]; 2] =
             serde_json::from_value(inspected["bounding_box"].clone()).unwrap();
         for (bound, expected) in
@@ -285,14 +286,37 @@ fn units_scale_and_are_shown() {
         assert!((inspected["mean_edge"].as_f64().unwrap() - mean).abs() < 1e-4, "{unit}");
         let text = succeeds(folder, &format!("inspect {unit}.dibs"));
         let shown = format!("61.0000]; mean edge {:.2}", (mean * 100.0).floor() / 100.0);
-        assert!(text.contains(&shown), "{text}");
+        assert!(
+            text.contains(&shown) && text.contains(&format!("8 triangles in {unit}\n")),
+            "{text}"
+        );
         let ask =
             format!("query {unit}.dibs --tool sphere:0,0,60,1 --vertices {unit}.pc2 --frame 0");
         let separation =
             json(folder, &format!("{ask} --unit {unit} --json"))["separation"].as_f64();
         assert!((separation.unwrap() - 26.0).abs() < 1e-3, "{unit}: {separation:?}");
-        let measured = json(folder, &format!("stretch {unit}.ply {unit}.pc2 --unit {unit} --json"));
+        let measured =
+            json(folder, &format!("stretch {unit}.ply --motion {unit}.pc2 --unit {unit} --json"));
         assert!((measured["uniform_limit"].as_f64().unwrap() - 1.21).abs() < 1e-3, "{measured}");
+    }
+    // In another unit than it is read in, no organ has its size.
+    write("um", 1e3);
+    for (name, warning) in [
+        (
+            "m.ply",
+            "the surface is 0.061 mm across, too small for an organ, with lengths taken to be in mm: give their",
+        ),
+        (
+            "um.ply",
+            "the surface is 61000.000 mm across, too large for an organ, with lengths taken to be in mm: give",
+        ),
+    ] {
+        let built = json(folder, &format!("build {name} -o wrong.dibs --json"));
+        let unit = name.trim_end_matches(".ply");
+        let said = built["warnings"].to_string();
+        assert!(said.contains(warning) && said.contains(&format!("--unit {unit},")), "{said}");
+        let right = json(folder, &format!("build {name} -o right.dibs --unit {unit} --json"));
+        assert!(!right["warnings"].to_string().contains("an organ"), "{right}");
     }
 }
 
