@@ -21,10 +21,33 @@ def _dtype(fields: list[tuple[str, str, int]]) -> np.dtype[Any]:
 
 
 ANSWER = _dtype(_dibs.ANSWER)
-"""The record of an answer. Field names are those of `dibs query --json`. Act on the first of `interval`, which holds the
-true separation: it is negative infinity where the tool may be inside at any depth."""
+"""The record of an answer. Act on the first of `interval`. Lengths are in mm, coordinates are those of the mesh's file.
+
+`separation`: the distance from tool to surface; where the tool's axis crosses or is inside, less than 0 by the depth.
+`lower`: the lower end of what the search certifies; below `separation` where a budget ended, or by a depth's tolerance.
+`accuracy`: by how much either may be off, by rounding and by the error of the positions.
+`interval`: both ends with the accuracy. The first is negative infinity where the tool may be inside at any depth.
+`axis_distance`: from the tool's axis, a sphere's centre or a capsule's segment, to the surface; 0 where it crosses.
+`axis_parameter`: the pair's place along the axis, 0 at its start and 1 at its end; 0 for a sphere.
+`point_on_surface`, `point_on_tool`: the closest pair; where the axis crosses or is inside, of its deepest point.
+`direction`: the unit vector that leads out of the tissue; zero where there is none.
+`triangle`: the vertices of the surface's triangle, numbered as in the mesh. Three equal ones where the budget ended first.
+`barycentric`: their weights at `point_on_surface`, of sum 1.
+`label`: the triangle's label, or -1.
+`surface`, `tool`: the pair's surface in a `Scene` and tool in a chain, from 0.
+`side`, `side_reason`: of `Side`; and of `SIDE_REASONS`, why it is undefined.
+`coverage`: of `Coverage`, what the stretch rests on.
+`node_tests`, `triangle_tests`: what the search cost.
+"""
 CONTACT = _dtype(_dibs.CONTACT)
-"""The record of a contact; `pose` is the tool's row."""
+"""The record of a contact. Fields with the names of an `ANSWER` are as there.
+
+`pose`: the row of the tool, or of the chain.
+`separation`: the lower end of the pair's interval.
+`normal`: the unit vector that leads out of the tissue at the pair.
+`velocity`: of the surface there, in mm/s; zero for a surface without velocities.
+`point_on_surface`, `point_on_tool`, `axis_parameter`, `triangle`, `barycentric`, `label`, `surface`, `tool`.
+"""
 SIDE_REASONS: tuple[str, ...] = tuple(_dibs.REASONS)
 """A sentence for each value of the field `side_reason`."""
 

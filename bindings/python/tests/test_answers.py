@@ -1,5 +1,7 @@
 """Answers against trimesh and scipy, which share no code with dibs."""
 
+import itertools
+import pathlib
 import pickle
 import threading
 import time
@@ -122,6 +124,15 @@ class Answers(unittest.TestCase):
         expected = [row[tuple(sorted(corners))] for corners in answers["triangle"].tolist()]
         np.testing.assert_array_equal(answers["label"], expected)
         self.assertTrue((TREE.query(spheres(3))["label"] == -1).all())
+
+    def test_every_field_is_described(self):
+        lines = pathlib.Path(dibs._tree.__file__).read_text(encoding="utf-8").splitlines()
+        for name, dtype in {"ANSWER": dibs.ANSWER, "CONTACT": dibs.CONTACT}.items():
+            start = next(number for number, line in enumerate(lines) if line.startswith(f"{name} = "))
+            fields = itertools.takewhile(lambda line: not line.endswith('"""'), lines[start + 2 :])
+            described = " ".join(fields)
+            for field in dtype.names:
+                self.assertIn(f"`{field}`", described, f"{name} has it")
 
     def test_one_row_many_and_none(self):
         tools = spheres(300)
