@@ -160,6 +160,12 @@ impl FrameCheck {
         &self.order
     }
 
+    /// Positions of a frame: the vertices of the mesh's file, or the nodes.
+    #[must_use]
+    pub const fn positions(&self) -> usize {
+        self.vertices
+    }
+
     /// Positions in the mesh's order (mm), in the order of the tree's rows.
     ///
     /// # Errors

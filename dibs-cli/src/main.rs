@@ -25,7 +25,7 @@ mod view;
 #[cfg(test)]
 mod words;
 
-use clap::{Parser, Subcommand};
+use clap::{Arg, ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// Closest points on a deforming surface, by trees that never need refitting.
@@ -52,7 +52,7 @@ enum Command {
     Filter(filter::Args),
     /// Write a page in which the surface moves and the query runs
     View(view::Args),
-    /// Send a recorded motion to a controller, over a serial line or a socket
+    /// Send a motion, recorded or as it comes, to a controller, over a serial line or a socket
     Stream(stream::Args),
     /// Generate a procedural heart or brain
     Generate(generate::Args),
@@ -76,7 +76,14 @@ Lengths are in millimetres. Warnings and progress go to standard error, results 
 standard output; --json makes them one JSON object. Bad input ends with exit code 1.";
 
 fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    // `--margin -0.1` is a wrong number, which the command names, and no option.
+    let with_value = |arg: Arg| match arg.get_action() {
+        ArgAction::Set | ArgAction::Append => arg.allow_negative_numbers(true),
+        _ => arg,
+    };
+    let command = Cli::command().mut_subcommands(|command| command.mut_args(with_value));
+    let parsed = command.try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = match parsed {
         Ok(cli) => cli,
         Err(answer) => return output::answer(&answer),
     };

@@ -50,9 +50,18 @@ impl MotionRate {
                 bail!("{name}: the file does not say how fast it was recorded; give --motion-rate")
             }
         };
-        if !(1e-3..=1e5).contains(&rate) {
-            bail!("{name}: {rate} frames a second; give a --motion-rate from 0.001 to 100000");
-        }
-        Ok(rate)
+        checked(rate).with_context(|| name.to_string())
     }
+
+    /// Frames a second, where they are given.
+    pub fn given(&self) -> Result<Option<f64>> {
+        self.motion_rate.map(checked).transpose()
+    }
+}
+
+fn checked(rate: f64) -> Result<f64> {
+    if !(1e-3..=1e5).contains(&rate) {
+        bail!("{rate} frames a second; give a --motion-rate from 0.001 to 100000");
+    }
+    Ok(rate)
 }

@@ -2,6 +2,7 @@
 //!
 //! The `println!` and `eprintln!` of this program: unlike the standard ones they do not panic.
 
+use clap::builder::Styles;
 use std::fmt;
 use std::io::{self, ErrorKind, Write};
 use std::process::ExitCode;
@@ -52,9 +53,15 @@ pub fn answer(error: &clap::Error) -> ExitCode {
     u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from)
 }
 
-/// Prints a line on standard error.
+/// Prints a line on standard error; on a terminal the word that it begins with is coloured, as in clap's own errors.
 pub fn warn(line: fmt::Arguments<'_>) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let styles = Styles::styled();
+    let line = line.to_string();
+    let kinds = [("error:", styles.get_error()), ("warning:", styles.get_invalid())];
+    let painted = kinds.into_iter().find_map(|(kind, style)| {
+        line.strip_prefix(kind).map(|rest| format!("{style}{kind}{style:#}{rest}"))
+    });
+    let _ = writeln!(anstream::stderr(), "{}", painted.unwrap_or(line));
 }
 
 /// An error unless all results were printed. A reader that closes the pipe (`dibs inspect --json | head -1`) is no

@@ -8,7 +8,7 @@ pub use pc2::MotionMismatchError;
 
 use crate::read::{Place, ReadError, ReadErrorKind, file};
 use crate::{Motion, Unit};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
 /// The files of a series that are there; `None` of a path that names none.
@@ -56,6 +56,31 @@ impl Motion {
             .map_err(ReadErrorKind::from)
             .and_then(parse)
             .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
+    }
+
+    /// One frame that comes without a file: positions in `unit`, as a motion of a mesh with this
+    /// [origin](crate::Mesh::origin) has them. Errors name it by its number.
+    ///
+    /// ```
+    /// use dibs_build::glam::{DVec3, Vec3};
+    /// use dibs_build::{Motion, Unit};
+    ///
+    /// let metres = [[0.25, 0.0, 0.0], [0.5, 0.0, 0.0]];
+    /// let frame = Motion::frame_around(&metres, 0, Unit::Metre, DVec3::ZERO)?;
+    /// assert_eq!(frame, [Vec3::X * 250.0, Vec3::X * 500.0]);
+    /// # Ok::<(), dibs_build::ReadErrorKind>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ReadErrorKind::NonFinite`] names the first vertex with a coordinate that f32 does not hold; also for a frame so far
+    /// from the origin that f32 does not hold its shape.
+    pub fn frame_around(
+        positions: &[[f64; 3]],
+        number: usize,
+        unit: impl Into<Option<Unit>>,
+        origin: DVec3,
+    ) -> Result<Vec<Vec3>, ReadErrorKind> {
+        Place { unit: unit.into().unwrap_or_default(), origin }.frame_of(positions, number)
     }
 }
 

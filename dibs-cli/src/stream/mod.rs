@@ -1,7 +1,9 @@
-//! `dibs stream`: a recorded motion, sent to a controller.
+//! `dibs stream`: a motion, recorded or as it comes, sent to a controller.
 
 mod interrupt;
 mod key;
+mod live;
+mod parse;
 mod player;
 mod report;
 
@@ -16,11 +18,15 @@ use dibs_nostd::wire::AesCmac;
 use dibs_stream::transport::Target;
 use dibs_stream::{Sender, Settings, SurfaceOrder};
 use interrupt::Interrupt;
+use live::Live;
+use parse::{Format, Parser};
 use player::Player;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-#[command(mut_arg("motion", |motion| motion.required(true)), mut_arg("motion_rate", |rate| rate.alias("rate")), after_help = "\
+#[command(mut_arg("motion", |motion| motion.required_unless_present("from").conflicts_with("from")))]
+#[command(mut_arg("unnamed_motion", |motion| motion.conflicts_with("from")))]
+#[command(mut_arg("motion_rate", |rate| rate.alias("rate")), after_help = "\
 Examples:
   dibs stream heart.dibs --motion heart.pc2 --to serial:/dev/ttyUSB0@921600 --quantise --partial 0.05 --loop
   dibs stream heart.dibs --motion heart.pc2 --to tcp:192.168.1.20:5000 --motion-rate 40
@@ -28,6 +34,15 @@ Examples:
   dibs stream heart.ply --motion heart.pc2 --to unix:/tmp/uart --frames 100 --json
   dibs stream heart.dibs --motion heart.pc2 --to serial:/dev/ttyUSB0 --key heart.key
   dibs stream heart.dibs --motion heart.pc2 --to udp:192.168.1.20:5000@5001 --key heart.key --receiver 3
+  solver | dibs stream heart.dibs --from - --to udp:192.168.1.20:5000
+  solver | dibs stream heart.dibs --from - --format json --unit m --to udp:192.168.1.20:5000
+
+Frames of --from are positions of the mesh's vertices in its own order, or of a tree's nodes. `raw` is x, y and z of each
+as little-endian f32, and nothing else. `json` is a frame a line, [[X, Y, Z], ...] or {\"positions\": [[X, Y, Z], ...],
+\"age_ms\": AGE} with the time since the frame was captured. Each is sent at once; where they come faster than the line or
+the receiver takes them, the newest is. Without an age a frame counts as captured when it came, or when the frames before
+it that equal it did. With
+--motion-rate every frame is sent, no faster than that, and counts as captured then. The first wrong frame ends the stream.
 
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
 pub struct Args {
@@ -36,6 +51,12 @@ pub struct Args {
     tree: PathBuf,
     #[command(flatten)]
     motion: MotionFile,
+    /// Frames as they come, from standard input (-), instead of a recorded motion
+    #[arg(long, value_name = "SOURCE", value_parser = ["-"], conflicts_with_all = ["weights", "repeat"])]
+    from: Option<String>,
+    /// What the frames of --from are
+    #[arg(long, value_enum, default_value_t = Format::Raw, requires = "from")]
+    format: Format,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
     /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next one
     #[arg(long)]
@@ -84,10 +105,49 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let path = args.motion.required()?;
-    overwrite::check([&args.tree, path].into_iter().chain(&args.key), [])?;
+    overwrite::check([&args.tree].into_iter().chain(args.motion.given()).chain(&args.key), [])?;
     let key = args.key.as_deref().map(key::read).transpose()?;
     let (order, origin) = order(&args.tree, &args.lengths)?;
+    if args.partial.is_some_and(|tolerance| !(tolerance >= 0.0 && tolerance.is_finite())) {
+        bail!("--partial: a tolerance is a length of at least 0");
+    }
+    let source = match args.motion.given() {
+        Some(motion) => recorded(args, motion, &order, origin)?,
+        None => {
+            let rate = args.motion_rate.given()?;
+            let parser =
+                Parser::new(args.format, args.lengths.unit(), origin, &order, std::io::stdin());
+            let frames = Frames::Live(Live::start(parser, rate.is_some()));
+            Source { name: parse::NAME.to_owned(), frames, rate }
+        }
+    };
+    if args.mtu == "64" {
+        connect::<64>(args, key, order, &source)
+    } else {
+        connect::<1024>(args, key, order, &source)
+    }
+}
+
+/// The surface to send.
+struct Source {
+    name: String,
+    frames: Frames,
+    /// Frames a second; `None` as they come.
+    rate: Option<f64>,
+}
+
+enum Frames {
+    Recorded {
+        /// In the mesh's order.
+        positions: Vec<Vec<Vec3>>,
+        /// The weights of each frame, if weights are sent.
+        weights: Option<Vec<Vec<f32>>>,
+    },
+    Live(Live),
+}
+
+/// Reads a recorded motion, all of whose frames can be sent.
+fn recorded(args: &Args, path: &Path, order: &SurfaceOrder, origin: DVec3) -> Result<Source> {
     let motion = args.lengths.motion(path, origin)?;
     let rate = args.motion_rate.of(&motion, path)?;
     let name = path.display();
@@ -95,29 +155,10 @@ pub fn run(args: &Args) -> Result<()> {
     for (number, frame) in motion.frames.iter().enumerate() {
         order.to_rows(frame).map_err(|error| anyhow!("{name}, frame {number}: {error}"))?;
     }
-    if args.partial.is_some_and(|tolerance| !(tolerance >= 0.0 && tolerance.is_finite())) {
-        bail!("--partial: a tolerance is a length of at least 0");
-    }
     let weights =
-        if args.weights { Some(modes::weights(&args.tree, &order, &motion)?) } else { None };
-    let recording = Recording { name: name.to_string(), frames: motion.frames, weights, rate };
-    if args.mtu == "64" {
-        connect::<64>(args, key, order, &recording)
-    } else {
-        connect::<1024>(args, key, order, &recording)
-    }
-}
-
-/// The surface to send.
-struct Recording {
-    /// The motion's file.
-    name: String,
-    /// Positions, in the mesh's order.
-    frames: Vec<Vec<Vec3>>,
-    /// The weights of each frame, if weights are sent.
-    weights: Option<Vec<Vec<f32>>>,
-    /// Frames a second.
-    rate: f64,
+        if args.weights { Some(modes::weights(&args.tree, order, &motion)?) } else { None };
+    let frames = Frames::Recorded { positions: motion.frames, weights };
+    Ok(Source { name: name.to_string(), frames, rate: Some(rate) })
 }
 
 /// Makes the sender: without tags, or with them once the receiver's challenge is known.
@@ -125,7 +166,7 @@ fn connect<const MTU: usize>(
     args: &Args,
     key: Option<[u8; 16]>,
     order: SurfaceOrder,
-    recording: &Recording,
+    source: &Source,
 ) -> Result<()> {
     let settings =
         Settings { quantised: args.quantise, partial: args.partial, ..Settings::default() };
@@ -137,7 +178,7 @@ fn connect<const MTU: usize>(
     let line = line?.until(interrupt.flag());
     let Some(key) = key else {
         let sender = Sender::<_, MTU>::new(line, order, settings);
-        return Player::new(args, recording, sender, interrupt).run();
+        return Player::new(args, source, sender, interrupt).run();
     };
     let receiver = args.receiver;
     let keyed_mac = move |challenge| AesCmac::new(&key, receiver, challenge);
@@ -145,7 +186,7 @@ fn connect<const MTU: usize>(
     if let Some(challenge) = args.challenge {
         sender.challenge(challenge);
     }
-    Player::new(args, recording, sender, interrupt).run()
+    Player::new(args, source, sender, interrupt).run()
 }
 
 /// The order and origin of a tree's vertices: of the tree file given, or of the tree built from the mesh file given.

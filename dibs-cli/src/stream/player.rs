@@ -1,12 +1,15 @@
-//! Plays a recording to a receiver, at the recorded speed.
+//! Plays a motion to a receiver: a recording at its speed, live frames as they come.
 
 use super::interrupt::Interrupt;
+use super::live::Next;
 use super::report::{self, Display, Outcome};
-use super::{Args, Recording};
+use super::{Args, Frames, Source};
 use anyhow::{Result, anyhow, bail};
+use dibs_build::glam::Vec3;
 use dibs_nostd::wire::Mac;
 use dibs_stream::transport::{Line, Target};
 use dibs_stream::{Pace, SendError, Sender};
+use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
 /// A receiver without a status for this long does not report.
@@ -29,32 +32,41 @@ const GLANCE: Duration = Duration::from_millis(2);
 
 pub struct Player<'a, const MTU: usize, M> {
     args: &'a Args,
-    recording: &'a Recording,
+    source: &'a Source,
     sender: Sender<Line, MTU, M>,
     interrupt: Interrupt,
-    /// From one frame to the next.
+    /// From one frame to the next; zero where they are sent as they come.
     interval: Duration,
-    /// Time over which a frame's packets are spread.
-    spread: Duration,
     display: Display,
     outcome: Outcome,
+}
+
+/// What is sent of a frame.
+enum Rows<'a> {
+    Positions(Cow<'a, [Vec3]>),
+    Weights(&'a [f32]),
+}
+
+/// A frame that is due.
+struct Due<'a> {
+    rows: Rows<'a>,
+    /// Time since its capture.
+    ago: Duration,
+    /// Time to the next one, as far as it is known.
+    period: Duration,
 }
 
 impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     pub fn new(
         args: &'a Args,
-        recording: &'a Recording,
+        source: &'a Source,
         sender: Sender<Line, MTU, M>,
         interrupt: Interrupt,
     ) -> Self {
-        let interval = Duration::from_secs_f64(1.0 / recording.rate);
-        // Any other line holds the sender up by itself; a datagram that does not fit the receiver's buffer is lost.
-        let spread = match args.to {
-            Target::Udp { .. } => SPREAD.min(interval / 2),
-            _ => Duration::ZERO,
-        };
+        let interval =
+            source.rate.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(1.0 / rate));
         let (display, outcome) = (Display::new(), Outcome::default());
-        Self { args, recording, sender, interrupt, interval, spread, display, outcome }
+        Self { args, source, sender, interrupt, interval, display, outcome }
     }
 
     /// Sends the frames, and prints the totals, after an interrupt too.
@@ -113,22 +125,26 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     fn play(&mut self) -> Result<()> {
         let interval = self.interval;
         let mut due = Instant::now();
-        let recorded = self.recording.frames.len() as u64;
-        let end = if self.args.repeat { u64::MAX } else { recorded };
+        let end = match &self.source.frames {
+            Frames::Recorded { positions, .. } if !self.args.repeat => positions.len() as u64,
+            _ => u64::MAX,
+        };
         for number in 0..self.args.frames.unwrap_or(end) {
             self.wait(due)?;
-            if self.interrupt.is_raised() {
-                self.outcome.is_interrupted = true;
-                break;
-            }
             let now = Instant::now();
-            if now > due + interval {
+            if !interval.is_zero() && now > due + interval {
                 // The line is slower than the motion: continue from now instead of catching up.
                 self.outcome.late += 1;
                 due = now;
             }
+            let frame = self.next(number, &mut due)?;
+            if self.interrupt.is_raised() {
+                self.outcome.is_interrupted = true;
+                break;
+            }
+            let Some(frame) = frame else { break };
             due += interval;
-            self.send((number % recorded) as usize)?;
+            self.send(&frame)?;
         }
         // Wait for the acknowledgement of frames on their way, if the receiver acknowledges any.
         let end = Instant::now();
@@ -143,16 +159,54 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         Ok(())
     }
 
-    fn send(&mut self, frame: usize) -> Result<()> {
-        let (sender, recording) = (&mut self.sender, self.recording);
-        // A recorded frame counts as captured when it is due, even if the surface stands still.
-        let prepared = match &recording.weights {
-            Some(weights) => sender.prepare_weights_captured(&weights[frame], Duration::ZERO),
-            None => sender.prepare_captured(&recording.frames[frame], Duration::ZERO),
+    /// The frame that is due; of a live source once it is there, and then it is due. `None` after the last one and after an
+    /// interrupt.
+    fn next(&mut self, number: u64, due: &mut Instant) -> Result<Option<Due<'a>>> {
+        let period = self.interval;
+        let live = match &self.source.frames {
+            Frames::Recorded { positions, weights } => {
+                let at = (number % positions.len() as u64) as usize;
+                let rows = match weights {
+                    Some(weights) => Rows::Weights(&weights[at]),
+                    None => Rows::Positions(Cow::Borrowed(&positions[at])),
+                };
+                // A recorded frame counts as captured when it is due, even if the surface stands still.
+                return Ok(Some(Due { rows, ago: Duration::ZERO, period }));
+            }
+            Frames::Live(live) => live,
+        };
+        while !self.interrupt.is_raised() {
+            match live.next(GLANCE)? {
+                Next::Frame(frame) => {
+                    *due = frame.came.max(*due);
+                    self.outcome.passed_over = live.passed_over();
+                    let rows = Rows::Positions(Cow::Owned(frame.positions));
+                    let waited =
+                        if period.is_zero() { frame.captured.elapsed() } else { Duration::ZERO };
+                    let period = if period.is_zero() { frame.gap } else { period };
+                    return Ok(Some(Due { rows, ago: frame.age + waited, period }));
+                }
+                Next::Later => self.poll()?,
+                Next::End => break,
+            }
+        }
+        Ok(None)
+    }
+
+    fn send(&mut self, frame: &Due<'_>) -> Result<()> {
+        // Any other line holds the sender up by itself; a datagram that does not fit the receiver's buffer is lost.
+        let spread = match self.args.to {
+            Target::Udp { .. } => SPREAD.min(frame.period / 2),
+            _ => Duration::ZERO,
+        };
+        let sender = &mut self.sender;
+        let prepared = match &frame.rows {
+            Rows::Weights(weights) => sender.prepare_weights_captured(weights, frame.ago),
+            Rows::Positions(positions) => sender.prepare_captured(positions, frame.ago),
         };
         let sent = prepared.and_then(|prepared| {
             let packets = prepared.sent().packets;
-            let mut pace = Pace::new(Instant::now(), self.spread, packets);
+            let mut pace = Pace::new(Instant::now(), spread, packets);
             sender.transmit_paced(prepared, || pace.wait())
         });
         match sent {
@@ -167,7 +221,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                 self.display.show(&self.sender, &sent);
             }
             Err(SendError::Line(error)) => self.reconnect(&error)?,
-            Err(error) => return Err(anyhow!("{}: {error}", self.recording.name)),
+            Err(error) => return Err(anyhow!("{}: {error}", self.source.name)),
         }
         Ok(())
     }

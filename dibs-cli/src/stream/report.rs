@@ -19,6 +19,8 @@ pub struct Display {
 pub struct Outcome {
     /// Frames that were sent later than they were due.
     pub late: u64,
+    /// Live frames that newer ones replaced before they were sent.
+    pub passed_over: u64,
     /// Times that the connection was made again.
     pub reconnections: u64,
     /// Datagrams that came back.
@@ -124,7 +126,7 @@ pub fn print<M: Mac, const MTU: usize>(
     outcome: &Outcome,
     json: bool,
 ) {
-    let Outcome { late, reconnections, refused, is_interrupted } = *outcome;
+    let Outcome { late, passed_over, reconnections, refused, is_interrupted } = *outcome;
     let totals = sender.totals();
     let per_frame = totals.bytes as f64 / totals.frames.max(1) as f64;
     if json {
@@ -141,6 +143,7 @@ pub fn print<M: Mac, const MTU: usize>(
                 "bytes": totals.bytes,
                 "bytes_per_frame": per_frame,
                 "late": late,
+                "passed_over": passed_over,
                 "reconnections": reconnections,
                 "refused": refused,
                 "interrupted": is_interrupted,
@@ -157,6 +160,11 @@ pub fn print<M: Mac, const MTU: usize>(
     );
     if late > 0 {
         println!("late      {late} frames: the line is slower than the motion");
+    }
+    if passed_over > 0 {
+        println!(
+            "passed    {passed_over} frames over: newer ones came; --motion-rate sends all of a recording"
+        );
     }
     if reconnections > 0 {
         println!("line      broke and came back {reconnections} times");

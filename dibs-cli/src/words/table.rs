@@ -44,6 +44,8 @@ pub const WORDS: &[Row] = &[
     ("weld", "TOLERANCE", "distance of vertices that are one", "build stretch"),
     ("largest-component", "", "keep the largest surface alone", "build stretch"),
     ("origin", "X,Y,Z", "the point that coordinates count from", "build stretch"),
+    ("from", "SOURCE", "where frames come from as they are made", "stream"),
+    ("format", "FORMAT", "what those frames are", "stream"),
     ("to", "TO", "the receiver's address", "stream"),
     ("quantise", "", "6 bytes a vertex", "stream"),
     ("partial", "TOLERANCE", "distance of vertices that stand still", "stream"),

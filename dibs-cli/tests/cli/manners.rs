@@ -67,3 +67,42 @@ fn results_are_json_where_a_script_asks() {
         assert!(help.contains("--json"), "{command}");
     }
 }
+
+/// Coloured as clap's own errors, and for eyes alone.
+#[test]
+fn errors_are_coloured_where_colours_are_wanted() {
+    let says = |name: &str, value: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_dibs"));
+        command.args(["inspect", "absent.dibs"]).env_remove("NO_COLOR").env(name, value);
+        String::from_utf8(command.output().unwrap().stderr).unwrap()
+    };
+    let painted = says("CLICOLOR_FORCE", "1");
+    assert!(painted.starts_with("\u{1b}[") && painted.contains("error:\u{1b}["), "{painted:?}");
+    for (name, value) in [("NO_COLOR", "1"), ("TERM", "xterm-256color")] {
+        let plain = says(name, value);
+        assert!(plain.starts_with("error: absent.dibs: "), "{plain:?}");
+    }
+}
+
+/// A negative number is not taken for an option, with a tip that helps nobody.
+#[test]
+fn a_negative_number_is_a_wrong_value() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 320 -o h.ply --motion h.pc2");
+    assert!(
+        fails(folder, "stretch h.ply h.pc2 --margin -0.1")
+            .contains("a margin of -0.1 makes no sense")
+    );
+    let to = "--to udp:127.0.0.1:9";
+    assert!(
+        fails(folder, &format!("stream h.ply h.pc2 {to} --rate -1"))
+            .contains("--rate -1: a rate is")
+    );
+    let output = dibs(folder, &format!("stream h.ply h.pc2 {to} --frames -3"));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        error.contains("invalid value '-3' for '--frames") && !error.contains("tip:"),
+        "{error}"
+    );
+}

@@ -49,6 +49,14 @@ impl SurfaceOrder {
         self.order.len()
     }
 
+    /// Positions of a frame in the mesh's order: of its file's vertices, or of the nodes. Where the order is that of no
+    /// tree, up to the last vertex that is sent.
+    #[must_use]
+    pub fn positions(&self) -> usize {
+        let last = || self.order.iter().max().map_or(0, |&last| last as usize + 1);
+        self.check.as_ref().map_or_else(last, FrameCheck::positions)
+    }
+
     /// Checks that the faces of a motion's files are those of the tree, where the order is that of one.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 //!
 //! One file, because all tests receive by the same helpers.
 
+mod live;
 mod receiver;
 
 use std::io::Read;

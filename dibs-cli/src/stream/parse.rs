@@ -1,0 +1,174 @@
+//! Frames from a stream of bytes: raw numbers, or JSON lines.
+
+use anyhow::{Result, anyhow, bail};
+use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::{Motion, ReadErrorKind, Unit};
+use dibs_stream::SurfaceOrder;
+use serde::Deserialize;
+use std::io::{BufRead, BufReader, Read};
+use std::time::Duration;
+
+/// The stream's name in errors.
+pub const NAME: &str = "standard input";
+
+/// Bytes of a raw position.
+const RAW: usize = 12;
+
+/// Most bytes of a position in JSON: three numbers of all their digits, and white space.
+const MOST_JSON: usize = 256;
+
+/// What frames are made of.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Little-endian f32 numbers: x, y and z of each position
+    Raw,
+    /// A frame a line
+    Json,
+}
+
+/// Reads one frame after the other.
+pub struct Parser<R> {
+    input: BufReader<R>,
+    format: Format,
+    unit: Option<Unit>,
+    origin: DVec3,
+    order: SurfaceOrder,
+    /// Of the next frame, from 0.
+    number: usize,
+}
+
+/// A frame that fits the tree.
+pub struct Parsed {
+    /// In the mesh's order.
+    pub positions: Vec<Vec3>,
+    /// The time since its capture that it states.
+    pub age: Option<Duration>,
+}
+
+/// A coordinate that is not finite is `null` in JavaScript's JSON.
+type Point = [Option<f64>; 3];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Object {
+    positions: Vec<Point>,
+    age_ms: Option<f64>,
+}
+
+impl<R: Read> Parser<R> {
+    pub fn new(
+        format: Format,
+        unit: Option<Unit>,
+        origin: DVec3,
+        order: &SurfaceOrder,
+        input: R,
+    ) -> Self {
+        let input = BufReader::with_capacity(1 << 18, input);
+        Self { input, format, unit, origin, order: order.clone(), number: 0 }
+    }
+
+    /// The next frame; `None` at the end.
+    pub fn next(&mut self) -> Result<Option<Parsed>> {
+        let number = self.number;
+        let read = match self.format {
+            Format::Raw => self.raw(),
+            Format::Json => self.json(),
+        };
+        let in_frame = |error| anyhow!("{NAME}, frame {number}: {error}");
+        let Some((positions, age)) = read.map_err(in_frame)? else {
+            if number == 0 {
+                bail!("{NAME}: no frame came; does the program before the pipe run?");
+            }
+            return Ok(None);
+        };
+        self.number += 1;
+        // Fewer positions have an error of their own.
+        let positions = Motion::frame_around(&positions, number, self.unit, self.origin);
+        let positions = positions.map_err(|error| match error {
+            ReadErrorKind::NonFinite { vertex, value } => anyhow!(
+                "{NAME}: {vertex} has the coordinate {value}, which is not a finite number: leave such frames out, and \
+                 check that --format is what the program before the pipe writes"
+            ),
+            error => anyhow!("{NAME}: {error}"),
+        })?;
+        self.order.to_rows(&positions).map_err(|error| in_frame(error.into()))?;
+        Ok(Some(Parsed { positions, age }))
+    }
+
+    fn raw(&mut self) -> Result<Option<(Vec<[f64; 3]>, Option<Duration>)>> {
+        let count = self.order.positions();
+        let size = RAW * count;
+        let mut bytes = Vec::with_capacity(size);
+        (&mut self.input).take(size as u64).read_to_end(&mut bytes)?;
+        // So long a run of letters and digits is no run of coordinates.
+        if self.number == 0 && !bytes.is_empty() && bytes.iter().all(is_text) {
+            bail!("begins with text: give --format json for JSON lines");
+        }
+        if !bytes.is_empty() && bytes.len() < size {
+            bail!(
+                "ends after {} of its {size} bytes, in position {} (counted from 0) of {count}: give frames of {count} \
+                 positions, each x, y and z as little-endian f32, and end after a whole one",
+                bytes.len(),
+                bytes.len() / RAW
+            );
+        }
+        let (words, _) = bytes.as_chunks::<4>();
+        let (points, _) = words.as_chunks::<3>();
+        let points: Vec<[f64; 3]> =
+            points.iter().map(|point| point.map(|x| f32::from_le_bytes(x).into())).collect();
+        Ok((!points.is_empty()).then_some((points, None)))
+    }
+
+    fn json(&mut self) -> Result<Option<(Vec<[f64; 3]>, Option<Duration>)>> {
+        let most = (MOST_JSON * (self.order.positions() + 16)) as u64;
+        let mut line = Vec::new();
+        while line.trim_ascii().is_empty() {
+            line.clear();
+            let read = (&mut self.input).take(most).read_until(b'\n', &mut line)?;
+            if read == 0 {
+                return Ok(None);
+            }
+            if read as u64 == most {
+                bail!("a line longer than {most} bytes: give one frame a line");
+            }
+        }
+        let line = line.trim_ascii();
+        let (points, age) = match line {
+            [b'[', ..] => (json::<Vec<Point>>(line)?, None),
+            _ => {
+                let Object { positions, age_ms } = json(line)?;
+                (positions, age_ms)
+            }
+        };
+        let age = age.map(|ms| {
+            Duration::try_from_secs_f64(ms / 1000.0)
+                .map_err(|_| anyhow!("age_ms is {ms}: give milliseconds of at least 0"))
+        });
+        let points = points.iter().map(|point| point.map(|x| x.unwrap_or(f64::NAN))).collect();
+        Ok(Some((points, age.transpose()?)))
+    }
+}
+
+fn json<'a, T: Deserialize<'a>>(line: &'a [u8]) -> Result<T> {
+    serde_json::from_slice(line).map_err(|error| {
+        let what = error.to_string();
+        // Its line is always the first.
+        let what = what.rsplit_once(" at line ").map_or(&*what, |(what, _)| what);
+        // The list opens one bracket, and each position one.
+        let before = line.get(..error.column()).unwrap_or(line);
+        let opened = before.iter().filter(|&&byte| byte == b'[').count();
+        let at = match opened.checked_sub(2) {
+            Some(position) => format!("position {position} (counted from 0), "),
+            None => String::new(),
+        };
+        anyhow!(
+            "{at}column {}: {what}; give [[X, Y, Z], ...] or {{\"positions\": [[X, Y, Z], ...], \"age_ms\": AGE}}, finite \
+             numbers, on one line",
+            error.column()
+        )
+    })
+}
+
+fn is_text(byte: &u8) -> bool {
+    byte.is_ascii_graphic() || byte.is_ascii_whitespace()
+}
