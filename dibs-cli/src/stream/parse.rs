@@ -45,6 +45,9 @@ pub struct Parsed {
     pub age: Option<Duration>,
 }
 
+/// Positions in the source's unit, and the age that they state.
+type Unplaced = (Vec<[f64; 3]>, Option<Duration>);
+
 /// A coordinate that is not finite is `null` in JavaScript's JSON.
 type Point = [Option<f64>; 3];
 
@@ -95,7 +98,7 @@ impl<R: Read> Parser<R> {
         Ok(Some(Parsed { positions, age }))
     }
 
-    fn raw(&mut self) -> Result<Option<(Vec<[f64; 3]>, Option<Duration>)>> {
+    fn raw(&mut self) -> Result<Option<Unplaced>> {
         let count = self.order.positions();
         let size = RAW * count;
         let mut bytes = Vec::with_capacity(size);
@@ -119,7 +122,7 @@ impl<R: Read> Parser<R> {
         Ok((!points.is_empty()).then_some((points, None)))
     }
 
-    fn json(&mut self) -> Result<Option<(Vec<[f64; 3]>, Option<Duration>)>> {
+    fn json(&mut self) -> Result<Option<Unplaced>> {
         let most = (MOST_JSON * (self.order.positions() + 16)) as u64;
         let mut line = Vec::new();
         while line.trim_ascii().is_empty() {
