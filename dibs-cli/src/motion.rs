@@ -50,18 +50,23 @@ impl MotionRate {
                 bail!("{name}: the file does not say how fast it was recorded; give --motion-rate")
             }
         };
-        checked(rate).with_context(|| name.to_string())
+        if !is_possible(rate) {
+            bail!("{name}: {rate} {WRONG}");
+        }
+        Ok(rate)
     }
 
     /// Frames a second, where they are given.
     pub fn given(&self) -> Result<Option<f64>> {
-        self.motion_rate.map(checked).transpose()
+        match self.motion_rate {
+            Some(rate) if !is_possible(rate) => bail!("{rate} {WRONG}"),
+            rate => Ok(rate),
+        }
     }
 }
 
-fn checked(rate: f64) -> Result<f64> {
-    if !(1e-3..=1e5).contains(&rate) {
-        bail!("{rate} frames a second; give a --motion-rate from 0.001 to 100000");
-    }
-    Ok(rate)
+const WRONG: &str = "frames a second; give a --motion-rate from 0.001 to 100000";
+
+fn is_possible(rate: f64) -> bool {
+    (1e-3..=1e5).contains(&rate)
 }

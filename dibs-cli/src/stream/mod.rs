@@ -24,7 +24,7 @@ use player::Player;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
-#[command(mut_arg("motion", |motion| motion.required_unless_present("from").conflicts_with("from")))]
+#[command(mut_arg("motion", |motion| motion.required_unless_present_any(["from", "unnamed_motion"]).conflicts_with("from")))]
 #[command(mut_arg("unnamed_motion", |motion| motion.conflicts_with("from")))]
 #[command(mut_arg("motion_rate", |rate| rate.alias("rate")), after_help = "\
 Examples:
@@ -55,7 +55,7 @@ pub struct Args {
     #[arg(long, value_name = "SOURCE", value_parser = ["-"], conflicts_with_all = ["weights", "repeat"])]
     from: Option<String>,
     /// What the frames of --from are
-    #[arg(long, value_enum, default_value_t = Format::Raw, requires = "from")]
+    #[arg(long, value_enum, default_value_t = Format::Raw, conflicts_with_all = ["motion", "unnamed_motion"])]
     format: Format,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
     /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next one

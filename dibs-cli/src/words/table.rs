@@ -26,6 +26,7 @@ pub const WORDS: &[Row] = &[
     ("tissue-speed", "MM/S", "largest speed of the tissue", "filter"),
     ("robot-speed", "MM/S", "largest speed of the robot", "filter"),
     ("age", "MS", "time by which the surface is behind", "filter"),
+    ("approach", "MS", "time constant of the approach", "filter"),
     ("registration", "MM", "error of the registration", "filter"),
     ("stretch", "STRETCH", "the limit on stretch", "build query demo"),
     ("limits", "LIMITS", "the file of a limit for each triangle", "build stretch"),

@@ -91,15 +91,15 @@ fn a_negative_number_is_a_wrong_value() {
     let folder = folder.path();
     succeeds(folder, "generate heart --triangles 320 -o h.ply --motion h.pc2");
     assert!(
-        fails(folder, "stretch h.ply h.pc2 --margin -0.1")
+        fails(folder, "stretch h.ply --motion h.pc2 --margin -0.1")
             .contains("a margin of -0.1 makes no sense")
     );
     let to = "--to udp:127.0.0.1:9";
     assert!(
-        fails(folder, &format!("stream h.ply h.pc2 {to} --rate -1"))
-            .contains("--rate -1: a rate is")
+        fails(folder, &format!("stream h.ply --motion h.pc2 {to} --motion-rate -1"))
+            .contains("-1 frames a second; give a --motion-rate")
     );
-    let output = dibs(folder, &format!("stream h.ply h.pc2 {to} --frames -3"));
+    let output = dibs(folder, &format!("stream h.ply --motion h.pc2 {to} --frames -3"));
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(
         error.contains("invalid value '-3' for '--frames") && !error.contains("tip:"),
