@@ -127,7 +127,8 @@ fn the_newest_frame_is_sent() {
     assert_eq!(sent + passed_over, FRAMES as u64 + 1, "{totals}");
     // The first frame's packets are spread over more time than all frames take to come.
     assert!((2..20).contains(&sent), "{totals}");
-    assert!(ages[0] < 200 && ages.last().is_some_and(|age| *age >= 400), "{ages:?}");
+    // The last frame repeats one that was read some time after it was written.
+    assert!(ages[0] < 200 && ages.last().is_some_and(|age| *age >= 300), "{ages:?}");
 }
 
 #[test]
