@@ -126,9 +126,9 @@ fn the_newest_frame_is_sent() {
     let [sent, passed_over] = ["frames", "passed_over"].map(|name| totals[name].as_u64().unwrap());
     assert_eq!(sent + passed_over, FRAMES as u64 + 1, "{totals}");
     // The first frame's packets are spread over more time than all frames take to come.
-    assert!((2..20).contains(&sent), "{totals}");
+    assert!((2..=FRAMES as u64).contains(&sent), "{totals}");
     // The last frame repeats one that was read some time after it was written.
-    assert!(ages[0] < 200 && ages.last().is_some_and(|age| *age >= 300), "{ages:?}");
+    assert!(ages[0] < 300 && ages.last().is_some_and(|age| *age >= 300), "{ages:?}");
 }
 
 #[test]

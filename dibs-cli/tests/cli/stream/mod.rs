@@ -388,7 +388,7 @@ fn datagrams_that_come_back_are_an_error_at_the_end() {
 fn a_receiver_that_acknowledges_nothing_is_named() {
     let folder = heart();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let line = format!("--to tcp:{} --motion-rate 100 --frames 3", listener.local_addr().unwrap());
+    let line = format!("--to tcp:{} --motion-rate 10 --frames 3", listener.local_addr().unwrap());
     let child = stream(folder.path(), &line);
     let (socket, _) = listener.accept().unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
