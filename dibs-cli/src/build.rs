@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// The largest stretch that the tree must cover: a factor of at least 1
-    #[arg(long, default_value_t = 1.5, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1.5)]
     stretch: f32,
     /// A limit for each triangle instead, as `dibs stretch` writes them
     #[arg(long, value_name = "LIMITS", conflicts_with = "stretch")]

@@ -47,22 +47,22 @@ pub struct Args {
     #[arg(long, value_name = "TOOLS")]
     path: PathBuf,
     /// Least separation of tool and tissue
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM")]
     stand_off: f32,
     /// Largest speed of the tissue; by default the largest of the motion
-    #[arg(long, value_name = "MM/S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM/S")]
     tissue_speed: Option<f32>,
     /// Largest speed of the robot; by default 1,000, or the fastest command's if that is more
-    #[arg(long, value_name = "MM/S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM/S")]
     robot_speed: Option<f32>,
     /// Most by which the surface is behind the tissue; by default a tick
-    #[arg(long, value_name = "MS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS")]
     age: Option<f64>,
     /// Error of the registration of robot and surface
-    #[arg(long, value_name = "MM", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM", default_value_t = 0.0)]
     registration: f32,
     /// Time in which the tool may use up its distance from the stand-off, for an approach without jumps; 0 for none
-    #[arg(long, value_name = "MS", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", default_value_t = 0.0)]
     approach: f32,
     /// Instructions of a Cortex-M7 that the queries of a tick may take, by the fit of plain queries: deep in the tissue they
     /// take up to twice as many

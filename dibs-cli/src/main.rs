@@ -75,14 +75,18 @@ Examples:
 Lengths are in millimetres. Warnings and progress go to standard error, results to
 standard output; --json makes them one JSON object. Bad input ends with exit code 1.";
 
-fn main() -> ExitCode {
+/// The command line.
+fn command() -> clap::Command {
     // `--margin -0.1` is a wrong number, which the command names, and no option.
     let with_value = |arg: Arg| match arg.get_action() {
         ArgAction::Set | ArgAction::Append => arg.allow_negative_numbers(true),
         _ => arg,
     };
-    let command = Cli::command().mut_subcommands(|command| command.mut_args(with_value));
-    let parsed = command.try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    Cli::command().mut_subcommands(|command| command.mut_args(with_value))
+}
+
+fn main() -> ExitCode {
+    let parsed = command().try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
     let cli = match parsed {
         Ok(cli) => cli,
         Err(answer) => return output::answer(&answer),

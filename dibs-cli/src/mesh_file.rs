@@ -15,7 +15,7 @@ pub struct MeshArgs {
     #[arg(long)]
     strict: bool,
     /// Weld vertices at most this far apart (0: equal ones); by default only soup is welded, exactly
-    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "TOLERANCE")]
     weld: Option<f32>,
     /// Keep only the largest of several separate surfaces
     #[arg(long)]

@@ -32,7 +32,7 @@ impl MotionFile {
 #[derive(clap::Args)]
 pub struct MotionRate {
     /// Frames a second of the motion; by default the number in its file
-    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ")]
     motion_rate: Option<f64>,
 }
 

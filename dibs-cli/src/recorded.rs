@@ -22,7 +22,7 @@ pub struct Moving {
     #[command(flatten)]
     motion_rate: MotionRate,
     /// Ticks a second of the control loop
-    #[arg(long, value_name = "HZ", default_value_t = 1_000.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "HZ", default_value_t = 1_000.0)]
     rate: f64,
     #[command(flatten)]
     lengths: Lengths,

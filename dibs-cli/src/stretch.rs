@@ -25,7 +25,7 @@ pub struct Args {
     #[command(flatten)]
     motion: MotionFile,
     /// What limits leave above the recorded stretch (0.1: a tenth of it)
-    #[arg(long, default_value_t = 0.1, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.1)]
     margin: f32,
     /// Write a limit for each triangle, for `dibs build --limits`
     #[arg(long, value_name = "LIMITS")]

@@ -52,7 +52,7 @@ pub struct Args {
     #[arg(long, value_name = "N")]
     budget: Option<u32>,
     /// List all locally closest pairs whose separation is at most this, too: at most 64
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM")]
     contacts: Option<f32>,
     /// Print a JSON object a line, and another one of the means on standard error
     #[arg(long)]

@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(short, long, default_value = "-", requires = "poses")]
     output: PathBuf,
     /// List all locally closest pairs whose separation is at most this, too: at most 64 of each tool and surface
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM")]
     contacts: Option<f32>,
     /// Current positions, one for each vertex of the built mesh: a mesh file, or a motion with
     /// --frame; by default the rest shape. In a scene, once for each tree, in their order
@@ -56,7 +56,7 @@ pub struct Args {
     frame: Option<usize>,
     /// Fail if the surface is stretched by more than this, and search with the stretch that it has
     /// instead of the tree's limit
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     stretch: Option<f32>,
     #[command(flatten)]
     lengths: Lengths,

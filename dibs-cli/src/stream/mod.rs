@@ -41,8 +41,8 @@ Frames of --from are positions of the mesh's vertices in its own order, or of a 
 as little-endian f32, and nothing else. `json` is a frame a line, [[X, Y, Z], ...] or {\"positions\": [[X, Y, Z], ...],
 \"age_ms\": AGE} with the time since the frame was captured. Each is sent at once; where they come faster than the line or
 the receiver takes them, the newest is. Without an age a frame counts as captured when it came, or when the frames before
-it that equal it did. With
---motion-rate every frame is sent, no faster than that, and counts as captured then. The first wrong frame ends the stream.
+it that equal it did. With --motion-rate every frame is sent, no faster than that, and counts as captured then. The first
+wrong frame ends the stream.
 
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
 pub struct Args {
@@ -67,7 +67,7 @@ pub struct Args {
     #[arg(long)]
     quantise: bool,
     /// Send only the vertices that moved by more than this (in the mesh's unit)
-    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "TOLERANCE")]
     partial: Option<f32>,
     /// Send the weights of the displacement modes that the tree was built with, instead of positions
     #[arg(long, alias = "modes", conflicts_with_all = ["quantise", "partial"])]

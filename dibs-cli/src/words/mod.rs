@@ -2,9 +2,8 @@
 
 mod table;
 
-use crate::Cli;
 use clap::builder::ValueParser;
-use clap::{Arg, Command, CommandFactory};
+use clap::{Arg, Command};
 use std::collections::{BTreeMap, BTreeSet};
 use table::{WORDS, of_clap, of_table, word};
 
@@ -30,7 +29,7 @@ const EARLIER: [(&str, &str); 6] = [
 
 /// The commands of the program, and those below them, each by the name of the one at the top.
 fn commands() -> Vec<(String, Command)> {
-    let top = Cli::command();
+    let top = crate::command();
     let mut found = Vec::new();
     for command in top.get_subcommands() {
         let name = command.get_name().to_owned();
@@ -50,7 +49,7 @@ fn arguments() -> Vec<(String, Arg)> {
 
 #[test]
 fn every_command_has_the_words_of_the_table() {
-    let top = Cli::command();
+    let top = crate::command();
     for command in top.get_subcommands() {
         assert_eq!(of_clap(command), of_table(command.get_name()), "{}", command.get_name());
     }
@@ -94,11 +93,11 @@ fn numbers_may_be_negative_where_they_are_fractions() {
 
 /// What a line gives to which argument.
 fn given(line: &str) -> BTreeMap<String, Vec<String>> {
-    let matches = Cli::command()
+    let matches = crate::command()
         .try_get_matches_from(["dibs"].into_iter().chain(line.split(' ')))
         .unwrap_or_else(|error| panic!("{line}: {error}"));
     let (name, matches) = matches.subcommand().expect("a command");
-    let mut command = Cli::command();
+    let mut command = crate::command();
     let command = command.find_subcommand_mut(name).expect("a command");
     let ids = command.get_arguments().map(|arg| arg.get_id().as_str());
     let ids = ids.filter(|id| matches.value_source(id).is_some());
@@ -116,7 +115,7 @@ fn earlier_words_mean_the_same() {
         assert_eq!(given(earlier), given(today), "{earlier}");
     }
     let both = "dibs stretch h.ply h.pc2 --motion h.pc2".split(' ');
-    assert!(Cli::command().try_get_matches_from(both).is_err());
+    assert!(crate::command().try_get_matches_from(both).is_err());
 }
 
 #[test]

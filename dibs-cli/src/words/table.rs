@@ -3,7 +3,7 @@
 use clap::{Arg, Command};
 use std::collections::BTreeSet;
 
-/// A word, the name of its value (of a switch: none), what it says, and the commands that have it.
+/// An option's name, its value's name (a switch has none), its meaning, and the commands that have it.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 #[rustfmt::skip]
@@ -86,7 +86,7 @@ pub fn of_clap(command: &Command) -> BTreeSet<(String, String)> {
     shown.map(|arg| (word(arg), value(arg))).chain(below).collect()
 }
 
-/// The name of an option; that of an argument without one is its value's.
+/// The name of an option, or an argument's value name in lower case.
 pub fn word(arg: &Arg) -> String {
     arg.get_long().map_or_else(|| value(arg).to_lowercase(), str::to_owned)
 }

@@ -103,7 +103,7 @@ fn what_is_no_tool_is_named_alike() {
     assert!(error.contains("line 1: 2 tools in place of one") && error.contains("one tool a line"));
 }
 
-/// A path may come from another program, and earlier words still say what they said.
+/// `--path -` reads another program's poses, and earlier spellings still work.
 #[test]
 fn a_path_is_read_from_standard_input_and_earlier_words_hold() {
     let folder = tempfile::tempdir().unwrap();

@@ -36,8 +36,8 @@ impl<S> LatestSurface<S> {
         LatestSurface { surface: self.surface.map(|(surface, frame)| (of(surface), frame)) }
     }
 
-    /// The surface, if it is not older than `limit`: of a source that may lose a frame, two of its periods and the time on
-    /// the way, 80 ms at 30 Hz. One period passes before the next frame even comes.
+    /// The surface, if it is not older than `limit`: of a source that may lose a frame, two of its periods and the transit,
+    /// 80 ms at 30 Hz. The next frame comes a period after this one, at the earliest.
     ///
     /// # Errors
     /// [`Unavailable::NoSurface`] before the first was published, [`Unavailable::Stale`] with its age.

@@ -1,4 +1,4 @@
-//! `dibs stream --from -`: frames from standard input, to what a controller would act on.
+//! `dibs stream --from -`: frames from standard input reach a receiver, or are refused by their number.
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
