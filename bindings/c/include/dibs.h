@@ -1913,6 +1913,29 @@ dibs_code dibs_bus_packet(dibs_bus *bus,
                           dibs_progress *progress);
 
 /**
+ * Takes a whole frame from this process, say from a solver's own thread. `dibs_bus_work` then checks and publishes it, as
+ * one that came in packets.
+ *
+ * The call counts as a sign of life, and its transit time is 0. One source at a time: a frame of packets that is in work
+ * is abandoned. No lock: the control tick reads the last surface meanwhile.
+ *
+ * Cost: linear in the vertices, several readings each.
+ *
+ * @param bus        The bus.
+ * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order. Read
+ *                   during the call.
+ * @param count      Their number: the vertices of the mesh's file.
+ * @param captured   When the surface was so, on the receiver's clock, in ms: at most 65,534 before `now`.
+ * @param now        The receiver's clock, in ms; wraps.
+ * @return `DIBS_CODE_OK`, the cause of a refusal as `dibs_receiver_accept` (the last good surface stays), or a misuse.
+ */
+dibs_code dibs_bus_frame(dibs_bus *bus,
+                         const float *positions,
+                         uint32_t count,
+                         uint32_t captured,
+                         uint32_t now);
+
+/**
  * Does a slice of the checks: looks at some rows and triangles of the frame that arrives, and publishes it once it is
  * complete and admitted. Without a frame it checks the tree's bytes.
  *

@@ -111,6 +111,10 @@ struct Bus : Object<dibs_bus, DIBS_BUS_SIZE, dibs_bus_init> {
     Code packet(std::span<const uint8_t> packet, uint32_t now, dibs_progress *progress = nullptr) {
         return dibs_bus_packet(*this, packet.data(), packet.size(), now, progress);
     }
+    /** A frame of this process: x, y and z of each vertex, in the mesh's order. */
+    Code frame(std::span<const float> positions, uint32_t captured, uint32_t now) {
+        return dibs_bus_frame(*this, positions.data(), uint32_t(positions.size() / 3), captured, now);
+    }
     Code work(uint32_t work, dibs_advance *outcome = nullptr) { return dibs_bus_work(*this, work, outcome); }
 };
 /** The control tick's end of a guarded surface. */

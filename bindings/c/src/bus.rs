@@ -8,6 +8,7 @@ use dibs_nostd::{Millis, TreeBytes, VertexTable};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
+use crate::frame::rows;
 use crate::limits::dibs_guard_limits;
 use crate::receiver::{DIBS_EVENTS, DIBS_STATUS, dibs_advance, dibs_progress};
 use crate::surface::dibs_surface;
@@ -112,6 +113,36 @@ pub extern "C" fn dibs_bus_packet(
         let (progress, mut bus) = (progress.check_if_any()?, bus.open()?);
         let outcome = bus.0.packet(packet.slice(length)?, Millis(now))?;
         Place::set_if_any(progress, outcome.into());
+        Ok(())
+    })
+}
+
+/// Takes a whole frame from this process, say from a solver's own thread. `dibs_bus_work` then checks and publishes it, as
+/// one that came in packets.
+///
+/// The call counts as a sign of life, and its transit time is 0. One source at a time: a frame of packets that is in work
+/// is abandoned. No lock: the control tick reads the last surface meanwhile.
+///
+/// Cost: linear in the vertices, several readings each.
+///
+/// @param bus        The bus.
+/// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order. Read
+///                   during the call.
+/// @param count      Their number: the vertices of the mesh's file.
+/// @param captured   When the surface was so, on the receiver's clock, in ms: at most 65,534 before `now`.
+/// @param now        The receiver's clock, in ms; wraps.
+/// @return `DIBS_CODE_OK`, the cause of a refusal as `dibs_receiver_accept` (the last good surface stays), or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_frame(
+    bus: *mut dibs_bus,
+    positions: *const f32,
+    count: u32,
+    captured: u32,
+    now: u32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (mut bus, rows) = (bus.open()?, rows(positions, count)?);
+        let _ = bus.0.frame(rows, Millis(captured), Millis(now))?;
         Ok(())
     })
 }

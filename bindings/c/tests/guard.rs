@@ -31,6 +31,8 @@ const PERIOD: u32 = 30;
 enum Step {
     Packet(u32, Vec<u8>),
     Receive(u32, Vec<u8>),
+    /// Now, when it was captured, and positions in the mesh's order.
+    Frame(u32, u32, Vec<Vec3>),
     Work(u32),
     Status(u32, bool),
     /// Both ends of the axis, and the radius.
@@ -42,7 +44,8 @@ enum Step {
     Counters,
 }
 
-/// Frames that come as packets and over a line in turn. One is lost, one is damaged, one is stretched too far.
+/// Frames that come as packets, over a line, and by a call in turn. One is lost, one is damaged, one is stretched too far,
+/// one lacks a vertex.
 /// Then the line falls silent, and comes back.
 fn script() -> (BuiltTree, Vec<Step>) {
     let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a size");
@@ -51,7 +54,12 @@ fn script() -> (BuiltTree, Vec<Step>) {
     for now in 1_000..3_600 {
         let number = (now - 1_000) / PERIOD;
         let is_silent = (3_300..3_450).contains(&now) || number == 9;
-        if (now - 1_000) % PERIOD == 0 && !is_silent {
+        let is_due = (now - 1_000) % PERIOD == 0 && !is_silent;
+        if is_due && number % 5 == 3 {
+            let mut positions = motion.frames[number as usize % motion.frames.len()].clone();
+            positions.truncate(if number == 8 { VERTICES - 1 } else { VERTICES });
+            steps.push(Step::Frame(now, now - number % 4, positions));
+        } else if is_due {
             let mut rows = built.to_rows(&motion.frames[number as usize % motion.frames.len()]);
             if number == 15 {
                 rows[100] += Vec3::new(0.0, 0.0, 15.0);
@@ -104,6 +112,11 @@ fn lines(steps: &[Step]) -> String {
         match step {
             Step::Packet(now, bytes) => writeln!(text, "packet {now} {}", hex(bytes)),
             Step::Receive(now, bytes) => writeln!(text, "receive {now} {}", hex(bytes)),
+            Step::Frame(now, captured, positions) => {
+                let numbers = positions.iter().flat_map(|position| position.to_array());
+                let numbers: String = numbers.map(|number| format!(" {number}")).collect();
+                writeln!(text, "frame {now} {captured}{numbers}")
+            }
             Step::Work(most) => writeln!(text, "work {most}"),
             Step::Status(now, is_framed) => writeln!(text, "status {now} {}", u8::from(*is_framed)),
             Step::Tick(now, tool) => {
@@ -133,6 +146,10 @@ fn answer((bus, guard): &mut Ends<'_>, step: &Step) -> String {
         Step::Receive(now, bytes) => {
             bus.receive(bytes, Millis(*now));
             "receive 0".to_owned()
+        }
+        Step::Frame(now, captured, positions) => {
+            let outcome = bus.frame(positions, Millis(*captured), Millis(*now));
+            format!("frame {}", outcome.map_or_else(|error| refusal(&error), |_| 0))
         }
         Step::Work(most) => match bus.work(*most) {
             Ok(advance) => format!("work 0 {}", outcome(advance)),
@@ -313,6 +330,7 @@ fn refusal(error: &ReceiveError) -> u32 {
     match error {
         ReceiveError::Packet(_) => 400,
         ReceiveError::Unexpected { .. } => 406,
+        ReceiveError::RowCount { .. } => 410,
         ReceiveError::Stretch(StretchError::Exceeded { .. })
         | ReceiveError::Refused { cause: Event::Stretch, .. } => 311,
         ReceiveError::Stretch(StretchError::TooFast { .. })

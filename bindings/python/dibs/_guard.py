@@ -168,6 +168,15 @@ class Guard:
         """Takes one packet, whole, of a network. Raises `ValueError` with the reason where it is not taken; it was counted."""
         return self._native.packet(_bytes("packet", packet), _now(now))
 
+    def frame(self, positions: npt.ArrayLike, now: int, *, captured: Optional[int] = None) -> None:
+        """Takes a whole frame of this process, say of a solver: one position (x, y, z) for each vertex of the mesh's file, or
+        for each node, in that file's order. `captured` is when the surface was so, by default `now`. `work` then checks and
+        publishes it. One source at a time: a frame of packets that is in work is abandoned. Raises `ValueError` with the
+        reason where it is not taken; it was counted, and the last good surface stays."""
+        now = _now(now)
+        when = now if captured is None else _arrays.whole("captured", captured, 0, _WRAP - 1)
+        self._native.frame(_arrays.points("positions", positions).tobytes(), when, now)
+
     def work(self, most: int = 1_000) -> Advance:
         """Looks at most at so many rows and triangles of the frame that arrives, and publishes it once it is complete and
         admitted. "pending" if more is due at once. Raises `ValueError` with the reason where a frame is refused."""

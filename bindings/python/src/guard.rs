@@ -3,6 +3,7 @@
 use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::constraint::{ConstraintForce, ConstraintState, SpringDamper};
 use dibs_nostd::failsafe::LimitError;
 use dibs_nostd::filter::FilterError;
@@ -162,6 +163,16 @@ impl Guard {
             Progress::Hello => "hello",
             _ => "stored",
         })
+    }
+
+    /// Positions in the mesh's order, and when they were so.
+    fn frame(&self, py: Python<'_>, positions: &[u8], captured: u32, now: u32) -> PyResult<()> {
+        let outcome = py.detach(|| {
+            let local = |position: DVec3| (position - self.tree.origin).as_vec3();
+            let positions: Vec<Vec3> = bytes::points(positions).into_iter().map(local).collect();
+            with_ends!(self, pair => pair.bus.frame(&positions, Millis(captured), Millis(now)))
+        });
+        outcome.map(|_| ()).map_err(invalid)
     }
 
     fn work(&self, py: Python<'_>, most: u32) -> PyResult<&'static str> {

@@ -86,6 +86,35 @@ class Guards(unittest.TestCase):
                 moved = loop.tick(tool + np.array([0.1, 0, 0] * (len(tool) // 3) + [0]))
                 np.testing.assert_allclose(moved.velocity, [100, 0, 0], atol=0.1)
 
+    def test_a_frame_of_this_process_is_that_of_packets(self):
+        answers = []
+        for is_called in [False, True]:
+            loop = Loop(OTHER, HEART.vertices + ASIDE)
+            if is_called:
+                loop.send = lambda: loop.guard.frame(loop.frame, loop.now) or [*iter(lambda: loop.guard.work(500), "published")]
+            answer = loop.run(1_200, SPHERE + np.array([*ASIDE, 0]))
+            answers.append((answer.closest["separation"], answer.state, answer.age, answer.epoch))
+        self.assertEqual(*answers)
+
+    def test_a_wrong_frame_of_this_process_is_refused(self):
+        loop = Loop()
+        loop.guard.frame(loop.frame, 1_000, captured=993)
+        self.assertEqual([*iter(lambda: loop.guard.work(500), "published")][-1:], ["pending"])
+        self.assertEqual(loop.tick().age, 8)
+        wrong = loop.frame.copy()
+        wrong[5] = np.inf
+        for positions, captured, sentence in [
+            (loop.frame[1:], None, f"{len(loop.frame) - 1} rows"),
+            (loop.frame, 100, "before the published"),
+            (loop.frame, 1_200, "ms old"),
+        ]:
+            with self.assertRaisesRegex(ValueError, sentence):
+                loop.guard.frame(positions, 1_010, captured=captured)
+        with self.assertRaisesRegex(ValueError, "positions"):
+            loop.guard.frame(wrong, 1_010)
+        self.assertEqual(loop.guard.counters["row count"], 1)
+        self.assertEqual(loop.tick().age, 9)
+
     def test_the_state_is_safe_until_acknowledged_and_after_the_age(self):
         loop = Loop(automatic=False)
         first = loop.tick()

@@ -1,8 +1,11 @@
 //! The bus's end: bytes in, published frames and statuses out.
 
+use glam::Vec3;
+
 use super::surface::Notes;
 use super::{GuardLimits, Rows, Vertices};
 use crate::surface::FrameView;
+use crate::tree::VertexOrder;
 use crate::wire::{Counters, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use crate::{
     Advance, Assembler, Error, FrameWriter, Index, Millis, Progress, ReceiveError, Scrub, Tree,
@@ -33,6 +36,8 @@ pub struct Bus<'s, 't, I: Index, M: Mac = NoMac, R: Rows = Vertices> {
     notes: &'s Notes,
     deframer: Deframer<MTU>,
     assembler: Receiver<'s, 't, I, M, R>,
+    /// The mesh's numbers of the rows, by which a frame of this process is read.
+    order: VertexOrder<'t, I>,
     scrub: Scrub<'t>,
     /// Time of the last status.
     reported: Millis,
@@ -66,6 +71,7 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
             notes,
             deframer: Deframer::new(),
             assembler: Assembler::with_mac(writer, gate, tree.mesh_id(), limits.reach, mac),
+            order: R::order(tree, rows),
             scrub: bytes.scrub(),
             reported: Millis(0),
             has_news: false,
@@ -99,6 +105,36 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
     /// [`ReceiveError`] names why the packet or its frame was not taken; the event has been counted.
     pub fn packet(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
         let outcome = self.assembler.accept(packet, now);
+        self.note(outcome.ok());
+        outcome
+    }
+
+    /// Takes a whole frame from this process, say from a solver's own thread: the positions (mm) of all vertices of the
+    /// mesh's file, or of all nodes, in that file's order, that the surface had at `captured` on the receiver's clock.
+    /// [`work`](Self::work) then checks and publishes it, as one that came in packets.
+    ///
+    /// The call counts as a sign of life, and its transit time is 0. One source at a time: a frame of packets that is in
+    /// work is abandoned.
+    ///
+    /// Cost: O(rows), several readings each. No lock: the control tick reads the last surface meanwhile.
+    ///
+    /// # Errors
+    /// [`ReceiveError`], as [`Assembler::frame`]: it has been counted, and the last good surface stays.
+    /// [`RowCount`](ReceiveError::RowCount) for another number of positions than
+    /// [`Tree::file_vertex_count`](crate::Tree::file_vertex_count), or nodes.
+    pub fn frame<P: Copy + Into<Vec3>>(
+        &mut self,
+        positions: &[P],
+        captured: Millis,
+        now: Millis,
+    ) -> Result<Progress, ReceiveError> {
+        let outcome = match self.order.rows(positions) {
+            Some(rows) => self.assembler.frame(rows, captured, now),
+            None => {
+                let rows = u32::try_from(positions.len()).unwrap_or(u32::MAX);
+                Err(self.assembler.refuse_frame(ReceiveError::RowCount { rows }, now))
+            }
+        };
         self.note(outcome.ok());
         outcome
     }

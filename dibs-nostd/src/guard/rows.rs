@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::surface::FrameView;
+use crate::tree::VertexOrder;
 use crate::{Error, Gate, Index, MovingSurface, StretchMonitor, SurfaceBlend, SurfaceLimits, Tree};
 
 /// Rows between the last two frames, or beyond.
@@ -31,6 +32,10 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     /// A row at rest.
     #[doc(hidden)]
     fn rest<I: Index>(tree: &Tree<'_, I>, of: &Self::Of<'_>, row: u32) -> Option<Vec3>;
+
+    /// The order of a frame of this process.
+    #[doc(hidden)]
+    fn order<'t, I: Index>(tree: &Tree<'t, I>, of: &Self::Of<'t>) -> VertexOrder<'t, I>;
 
     /// The check of frames and of their extrapolations.
     #[doc(hidden)]
@@ -88,6 +93,11 @@ impl Rows for Vertices {
     }
 
     #[inline(always)]
+    fn order<'t, I: Index>(tree: &Tree<'t, I>, (): &()) -> VertexOrder<'t, I> {
+        VertexOrder::of(tree)
+    }
+
+    #[inline(always)]
     fn gate<'t, I: Index>(
         tree: &Tree<'t, I>,
         (): &(),
@@ -129,6 +139,10 @@ impl Rows for crate::nodes::Nodes<'static> {
 
     fn rest<I: Index>(_: &Tree<'_, I>, nodes: &Self::Of<'_>, row: u32) -> Option<Vec3> {
         nodes.rest_position(row)
+    }
+
+    fn order<'t, I: Index>(_: &Tree<'t, I>, nodes: &Self::Of<'t>) -> VertexOrder<'t, I> {
+        VertexOrder::of_rows(nodes.count())
     }
 
     fn gate<'t, I: Index>(

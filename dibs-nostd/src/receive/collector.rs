@@ -186,15 +186,15 @@ impl Collector {
         Err(ReceiveError::WrongMesh { mesh_id: packet.mesh_id })
     }
 
-    /// Starts a frame from a genuine begin; `None` for a repeated one. `is_acceptable` has the checks of this receiver.
+    /// Starts a frame from a genuine begin, with its checksum and its contribution to the digest; `None` for a repeated
+    /// one. `is_acceptable` has the checks of this receiver.
     pub fn begin<M: Mac>(
         &mut self,
-        packet: &Packet<'_>,
+        epoch: u32,
         begin: Begin,
-        contribution: u32,
+        [checksum, contribution]: [u32; 2],
         is_acceptable: impl FnOnce(&Begin) -> Result<(), ReceiveError>,
     ) -> Result<Option<Frame>, ReceiveError> {
-        let epoch = packet.epoch;
         let id = FrameId { mesh_id: self.mesh_id, session: begin.session, epoch };
         if self.published.is_some_and(|published| !id.is_after(&published.id)) {
             return Err(ReceiveError::Stale { epoch });
@@ -218,7 +218,7 @@ impl Collector {
             }
         }
         if let Some(frame) = &self.frame {
-            if frame.id == id && frame.begin_checksum == packet.checksum {
+            if frame.id == id && frame.begin_checksum == checksum {
                 return Ok(None);
             }
             if frame.is_complete {
@@ -236,7 +236,7 @@ impl Collector {
             begin,
             received: self.now,
             touched: self.now,
-            begin_checksum: packet.checksum,
+            begin_checksum: checksum,
             sum: contribution,
             arrivals: Arrivals::new(!matches!(begin.content, Content::Partial { .. })),
             commit: None,
@@ -244,6 +244,31 @@ impl Collector {
         };
         self.frame = Some(frame);
         Ok(Some(frame))
+    }
+
+    /// The name of the next frame of this process: after all that have come.
+    pub fn next_id(&self) -> FrameId {
+        let in_work = self.frame.as_ref().map(|frame| frame.id);
+        let published = self.published_id();
+        let later = match (in_work, published) {
+            (Some(in_work), Some(published)) if published.is_after(&in_work) => Some(published),
+            _ => in_work.or(published),
+        };
+        let first = FrameId { mesh_id: self.mesh_id, session: 0, epoch: 1 };
+        later.map_or(first, |last| FrameId { epoch: last.epoch.wrapping_add(1), ..last })
+    }
+
+    /// The place of all rows of the frame in work, which have come at once; their commit with them.
+    pub fn place_whole(&mut self, rows: u32) -> Option<Place> {
+        let frame = self.frame.as_mut()?;
+        frame.commit = Some((2, frame.sum));
+        frame.arrivals.locate(1, 0..rows).ok()
+    }
+
+    /// A frame came from this process, which is alive.
+    pub fn note_local(&mut self) {
+        self.note_packet();
+        self.note_alive(None);
     }
 
     /// The frame in work and the packet's contribution to its digest, if the packet belongs to it.

@@ -6,6 +6,7 @@ mod arrivals;
 mod collector;
 mod error;
 mod health;
+mod local;
 mod packets;
 mod step;
 

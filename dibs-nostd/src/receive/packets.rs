@@ -40,6 +40,19 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     }
 
     fn begin(&mut self, packet: &Packet<'_>, begin: Begin) -> Result<Progress, ReceiveError> {
+        let contribution = packet.verify(&self.mac, begin.session);
+        let contribution = contribution.ok_or(ReceiveError::Forged { epoch: packet.epoch })?;
+        self.begin_frame(packet.epoch, begin, [packet.checksum, contribution])
+    }
+
+    /// Starts a frame whose begin is genuine, with the begin's checksum and its contribution to the digest.
+    #[inline]
+    pub(super) fn begin_frame(
+        &mut self,
+        epoch: u32,
+        begin: Begin,
+        sums: [u32; 2],
+    ) -> Result<Progress, ReceiveError> {
         // An admitted frame that waits for a reader would block this one: try to publish it first.
         if self.is_admitted {
             self.publish();
@@ -58,11 +71,9 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             }
         };
         let is_partial = matches!(begin.content, Content::Partial { .. });
-        let contribution = packet.verify(&self.mac, begin.session);
-        let contribution = contribution.ok_or(ReceiveError::Forged { epoch: packet.epoch })?;
         // Even if this frame is refused, the next one must find the published rows copied.
         self.takes_partial |= is_partial;
-        let begun = self.collector.begin::<M>(packet, begin, contribution, check_begin)?;
+        let begun = self.collector.begin::<M>(epoch, begin, sums, check_begin)?;
         let Some(frame) = begun else { return Ok(Progress::Duplicate) };
         self.is_admitted = false;
         self.clean();
@@ -140,14 +151,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             return Ok(Progress::Duplicate);
         };
         for (row, value) in range.clone().zip(values) {
-            let value = f32::from_le_bytes(*value);
-            let [low, high] = self.gate.weight_range(row).ok_or(out_of_range)?;
-            if !value.is_finite() {
-                return Err(ReceiveError::NotFinite { row });
-            }
-            if !(low <= value && value <= high) {
-                return Err(ReceiveError::TooFar { row });
-            }
+            self.check_weight(row, f32::from_le_bytes(*value))?;
         }
         for (slot, value) in slots.iter().zip(values) {
             slot.set(Vec3::new(f32::from_le_bytes(*value), 0.0, 0.0));
@@ -155,9 +159,20 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         self.stored(packet.epoch, contribution, at, range)
     }
 
+    /// Whether a weight is in its mode's range.
+    #[inline]
+    pub(super) fn check_weight(&self, row: u32, weight: f32) -> Result<(), ReceiveError> {
+        let out_of_range = ReceiveError::OutOfRange { first: row, count: 1 };
+        let [low, high] = self.gate.weight_range(row).ok_or(out_of_range)?;
+        if !weight.is_finite() {
+            return Err(ReceiveError::NotFinite { row });
+        }
+        if low <= weight && weight <= high { Ok(()) } else { Err(ReceiveError::TooFar { row }) }
+    }
+
     /// Notes rows that have been stored.
     #[inline]
-    fn stored(
+    pub(super) fn stored(
         &mut self,
         epoch: u32,
         contribution: u32,
@@ -193,7 +208,7 @@ fn is_within(position: Vec3, limit: f32) -> bool {
 
 /// An error that names the first position that is not finite or beyond the limit.
 #[inline]
-fn check(
+pub(super) fn check(
     positions: impl Iterator<Item = Vec3> + Clone,
     first: u32,
     limit: f32,

@@ -18,6 +18,8 @@ mod facts;
 pub mod format;
 mod header;
 mod index;
+#[cfg(feature = "control")]
+mod order;
 mod row;
 mod scrub;
 pub(crate) mod sections;
@@ -30,6 +32,8 @@ pub use error::FormatError;
 pub use facts::SurfaceFacts;
 pub use format::PathKind;
 pub use index::Index;
+#[cfg(feature = "control")]
+pub(crate) use order::VertexOrder;
 pub use row::{TriangleRow, VertexNumber};
 pub use scrub::{CorruptTreeError, Scrub};
 pub(crate) use shells::RootSet;

@@ -7,6 +7,7 @@
  * SCRIPT  lines, with the receiver's clock in ms:
  *     receive NOW BYTES            bytes of a serial line, in hexadecimal
  *     packet NOW BYTES             a packet
+ *     frame NOW CAPTURED POSITIONS a frame of this process: x, y and z of each vertex, in the mesh's order
  *     work ROWS                    a slice of the checks
  *     status NOW FRAMED            the status for the sender
  *     tick NOW START END RADIUS    a control tick: a capsule, or a sphere where both ends are one
@@ -150,6 +151,14 @@ static void answer_event(dibs_bus *bus, dibs_guard *guard, const char *name, uin
             print_floats(&admitted.least_separation, 1);
             print_floats(&admitted.motion.about.x, 9);
         }
+    } else if (strcmp(name, "frame") == 0) {
+        static float positions[3 * VERTICES];
+        const uint32_t captured = (uint32_t)strtoul(rest, &rest, 10);
+        uint32_t count = 0;
+        while (count < 3 * VERTICES && rest[strspn(rest, " ")] != '\0') {
+            positions[count++] = strtof(rest, &rest);
+        }
+        printf("frame %u", dibs_bus_frame(bus, positions, count / 3, captured, now));
     } else if (strcmp(name, "blind") == 0) {
         dibs_answer answer;
         printf("tick %u", dibs_guard_closest(guard, NULL, now, &answer));

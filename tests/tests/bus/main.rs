@@ -11,6 +11,7 @@ mod guard;
 mod guard_embedded;
 mod life;
 mod line;
+mod local;
 mod order;
 mod partial;
 mod properties;

@@ -189,3 +189,34 @@ fn the_gate_is_exact_whatever_the_bound() {
     println!("{bounded} admitted by the bound, {measured} by measurement, {refused} refused");
     assert!(bounded > 100 && measured > 20 && refused > 20);
 }
+
+/// Weights of this process: those of packets to the bit, and refused as theirs.
+#[test]
+fn weights_come_by_a_call() {
+    let (mut near, mut far) = (bus(), bus());
+    for (epoch, weights) in (1..).zip(near.recorded.clone()) {
+        let now = Millis(7 * epoch);
+        assert!(near.assembler.frame_of_weights(&weights, now, now).is_ok());
+        assert_eq!(near.assembler.advance(u32::MAX), Ok(Advance::Published { epoch }));
+        assert_eq!(far.send(epoch, &weights), Ok(Advance::Published { epoch }));
+        let [near, far] = [&mut near, &mut far].map(|bus| bus.reader.latest(now).of_any_age());
+        assert_eq!(positions(&near.expect("published")), positions(&far.expect("published")));
+    }
+    let good = near.recorded[0].clone();
+    let mut refused = |weights: &[f32]| {
+        let outcome = near.assembler.frame_of_weights(weights, Millis(900), Millis(900));
+        assert_eq!(near.assembler.advance(u32::MAX), Ok(Advance::Idle));
+        outcome.expect_err("wrong")
+    };
+    assert_eq!(refused(&good[1..]), ReceiveError::RowCount { rows: 3 });
+    for (wrong, error) in
+        [(f32::NAN, ReceiveError::NotFinite { row: 2 }), (1e30, ReceiveError::TooFar { row: 2 })]
+    {
+        let mut weights = good.clone();
+        weights[2] = wrong;
+        assert_eq!(refused(&weights), error);
+    }
+    let positions = [Vec3::ZERO; 4].into_iter();
+    let outcome = near.assembler.frame(positions, Millis(900), Millis(900));
+    assert_eq!(outcome, Err(ReceiveError::Encoding));
+}

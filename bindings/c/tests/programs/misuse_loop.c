@@ -101,6 +101,10 @@ static void start(const unsigned char *bytes, size_t length) {
     EXPECT(NULL, dibs_bus_receive(NULL, unmade, 1, 0));
     EXPECT(NULL, dibs_bus_packet(bus, NULL, 1, 0, NULL));
     EXPECT(PACKET_DAMAGED, dibs_bus_packet(bus, unmade, 8, 0, NULL));
+    static const float positions[3] = {1.0f, 2.0f, 3.0f};
+    EXPECT(NULL, dibs_bus_frame(NULL, positions, 1, 0, 0));
+    EXPECT(NULL, dibs_bus_frame(bus, NULL, 1, 0, 0));
+    EXPECT(PACKET_ROWS, dibs_bus_frame(bus, positions, 1, 0, 0));
     EXPECT(NOT_INITIALISED, dibs_bus_work((dibs_bus *)(void *)guard, 1, NULL));
     EXPECT(NOT_INITIALISED, dibs_bus_register((dibs_bus *)(void *)unmade));
     EXPECT(OK, dibs_bus_register(bus));

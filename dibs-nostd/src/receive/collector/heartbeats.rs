@@ -62,7 +62,7 @@ impl Collector {
 
     /// The sender lived when it took the status that it echoes; without an echo, count its arrival. A delayed heartbeat
     /// therefore counts with its delay. An echo ahead of this clock is from another run and counts for nothing.
-    fn note_alive(&mut self, echo: Option<u32>) {
+    pub(in crate::receive) fn note_alive(&mut self, echo: Option<u32>) {
         let at = echo.map_or(self.now, Millis);
         // An echo up to [`AHEAD`] ahead of this clock counts as now.
         let age = elapsed(self.now, at);

@@ -1,0 +1,123 @@
+//! Whole frames of this process, without packets: the same checks, and the same gate.
+
+use glam::Vec3;
+
+use super::health::FrameName;
+use super::packets::check;
+use super::{Assembler, Progress, ReceiveError};
+use crate::stretch::Gate;
+use crate::surface::{Millis, Position, elapsed};
+use crate::wire::{Begin, Content, Encoding, FrameId, Freshness, Mac};
+
+impl<G: Gate, M: Mac> Assembler<'_, G, M> {
+    /// Takes a whole frame from this process, say from a solver's own thread: the positions (mm) of all rows, in the
+    /// rows' order, that the surface had at `captured`, at most 65.5 s before `now` on the receiver's clock. As after a
+    /// frame's last packet, [`advance`](Self::advance) then checks and publishes it.
+    ///
+    /// The call counts as a sign of life, as a heartbeat does, and its transit time is 0. A frame of packets that is in
+    /// work is abandoned: one source at a time.
+    ///
+    /// Cost: O(rows), several readings each.
+    ///
+    /// # Errors
+    /// [`ReceiveError`], counted: another number of rows, a position that is not finite or too far away, a capture too
+    /// old or earlier than the published one's, weights expected, or a complete frame still in work
+    /// ([`Busy`](ReceiveError::Busy)). What was published or in work stays.
+    pub fn frame(
+        &mut self,
+        positions: impl ExactSizeIterator<Item = Vec3> + Clone,
+        captured: Millis,
+        now: Millis,
+    ) -> Result<Progress, ReceiveError> {
+        let limit = self.max_coordinate;
+        let source = |_: &Self| check(positions.clone(), 0, limit);
+        let store = |slots: &[Position]| {
+            for (slot, position) in slots.iter().zip(positions.clone()) {
+                slot.set(position);
+            }
+        };
+        self.local(Content::Whole, positions.len(), source, store, [captured, now])
+    }
+
+    /// The same, of weights of displacement modes.
+    ///
+    /// # Errors
+    /// As [`frame`](Self::frame); [`ReceiveError::TooFar`] for a weight out of its mode's range.
+    pub fn frame_of_weights(
+        &mut self,
+        weights: &[f32],
+        captured: Millis,
+        now: Millis,
+    ) -> Result<Progress, ReceiveError> {
+        let source = |this: &Self| {
+            (0..).zip(weights).try_for_each(|(row, &weight)| this.check_weight(row, weight))
+        };
+        let store = |slots: &[Position]| {
+            for (slot, &weight) in slots.iter().zip(weights) {
+                slot.set(Vec3::new(weight, 0.0, 0.0));
+            }
+        };
+        self.local(Content::Modal, weights.len(), source, store, [captured, now])
+    }
+
+    /// Refuses, and counts, a frame of this process.
+    #[cold]
+    pub(crate) fn refuse_frame(&mut self, rejection: ReceiveError, now: Millis) -> ReceiveError {
+        self.collector.set_now(now);
+        let name = FrameName::of(&self.collector.next_id());
+        self.collector.refuse::<M>(name, true, &rejection);
+        rejection
+    }
+
+    /// Takes a frame whose rows `check` finds good and `store` stores.
+    fn local(
+        &mut self,
+        content: Content,
+        rows: usize,
+        check: impl FnOnce(&Self) -> Result<(), ReceiveError>,
+        store: impl FnOnce(&[Position]),
+        [captured, now]: [Millis; 2],
+    ) -> Result<Progress, ReceiveError> {
+        self.collector.set_now(now);
+        let id = self.collector.next_id();
+        let rows = u32::try_from(rows).unwrap_or(u32::MAX);
+        let age_ms = u16::try_from(elapsed(now, captured).0).unwrap_or(u16::MAX);
+        let begin = Begin {
+            session: id.session,
+            content,
+            encoding: Encoding::Float,
+            rows,
+            surface: self.surface_facts(),
+            freshness: Freshness { age_ms, echo: Some(now.0) },
+        };
+        let outcome = self.local_rows(id, begin, check, store);
+        let outcome = outcome.map_err(|rejection| self.refuse_frame(rejection, now));
+        if outcome.is_ok() {
+            self.collector.note_local();
+        }
+        outcome
+    }
+
+    fn local_rows(
+        &mut self,
+        id: FrameId,
+        begin: Begin,
+        check: impl FnOnce(&Self) -> Result<(), ReceiveError>,
+        store: impl FnOnce(&[Position]),
+    ) -> Result<Progress, ReceiveError> {
+        let (rows, takes_weights) = (begin.rows, self.gate.weight_range(0).is_some());
+        if rows != self.writer.len() {
+            return Err(ReceiveError::RowCount { rows });
+        }
+        if takes_weights != (begin.content == Content::Modal) {
+            return Err(ReceiveError::Encoding);
+        }
+        check(self)?;
+        // A frame of one packet, whose parts add up to 0.
+        self.begin_frame(id.epoch, begin, [0; 2])?;
+        let misplaced = ReceiveError::OutOfRange { first: 0, count: rows };
+        let place = self.collector.place_whole(rows).ok_or(misplaced)?;
+        store(self.writer.rows(0..rows).ok_or(misplaced)?);
+        self.stored(id.epoch, 0, place, 0..rows)
+    }
+}
