@@ -24,7 +24,7 @@ pub struct Options {
     pub demo_seconds: u32,
     /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the viewer's query in
     /// WebAssembly, the paper's experiments in small, a filter, an embedded organ, modal ticks and a flood on the board,
-    /// other processors, the address sanitizer, the fuzzers, and all cases of tests that else try a quarter.
+    /// other processors, the sanitizers, the fuzzers, and all cases of tests that else try a quarter.
     #[arg(long)]
     pub whole: bool,
     /// Only these steps, for machines that run side by side; by default all.

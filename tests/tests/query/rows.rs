@@ -6,6 +6,7 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Contacts, Options, Query, Side, measure_stretch};
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::closest_pair;
+use dibs_tests::sample;
 use dibs_tests::side_poses::bent;
 use dibs_tests::sides::winding_number;
 use dibs_tests::surfaces::{ball, cuboid};
@@ -28,7 +29,7 @@ const LEVEL: f64 = 1e-3;
 /// The number of poses of each case: `DIBS_POSES`, if set.
 fn poses() -> usize {
     let asked = std::env::var("DIBS_POSES").ok().map(|n| n.parse().expect("a number of poses"));
-    asked.unwrap_or(if cfg!(debug_assertions) { 10 } else { 100 })
+    asked.unwrap_or(if cfg!(debug_assertions) { 10 } else { sample(200) })
 }
 
 fn torus(large: f32, small: f32, around: u32, across: u32) -> Mesh {

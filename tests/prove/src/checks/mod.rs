@@ -85,13 +85,14 @@ pub const CHECKS: &[Check] = &[
 
 /// Names of the checks that `cargo xtask test` runs with `--whole` only: each builds one more program, or takes half a
 /// minute besides checks of the same parts, or runs the tests once more under an instrument.
-pub const ON_REQUEST: [&str; 7] = [
+pub const ON_REQUEST: [&str; 8] = [
     filter_board::CHECK.name,
     nodes::CHECK.name,
     flood::CHECK.name,
     tracked_modes::CHECK.name,
     other_processors::CHECK.name,
     sanitizers::ADDRESS.name,
+    sanitizers::THREAD.name,
     fuzz::CHECK.name,
 ];
 
