@@ -24,6 +24,7 @@ Examples:
   dibs build organs.msh -o organs.dibs --labels-from-groups
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16
   dibs build heart.ply -o heart.dibs --nodes heart-fem.msh --motion nodes.npy
+  dibs build heart.ply -o heart.dibs --nodes heart-fem.vtu --bind-within 2
   dibs build heart.ply -o heart.dibs --nodes lattice:14,12,10")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp, .vtu), glTF (.gltf, .glb), Gmsh (.msh) or 3MF, told apart by content
@@ -41,6 +42,9 @@ pub struct Args {
     /// of so many cells. Frames are the nodes then, and --stretch limits each tetrahedron
     #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with_all = ["limits", "modes"])]
     nodes: Option<VolumeSpec>,
+    /// Bind vertices outside of the volume to the nearest tetrahedron, within this distance (mm)
+    #[arg(long, value_name = "MM", requires = "nodes", default_value_t = 0.0)]
+    bind_within: f64,
     /// A label for each face of the file or triangle of the mesh, say of its tissue: text, one number from 0 to 255 a
     /// line, in the file's order
     #[arg(long, value_name = "LABELS")]
@@ -128,6 +132,7 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let nodes = args.nodes.as_ref();
     let volume = nodes.map(|nodes| nodes.volume(mesh, &args.reading.lengths)).transpose()?;
+    let volume = volume.map(|volume| volume.bind_within(args.bind_within));
     let mut tree = build(args, &import, limits, labels, volume.as_ref())
         .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
     if let (Some(path), Some(_)) = (&args.motion, nodes) {

@@ -1,8 +1,9 @@
 //! Surfaces that a volume carries: volumes, motions of their nodes, and their stretch in f64.
 
 use dibs_build::{Mesh, Volume};
-use dibs_nostd::VertexTable;
+use dibs_nostd::format::Link;
 use dibs_nostd::nodes::Nodes;
+use dibs_nostd::{Tree, TriangleRow, VertexTable};
 use fastrand::Rng;
 use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
 
@@ -42,6 +43,50 @@ pub fn hull(mesh: &Mesh, cells: [u32; 3], rng: &mut Rng) -> Volume {
         }
     }
     Volume::new(nodes, tetrahedra).expect("cells that touch")
+}
+
+/// A volume made smaller around its middle, so that vertices are outside: bound within this distance (mm).
+#[must_use]
+pub fn shrunk(volume: &Volume, part: f64, within: f64) -> Volume {
+    let nodes = volume.nodes();
+    let middle = nodes.iter().sum::<DVec3>() / nodes.len() as f64;
+    let nodes = nodes.iter().map(|&at| middle + (at - middle) * part).collect();
+    let smaller = Volume::new(nodes, volume.tetrahedra().to_vec()).expect("as before");
+    smaller.bind_within(within)
+}
+
+/// The triangles below a node of a tree.
+#[derive(Debug)]
+pub struct Section {
+    /// The node's pin.
+    pub pin: u32,
+    /// Its radius (mm).
+    pub radius: f64,
+    /// The rows of the section's vertices.
+    pub covered: Vec<u32>,
+}
+
+/// All sections of a tree.
+#[must_use]
+pub fn sections(tree: &Tree<'_, u16>) -> Vec<Section> {
+    let section = |row: u32| {
+        let (pin, radius, _) = tree.node(row).expect("in the tree");
+        let (mut below, mut covered) = (vec![row], Vec::new());
+        while let Some(row) = below.pop() {
+            match tree.node(row).expect("in the tree").2 {
+                Link::Leaf { first, count } => covered.extend(
+                    (first..first + count)
+                        .filter_map(|row| tree.corners(TriangleRow(row)))
+                        .flatten(),
+                ),
+                Link::Children { first, count } => below.extend(first..first + count),
+            }
+        }
+        covered.sort_unstable();
+        covered.dedup();
+        Section { pin, radius: f64::from(radius), covered }
+    };
+    (0..tree.node_count()).map(section).collect()
 }
 
 /// A motion of nodes.
@@ -127,7 +172,7 @@ pub fn rows(surface: &(impl VertexTable + ?Sized)) -> Vec<Vec3> {
 #[must_use]
 pub fn exact(nodes: &Nodes<'_>, table: &[Vec3], vertex: u32) -> DVec3 {
     let weights = nodes.weights(vertex).expect("in the table");
-    let term = |(node, weight): (u32, u32)| table[node as usize].as_dvec3() * f64::from(weight);
+    let term = |(node, weight): (u32, i32)| table[node as usize].as_dvec3() * f64::from(weight);
     weights.map(term).into_iter().sum::<DVec3>() / 65_536.0
 }
 

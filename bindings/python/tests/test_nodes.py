@@ -59,6 +59,19 @@ class Nodes(unittest.TestCase):
         again = dibs.Tree(tree.blob).rest.query(tools[0])["separation"]
         np.testing.assert_array_equal(again, tree.query(tools[0])["separation"])
 
+    def test_vertices_outside_are_bound(self):
+        nodes = self.nodes * 0.97
+        with self.assertRaisesRegex(ValueError, "bind vertices within that distance"):
+            self.build(nodes=nodes, bind_within=0.01)
+        tree = self.build(nodes=nodes, bind_within=3.0)
+        self.assertGreater(tree.summary["volume"]["amplification"], 1.01)
+        self.assertEqual(self.build().summary["volume"]["amplification"], 1.0)
+        matrix = np.array([[1.05, 0.0, 0.1], [0.0, 0.98, 0.0], [0.0, 0.05, 1.0]])
+        tool = dibs.spheres((90.0, 10.0, 20.0), 5.0)
+        found = tree.surface(nodes @ matrix.T).query(tool)["separation"]
+        truth = dibs.build(self.mesh).surface(self.mesh.vertices @ matrix.T).query(tool)["separation"]
+        np.testing.assert_allclose(found, truth, atol=2e-2)
+
     def test_what_is_no_volume_is_refused(self):
         tree = self.build()
         for scale, why in [

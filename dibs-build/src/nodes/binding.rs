@@ -1,6 +1,6 @@
 //! The binding of a surface's vertices to the tetrahedra of a volume.
 
-use dibs_nostd::nodes::WHOLE;
+use dibs_nostd::nodes::{MOST_SIZES, SIGNED_ZERO, STEP, WHOLE};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -17,6 +17,8 @@ pub(crate) struct Embedding {
     pub tetrahedra: Vec<[u32; 4]>,
     pub is_box: bool,
     pub vertices: Vec<Bound>,
+    /// Whether a vertex is outside of its tetrahedron, so that weights are signed.
+    pub is_signed: bool,
     /// Largest distance (mm) of a vertex from its position in the mesh, caused by rounding its weights.
     pub error: f64,
 }
@@ -25,13 +27,33 @@ pub(crate) struct Embedding {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
     pub tetrahedron: u32,
-    /// They sum up to [`WHOLE`]; the first three are below it.
-    pub weights: [u32; 4],
+    /// Parts of [`WHOLE`], to which they sum up. The first three can be [stored](Embedding::stored).
+    pub weights: [i32; 4],
 }
 
 impl Bound {
+    /// Whether the vertex is outside of its tetrahedron.
+    pub fn is_outside(&self) -> bool {
+        self.weights.iter().any(|&weight| weight < 0)
+    }
+
+    /// The sum of the sizes of its weights.
+    fn sizes(&self) -> u32 {
+        self.weights.iter().map(|weight| weight.unsigned_abs()).sum()
+    }
+}
+
+/// A vertex's place: its tetrahedron, its barycentric coordinates there, and the distance from it.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    tetrahedron: u32,
+    weights: [f64; 4],
+    distance: f64,
+}
+
+impl Place {
     /// Of a vertex that nothing reads.
-    const NONE: Self = Self { tetrahedron: 0, weights: [0, 0, 0, WHOLE] };
+    const NONE: Self = Self { tetrahedron: 0, weights: [0.0, 0.0, 0.0, 1.0], distance: 0.0 };
 }
 
 impl Embedding {
@@ -47,26 +69,47 @@ impl Embedding {
         // A vertex of no triangle may be anywhere.
         let mut is_used = vec![false; mesh.positions.len()];
         mesh.triangles.iter().flatten().for_each(|&vertex| is_used[vertex as usize] = true);
-        let bind = |(position, is_used): (&Vec3, &bool)| match is_used {
-            true => grid.bind(&cells, position.as_dvec3()),
-            false => Ok(Bound::NONE),
+        let place = |(position, is_used): (&Vec3, &bool)| match is_used {
+            true => grid.place_of(&cells, position.as_dvec3()),
+            false => Place::NONE,
         };
-        let bound: Vec<Result<Bound, f64>> =
-            mesh.positions.par_iter().zip(&is_used).map(bind).collect();
-        if let Some(first) = bound.iter().position(Result::is_err) {
-            let outside = bound.iter().filter_map(|bound| bound.err());
-            let (count, distance) =
-                outside.fold((0, 0.0), |(count, far), at| (count + 1, f64::max(far, at)));
+        let places: Vec<Place> = mesh.positions.par_iter().zip(&is_used).map(place).collect();
+        // Written so that a distance of NaN binds none.
+        let is_beyond =
+            |place: &&Place| place.distance > 0.0 && !(place.distance <= volume.within());
+        if let Some(first) = places.iter().position(|place| is_beyond(&place)) {
+            let count = places.iter().filter(is_beyond).count();
+            let distance = places.iter().map(|place| place.distance).fold(0.0, f64::max);
             return Err(VolumeError::Outside { count, first, distance });
         }
-        let vertices: Vec<Bound> = bound.into_iter().flatten().collect();
-        let mut embedding =
-            Self { nodes, tetrahedra, is_box: volume.is_box(), vertices, error: 0.0 };
+        let is_signed = places.iter().any(|place| place.distance > 0.0);
+        let bind = |&Place { tetrahedron, weights, distance }: &Place| Bound {
+            tetrahedron,
+            weights: match (is_signed, distance > 0.0) {
+                (false, _) => rounded(weights.map(|weight| weight.clamp(0.0, 1.0)), 1),
+                (true, false) => rounded(weights.map(|weight| weight.clamp(0.0, 1.0)), STEP),
+                (true, true) => rounded(weights, STEP),
+            },
+        };
+        let vertices: Vec<Bound> = places.iter().map(bind).collect();
+        if let Some(vertex) = vertices.iter().position(|bound| bound.sizes() >= MOST_SIZES) {
+            let distance = places[vertex].distance;
+            return Err(VolumeError::Lever { vertex, distance });
+        }
+        // Lines to a vertex outside leave the box.
+        let is_box = volume.is_box() && !is_signed;
+        let mut embedding = Self { nodes, tetrahedra, is_box, vertices, is_signed, error: 0.0 };
         let moved = mesh.positions.iter().zip(embedding.positions());
         let moved = moved.map(|(position, at)| position.as_dvec3().distance(at));
         let moved = moved.zip(is_used).filter(|(_, is_used)| *is_used);
         embedding.error = moved.map(|(moved, _)| moved).fold(0.0, f64::max);
         Ok(embedding)
+    }
+
+    /// A weight as a tree stores it.
+    pub const fn stored(&self, weight: i32) -> u16 {
+        let signed = weight / STEP as i32 + SIGNED_ZERO as i32;
+        (if self.is_signed { signed } else { weight }) as u16
     }
 
     /// The vertices at rest as the weights give them.
@@ -175,23 +218,32 @@ impl Grid {
         x + self.size[0] * (y + self.size[1] * z)
     }
 
-    /// The binding of a position, or its distance from the volume.
-    fn bind(&self, tetrahedra: &[Cell], position: DVec3) -> Result<Bound, f64> {
+    /// The tetrahedron around a position, or the nearest one. Of several as near it is the one that extrapolates least.
+    fn place_of(&self, tetrahedra: &[Cell], position: DVec3) -> Place {
         let near = &self.cells[self.row(self.place(position))];
         let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
         let weights = near.iter().map(|&at| (at, tetrahedra[at as usize].weights(position)));
         let inner = weights.max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)).then(b.0.cmp(&a.0)));
         match inner {
             Some((tetrahedron, weights)) if least(&weights) >= -OUTSIDE => {
-                Ok(Bound { tetrahedron, weights: rounded(weights) })
+                Place { tetrahedron, weights, distance: 0.0 }
             }
             _ => {
-                let nearer = |nearest: f64, cell: &Cell| {
+                let sizes = |place: &Place| place.weights.iter().map(|w| w.abs()).sum::<f64>();
+                let nearer = |nearest: Place, (tetrahedron, cell): (u32, &Cell)| {
                     let [low, high] = cell.bounds();
-                    let is_far = position.clamp(low, high).distance(position) >= nearest;
-                    if is_far { nearest } else { nearest.min(cell.distance(position)) }
+                    let as_near = nearest.distance * (1.0 + 1e-9);
+                    if position.clamp(low, high).distance(position) > as_near {
+                        return nearest;
+                    }
+                    let (weights, distance) = (cell.weights(position), cell.distance(position));
+                    let place = Place { tetrahedron, weights, distance };
+                    let is_nearer = distance * (1.0 + 1e-9) < nearest.distance
+                        || distance <= as_near && sizes(&place) < sizes(&nearest);
+                    if is_nearer { place } else { nearest }
                 };
-                Err(tetrahedra.iter().fold(f64::INFINITY, nearer))
+                let none = Place { distance: f64::INFINITY, ..Place::NONE };
+                (0..).zip(tetrahedra).fold(none, nearer)
             }
         }
     }
@@ -200,27 +252,30 @@ impl Grid {
 /// A vertex is not outside by less than a weight's unit.
 const OUTSIDE: f64 = 1.0 / WHOLE as f64;
 
-/// Barycentric coordinates as integers with an exact sum, each off by one at most.
-fn rounded(weights: [f64; 4]) -> [u32; 4] {
-    let exact = weights.map(|weight| weight.clamp(0.0, 1.0) * f64::from(WHOLE));
-    let mut rounded = exact.map(|weight| weight as u32);
+/// Barycentric coordinates as parts of [`WHOLE`] with an exact sum, in steps of so many parts, each off by one step at most.
+fn rounded(weights: [f64; 4], step: u32) -> [i32; 4] {
+    let whole = (WHOLE / step) as i32;
+    let exact = weights.map(|weight| weight * f64::from(whole));
+    let mut rounded = exact.map(|weight| weight.floor() as i32);
     let mut order = [0, 1, 2, 3];
-    order.sort_by(|&i, &j| exact[j].fract().total_cmp(&exact[i].fract()));
+    let part = |at: usize| exact[at] - exact[at].floor();
+    order.sort_by(|&i, &j| part(j).total_cmp(&part(i)));
     for at in order.into_iter().cycle().take(16) {
-        let sum: u32 = rounded.iter().sum();
-        match sum.cmp(&WHOLE) {
+        let sum: i32 = rounded.iter().sum();
+        match sum.cmp(&whole) {
             std::cmp::Ordering::Less => rounded[at] += 1,
             std::cmp::Ordering::Equal => break,
-            std::cmp::Ordering::Greater => rounded[at] = rounded[at].saturating_sub(1),
+            // No weight that is not negative becomes so.
+            std::cmp::Ordering::Greater => rounded[at] -= i32::from(rounded[at] != 0),
         }
     }
     // A stored weight has 16 bits.
     for at in 0..3 {
-        if rounded[at] == WHOLE {
-            (rounded[at], rounded[3]) = (WHOLE - 1, 1);
+        if rounded[at] == WHOLE as i32 {
+            (rounded[at], rounded[3]) = (WHOLE as i32 - 1, 1);
         }
     }
-    rounded
+    rounded.map(|weight| weight * step as i32)
 }
 
 /// The distance of a point from a triangle.

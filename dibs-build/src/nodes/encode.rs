@@ -1,6 +1,6 @@
 //! The nodes of a tree as bytes: section 11 of `dibs-nostd`'s `docs/format.md`.
 
-use dibs_nostd::nodes::{LEAST_VOLUME, MARGIN};
+use dibs_nostd::nodes::{HEADER_BYTES, LEAST_VOLUME, MARGIN, SIGNED_ZERO};
 use glam::{DMat3, DVec3};
 
 use super::VolumeError;
@@ -21,7 +21,9 @@ pub(crate) fn encode(
     bytes.extend((shapes.len() as u32).to_le_bytes());
     bytes.extend(round_up(embedding.paths().extent(shapes[0].corners[0])).to_le_bytes());
     bytes.extend(round_up(longest).to_le_bytes());
-    bytes.resize(32, 0);
+    let zero = if embedding.is_signed { SIGNED_ZERO } else { 0 };
+    bytes.extend(zero.to_le_bytes());
+    bytes.resize(HEADER_BYTES, 0);
     for node in &embedding.nodes {
         node.to_array().into_iter().for_each(|x| bytes.extend(x.to_le_bytes()));
     }
@@ -37,7 +39,9 @@ pub(crate) fn encode(
         let of =
             |node: u32| (0..4).find(|&at| corners[at] == node).map_or(0, |at| bound.weights[at]);
         let [a, b, c, _] = shapes[bound.tetrahedron as usize].corners;
-        [a, b, c].into_iter().for_each(|node| bytes.extend((of(node) as u16).to_le_bytes()));
+        [a, b, c]
+            .into_iter()
+            .for_each(|node| bytes.extend(embedding.stored(of(node)).to_le_bytes()));
     }
     Ok(bytes)
 }

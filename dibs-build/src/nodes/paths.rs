@@ -117,12 +117,15 @@ impl<'e> VolumePaths<'e> {
         self.embedding.nodes[node as usize].as_dvec3()
     }
 
-    /// Whether the straight line between two vertices is known to stay in the volume.
+    /// Whether the straight line between two vertices is known to stay in the volume. From a vertex outside it leads to the
+    /// vertex's tetrahedron first, and is part of that.
     fn is_straight(&self, from: u32, to: u32) -> bool {
-        let [start, end] =
-            [from, to].map(|vertex| self.embedding.vertices[vertex as usize].tetrahedron);
         let [a, b] = [from, to].map(|vertex| self.position(vertex));
-        let (mut at, mut before, mut passed) = (start, None, 0.0);
+        let [from, to] = [from, to].map(|vertex| &self.embedding.vertices[vertex as usize]);
+        let [start, end] = [from, to].map(|bound| bound.tetrahedron);
+        let (mut at, mut before) = (start, None);
+        // The part of the line at which it comes into the tetrahedron.
+        let mut passed = if from.is_outside() { self.entry(start, a, b) } else { 0.0 };
         for _ in 0..MOST_CROSSED {
             if at == end {
                 return true;
@@ -136,7 +139,7 @@ impl<'e> VolumePaths<'e> {
             let part = |corner: usize| here[corner] / (here[corner] - there[corner]);
             let Some(out) = leaves.min_by(|&i, &j| part(i).total_cmp(&part(j))) else {
                 // The end is in this tetrahedron, too.
-                return there.iter().all(|&weight| weight >= 0.0);
+                return !to.is_outside() && there.iter().all(|&weight| weight >= 0.0);
             };
             // A line through an edge or a corner may go astray by rounding.
             let is_ahead = part(out) >= passed - ASTRAY && here[out] >= -ASTRAY;
@@ -146,6 +149,17 @@ impl<'e> VolumePaths<'e> {
             (at, before, passed) = (next, Some(at), part(out));
         }
         false
+    }
+
+    /// The part of a line from outside at which it comes through the last plane of a tetrahedron's faces that it begins
+    /// beyond.
+    fn entry(&self, tetrahedron: u32, from: DVec3, to: DVec3) -> f64 {
+        let cell = &self.cells[tetrahedron as usize];
+        let ends = cell.weights(from).into_iter().zip(cell.weights(to));
+        let outer = ends.filter(|(here, _)| *here < 0.0);
+        outer
+            .map(|(here, there)| if there > 0.0 { here / (here - there) } else { f64::INFINITY })
+            .fold(0.0, f64::max)
     }
 
     /// Dijkstra's distances of nodes along the volume's edges, until all `wanted` are known.

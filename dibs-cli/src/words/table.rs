@@ -34,6 +34,7 @@ pub const WORDS: &[Row] = &[
     ("picture", "PICTURE", "the drawing of the stretch", "stretch"),
     ("construction", "CONSTRUCTION", "how the tree is built", "build stretch"),
     ("nodes", "VOLUME", "the volume whose nodes move the surface", "build"),
+    ("bind-within", "MM", "distance from which vertices outside are bound", "build"),
     ("labels", "LABELS", "the file of a label for each triangle", "build"),
     ("labels-from-groups", "", "labels from the mesh's file", "build"),
     ("index", "INDEX", "bits of an index", "build"),

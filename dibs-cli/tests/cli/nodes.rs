@@ -94,6 +94,18 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
     }
     assert!(answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
 
+    // A volume that vertices stick out of.
+    let smaller: Vec<DVec3> = volume.nodes().iter().map(|at| *at * 0.97).collect();
+    std::fs::write(folder.join("smaller.vtk"), vtk(&smaller, volume.tetrahedra())).unwrap();
+    let bound = "build heart.ply -o bound.dibs --nodes smaller.vtk --bind-within";
+    assert!(fails(folder, &format!("{bound} 0.01")).contains("bind vertices within that distance"));
+    let bound = json(folder, &format!("{bound} 3 --json"));
+    assert!(bound["tree"]["volume"]["amplification"].as_f64().unwrap() > 1.01);
+    assert!(succeeds(folder, "inspect bound.dibs").contains("outside  vertices move up to 1."));
+    let ask = "query bound.dibs --tool sphere:0,0,150,5 --json --vertices smaller.vtk";
+    let apart = json(folder, ask)["separation"].as_f64().unwrap() - answers[0].0.as_f64().unwrap();
+    assert!(apart.abs() < 1e-2, "{apart}");
+
     std::fs::write(folder.join("tools.csv"), "sphere:0,0,120,5\n".repeat(200)).unwrap();
     for surface in ["held", "interpolated", "extrapolated"] {
         let line =

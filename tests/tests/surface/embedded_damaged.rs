@@ -74,7 +74,7 @@ fn damaged_nodes_are_refused() {
     let error = defect(&built, |bytes| put(bytes, bindings + 8 * 9, &72_u16.to_le_bytes()));
     assert_eq!(error, Some(NodesError::Binding { vertex: 9, element: 72, elements: 72 }));
     let error = defect(&built, |bytes| put(bytes, bindings + 8 * 9 + 2, &[0xFF; 6]));
-    assert_eq!(error, Some(NodesError::Weights { vertex: 9, sum: 3 * 65_535 }));
+    assert_eq!(error, Some(NodesError::Weights { vertex: 9, sum: 6 * 65_535 - 65_536 }));
 }
 
 /// Nodes belong to trees whose radii are lengths of paths through a volume, and to no others; metrics do not.
