@@ -35,12 +35,12 @@ pub struct Args {
     /// The largest stretch that the tree must cover: a factor of at least 1
     #[arg(long, default_value_t = 1.5)]
     stretch: f32,
-    /// A limit for each triangle instead, as `dibs stretch` writes them
+    /// A limit for each triangle or tetrahedron instead, as `dibs stretch` writes them
     #[arg(long, value_name = "LIMITS", conflicts_with = "stretch")]
     limits: Option<PathBuf>,
     /// A volume whose nodes move the surface: a file of tetrahedra around it (.msh, .vtk, .vtu), or lattice:NX,NY,NZ, a box
     /// of so many cells. Frames are the nodes then, and --stretch limits each tetrahedron
-    #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with_all = ["limits", "modes"])]
+    #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with = "modes")]
     nodes: Option<VolumeSpec>,
     /// Bind vertices outside of the volume to the nearest tetrahedron, within this distance (mm)
     #[arg(long, value_name = "MM", requires = "nodes", default_value_t = 0.0)]
@@ -114,7 +114,14 @@ pub fn run(args: &Args) -> Result<()> {
     let Import { mesh, report, groups, .. } = &import;
     let winding = check_winding(mesh).err().map(|error| error.to_string());
     let crossing = crossing_parts(mesh);
-    let limits = args.limits.as_ref().map(|path| read_limits(path, mesh)).transpose()?;
+    let nodes = args.nodes.as_ref();
+    let volume = nodes.map(|nodes| nodes.volume(mesh, &args.reading.lengths)).transpose()?;
+    let volume = volume.map(|volume| volume.bind_within(args.bind_within));
+    let limits = args.limits.as_ref().map(|path| match &volume {
+        Some(volume) => volume.read_limits(path),
+        None => read_limits(path, mesh),
+    });
+    let limits = limits.transpose()?;
     let labels = match (&args.labels, groups) {
         (Some(path), _) => Some(read_labels(path, &import)?),
         (None, Some(groups)) => Some(groups.labels.clone()),
@@ -130,9 +137,6 @@ pub fn run(args: &Args) -> Result<()> {
         (Some(path), Some(_)) => Some(modes::fit(mesh, path, &args.reading.lengths)?),
         _ => None,
     };
-    let nodes = args.nodes.as_ref();
-    let volume = nodes.map(|nodes| nodes.volume(mesh, &args.reading.lengths)).transpose()?;
-    let volume = volume.map(|volume| volume.bind_within(args.bind_within));
     let mut tree = build(args, &import, limits, labels, volume.as_ref())
         .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
     if let (Some(path), Some(_)) = (&args.motion, nodes) {

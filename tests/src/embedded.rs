@@ -89,6 +89,36 @@ pub fn sections(tree: &Tree<'_, u16>) -> Vec<Section> {
     (0..tree.node_count()).map(section).collect()
 }
 
+/// Climbs, over the positions of the nodes that carry a section, towards a vertex beyond its sphere, and returns how much of
+/// the radius the farthest one took.
+///
+/// # Panics
+/// If one is beyond.
+#[must_use]
+pub fn climb(nodes: &Nodes<'_>, section: &Section, rest: &[Vec3], rng: &mut Rng) -> f64 {
+    let Section { pin, radius, covered } = section;
+    let of = |row: &u32| nodes.weights(*row).expect("in the table").map(|(node, _)| node);
+    let carriers: Vec<u32> = covered.iter().flat_map(of).collect();
+    let part = |frame: &[Vec3]| {
+        let sigma = f64::from(nodes.measure(frame).ok()?.sigma());
+        let at = |row| exact(nodes, frame, row);
+        let away = covered.iter().map(|&row| at(row).distance(at(*pin)));
+        Some(away.fold(0.0, f64::max) / (sigma * radius + 1e-9))
+    };
+    let (mut frame, mut best) = (rest.to_vec(), part(rest).expect("at rest"));
+    for _ in 0..300 {
+        let mut next = frame.clone();
+        let by = Vec3::from([(); 3].map(|()| rng.f32() - 0.5));
+        next[carriers[rng.usize(..carriers.len())] as usize] +=
+            by * 30.0 * 10.0_f32.powf(-2.0 * rng.f32());
+        if let Some(part) = part(&next).filter(|part| *part > best) {
+            assert!(part <= 1.0, "{part} {radius}");
+            (frame, best) = (next, part);
+        }
+    }
+    best
+}
+
 /// A motion of nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeMotion {

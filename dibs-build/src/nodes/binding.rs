@@ -4,9 +4,11 @@ use dibs_nostd::nodes::{MOST_SIZES, SIGNED_ZERO, STEP, WHOLE};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::encode::least_limit;
 use super::paths::VolumePaths;
 use super::{Volume, VolumeError};
 use crate::Mesh;
+use crate::rounding::round_up;
 
 /// A surface bound to a volume: for each vertex its tetrahedron, and the weights of its nodes.
 #[derive(Debug)]
@@ -15,6 +17,10 @@ pub(crate) struct Embedding {
     pub nodes: Vec<Vec3>,
     /// The tetrahedra in the order of their latest nodes, which is that in which frames arrive.
     pub tetrahedra: Vec<[u32; 4]>,
+    /// The volume's number of each.
+    order: Vec<usize>,
+    /// The limit of each as a part of the tree's; empty if all have that.
+    ratios: Vec<f64>,
     pub is_box: bool,
     pub vertices: Vec<Bound>,
     /// Whether a vertex is outside of its tetrahedron, so that weights are signed.
@@ -61,8 +67,10 @@ impl Embedding {
     pub fn new(volume: &Volume, mesh: &Mesh) -> Result<Self, VolumeError> {
         let nodes: Vec<Vec3> =
             volume.nodes().iter().map(|&node| (node - mesh.origin).as_vec3()).collect();
-        let mut tetrahedra = volume.tetrahedra().to_vec();
-        tetrahedra.sort_by_key(|corners| corners.iter().copied().max());
+        let mut order: Vec<usize> = (0..volume.tetrahedra().len()).collect();
+        order.sort_by_key(|&number| volume.tetrahedra()[number].into_iter().max());
+        let tetrahedra: Vec<[u32; 4]> =
+            order.iter().map(|&number| volume.tetrahedra()[number]).collect();
         let cells: Vec<Cell> =
             tetrahedra.iter().map(|&corners| Cell::new(&nodes, corners)).collect();
         let grid = Grid::new(&cells);
@@ -98,12 +106,47 @@ impl Embedding {
         }
         // Lines to a vertex outside leave the box.
         let is_box = volume.is_box() && !is_signed;
-        let mut embedding = Self { nodes, tetrahedra, is_box, vertices, is_signed, error: 0.0 };
+        let ratios = Vec::new();
+        let mut embedding =
+            Self { nodes, tetrahedra, order, ratios, is_box, vertices, is_signed, error: 0.0 };
         let moved = mesh.positions.iter().zip(embedding.positions());
         let moved = moved.map(|(position, at)| position.as_dvec3().distance(at));
         let moved = moved.zip(is_used).filter(|(_, is_used)| *is_used);
         embedding.error = moved.map(|(moved, _)| moved).fold(0.0, f64::max);
         Ok(embedding)
+    }
+
+    /// Limits the stretch of all tetrahedra, or of each by the volume's numbers, and returns the tree's limit: the largest,
+    /// at least what the controller's check tells from the rest shape.
+    pub fn limit(&mut self, stretch: f32, limits: Option<&[f32]>) -> Result<f32, VolumeError> {
+        let mut own = Vec::new();
+        for (tetrahedron, &number) in self.order.iter().enumerate() {
+            let corners = self.tetrahedra[tetrahedron].map(|node| self.nodes[node as usize]);
+            let least = least_limit(corners.map(Vec3::as_dvec3));
+            let least = least.ok_or(VolumeError::Shape { tetrahedron: number })?;
+            own.push(limits.map_or(stretch, |limits| limits[number]).max(round_up(least)));
+        }
+        let most = own.iter().copied().fold(1.0, f32::max);
+        if limits.is_some() && own.iter().any(|&limit| limit < most) {
+            let part = |limit: f32| f64::from(limit) / f64::from(most);
+            self.ratios = own.into_iter().map(part).collect();
+        }
+        Ok(most)
+    }
+
+    /// Whether all tetrahedra have the tree's limit.
+    pub fn is_uniform(&self) -> bool {
+        self.ratios.is_empty()
+    }
+
+    /// A tetrahedron's limit as a part of the tree's.
+    pub fn ratio(&self, tetrahedron: u32) -> f64 {
+        self.ratios.get(tetrahedron as usize).copied().unwrap_or(1.0)
+    }
+
+    /// The volume's number of a tetrahedron.
+    pub fn number(&self, tetrahedron: usize) -> usize {
+        self.order[tetrahedron]
     }
 
     /// A weight as a tree stores it.

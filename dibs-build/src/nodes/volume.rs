@@ -199,6 +199,13 @@ impl Volume {
         &self.tetrahedra
     }
 
+    /// The nodes in f32, from an origin, and the faces of the tetrahedra: what a motion of them is compared with.
+    pub(crate) fn skeleton(&self, origin: DVec3) -> Mesh {
+        let positions = self.nodes.iter().map(|&node| (node - origin).as_vec3()).collect();
+        let faces = self.tetrahedra.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [b, c, d]]);
+        Mesh { origin, positions, triangles: faces.collect() }
+    }
+
     pub(super) const fn within(&self) -> f64 {
         self.within
     }
@@ -260,7 +267,24 @@ fn grid(size: UVec3) -> impl Iterator<Item = UVec3> {
     (0..size.z).flat_map(layer)
 }
 
+/// The largest singular value of the gradient from edges at rest to edges now.
+pub(crate) fn largest_stretch(rest: DMat3, now: DMat3) -> f64 {
+    let gradient = now * rest.inverse();
+    let [a, b, c] = [gradient.x_axis, gradient.y_axis, gradient.z_axis];
+    let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
+    let (ab, ac, bc) = (a.dot(b), a.dot(c), b.dot(c));
+    // The largest root of the characteristic polynomial of the products, which is all real.
+    let mean = (aa + bb + cc) / 3.0;
+    let (x, y, z) = (aa - mean, bb - mean, cc - mean);
+    let size = ((x * x + y * y + z * z) / 6.0 + (ab * ab + ac * ac + bc * bc) / 3.0).sqrt();
+    let determinant = x * (y * z - bc * bc) - ab * (ab * z - bc * ac) + ac * (ab * bc - y * ac);
+    let cosine = (determinant / (2.0 * size.powi(3))).clamp(-1.0, 1.0);
+    // NaN of a gradient that is a rotation.
+    let spread = if size > 0.0 { 2.0 * size * (cosine.acos() / 3.0).cos() } else { 0.0 };
+    (mean + spread).sqrt()
+}
+
 /// The edges along the path through four nodes.
-pub(super) fn edges([a, b, c, d]: [DVec3; 4]) -> DMat3 {
+pub(crate) fn edges([a, b, c, d]: [DVec3; 4]) -> DMat3 {
     DMat3::from_cols(b - a, c - b, d - c)
 }

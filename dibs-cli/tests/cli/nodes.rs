@@ -94,6 +94,20 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
     }
     assert!(answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
 
+    // Limits of each tetrahedron.
+    let line = "stretch heart.ply --nodes volume.msh --motion nodes.pc2 --margin 0.05 --limits heart.limits";
+    let told = succeeds(folder, line);
+    assert!(told.contains("written  heart.limits: a limit for each tetrahedron"), "{told}");
+    let learned = json(folder, &format!("{line} --json"));
+    assert_eq!(learned["worst"][0]["nodes"].as_array().unwrap().len(), 4);
+    let line =
+        "build heart.ply -o learned.dibs --limits heart.limits --motion nodes.pc2 --json --nodes";
+    let tree = json(folder, &format!("{line} volume.msh"));
+    let stated = |limit: &serde_json::Value| limit.as_f64().unwrap();
+    assert_eq!(stated(&tree["tree"]["stretch"]), stated(&learned["uniform_limit"]));
+    let error = fails(folder, &format!("{line} lattice:2,2,2"));
+    assert!(error.contains("heart.limits: is of mesh"), "{error}");
+
     // A volume that vertices stick out of.
     let smaller: Vec<DVec3> = volume.nodes().iter().map(|at| *at * 0.97).collect();
     std::fs::write(folder.join("smaller.vtk"), vtk(&smaller, volume.tetrahedra())).unwrap();

@@ -146,7 +146,15 @@ fn volumes_that_cannot_carry_a_surface_are_refused() {
     assert!(matches!(error, Some(VolumeError::Shape { .. } | VolumeError::Outside { .. })));
     let limits =
         Builder::new().limits(vec![1.5; mesh.triangles.len()]).nodes(&lattice).build(&mesh);
-    assert!(matches!(limits, Err(BuildError::LimitsOfTriangles)));
+    let elements = tetrahedra.len();
+    assert!(matches!(
+        limits,
+        Err(BuildError::Limits { limits: 320, elements: found, of: "tetrahedra" }) if found == elements
+    ));
+    let mut below = vec![1.5; elements];
+    below[7] = 0.9;
+    let below = Builder::new().limits(below).nodes(&lattice).build(&mesh);
+    assert!(matches!(below, Err(BuildError::Limit { of: "tetrahedron", element: 7, .. })));
 }
 
 /// A vertex on a node, an edge or a face is bound exactly, and a volume whose skin is the surface holds it.

@@ -7,7 +7,7 @@ use dibs_nostd::{
     Admission, FrameExtent, Gate, IncomingSurface, Millis, MovingSurface, Options, Sphere,
     StretchError, SurfaceLimits, Tracker, Tree, VertexTable,
 };
-use dibs_tests::embedded::{Section, exact, hull, rows, sections, shrunk};
+use dibs_tests::embedded::{climb, exact, hull, rows, sections, shrunk};
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::tree_bytes::{reseal, section};
 use dibs_tests::{sample, surfaces};
@@ -89,26 +89,7 @@ fn coverage_holds_outside() {
         };
         let outside: Vec<_> = sections.iter().filter(|section| is_outside(section.pin)).collect();
         for _ in 0..sample(200) {
-            let Section { pin, radius, covered } = outside[rng.usize(..outside.len())];
-            let of = |row: &u32| nodes.weights(*row).expect("in the table").map(|(node, _)| node);
-            let carriers: Vec<u32> = covered.iter().flat_map(of).collect();
-            let part = |frame: &[Vec3]| {
-                let sigma = f64::from(nodes.measure(frame).ok()?.sigma());
-                let at = |row| exact(&nodes, frame, row);
-                let away = covered.iter().map(|&row| at(row).distance(at(*pin)));
-                Some(away.fold(0.0, f64::max) / (sigma * radius + 1e-9))
-            };
-            let (mut frame, mut best) = (rest.clone(), part(&rest).expect("at rest"));
-            for _ in 0..300 {
-                let mut next = frame.clone();
-                let by = Vec3::from([(); 3].map(|()| rng.f32() - 0.5));
-                next[carriers[rng.usize(..carriers.len())] as usize] +=
-                    by * 30.0 * 10.0_f32.powf(-2.0 * rng.f32());
-                if let Some(part) = part(&next).filter(|part| *part > best) {
-                    assert!(part <= 1.0, "{part} {radius}");
-                    (frame, best) = (next, part);
-                }
-            }
+            let best = climb(&nodes, outside[rng.usize(..outside.len())], &rest, &mut rng);
             highest = highest.max(best);
         }
     }
