@@ -166,8 +166,12 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
         assert!(error.contains(part), "{vertices}: {error}");
     }
     std::fs::write(folder.join("page.html"), "<!--data-->").unwrap();
-    let error = fails(folder, "view heart.dibs -o heart.html --page page.html");
-    assert!(error.contains("build it without --nodes"), "{error}");
+    for motion in ["", "--motion nodes.pc2"] {
+        let view = format!("view heart.dibs -o heart.html --page page.html {motion}");
+        assert!(succeeds(folder, &view).starts_with("written  heart.html"));
+    }
+    let error = fails(folder, "view bound.dibs --motion heart.ply -o heart.html --page page.html");
+    assert!(error.contains("heart.ply"), "{error}");
     assert_eq!(std::fs::read(folder.join("heart.dibs")).unwrap(), before);
 }
 
