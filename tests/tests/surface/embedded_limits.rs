@@ -90,7 +90,7 @@ fn coverage_holds_with_limits_of_each() {
             let rest: Vec<Vec3> =
                 (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
             let sections = sections(&tree);
-            for trial in 0..sample(160) {
+            for trial in 0..sample(80) {
                 let section = &sections[rng.usize(..sections.len())];
                 let from = match trial % 2 {
                     0 => rest.clone(),
@@ -116,7 +116,7 @@ fn no_element_goes_beyond_its_own_limit() {
         let tree = built.tree::<u16>().expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
         let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
-        for _ in 0..sample(4_000) {
+        for _ in 0..sample(1_200) {
             let mut next = rest.clone();
             let by = Vec3::from([(); 3].map(|()| rng.f32() - 0.5)) * 30.0 * rng.f32();
             next[rng.usize(..rest.len())] += by;
@@ -138,5 +138,5 @@ fn no_element_goes_beyond_its_own_limit() {
             }
         }
     }
-    assert!(closest > 0.99 && refused > 100, "{closest} {refused}");
+    assert!(closest > 0.99 && refused > 30, "{closest} {refused}");
 }
