@@ -28,6 +28,10 @@ pub const DIBS_BUS_SIZE: usize = 3_072;
 pub struct dibs_bus(TheBus);
 
 /// Of frames of vertices, or of the nodes that carry the surface.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "its storage has one size, and there is no allocator"
+)]
 enum TheBus {
     Vertices(Bus<'static, 'static, u16>),
     Nodes(Bus<'static, 'static, u16, NoMac, Nodes<'static>>),

@@ -142,7 +142,7 @@ fn lines(steps: &[Step]) -> String {
             Step::Packet(now, bytes) => writeln!(text, "packet {now} {}", hex(bytes)),
             Step::Receive(now, bytes) => writeln!(text, "receive {now} {}", hex(bytes)),
             Step::Frame(now, captured, positions) => {
-                let numbers = positions.iter().flat_map(|position| position.to_array());
+                let numbers = positions.iter().flat_map(Vec3::to_array);
                 let numbers: String = numbers.map(|number| format!(" {number}")).collect();
                 writeln!(text, "frame {now} {captured}{numbers}")
             }

@@ -66,7 +66,7 @@ fn queries_on_nodes_have_the_same_bits() {
     }
     let [blob, motion, program] = ["tree", "frames", "nodes"].map(|name| folder.path().join(name));
     fs::write(&blob, built.blob()).expect("writable");
-    let floats = frames.iter().flatten().flat_map(|at| at.to_array());
+    let floats = frames.iter().flatten().flat_map(Vec3::to_array);
     fs::write(&motion, floats.flat_map(f32::to_le_bytes).collect::<Vec<u8>>()).expect("writable");
     let mut gcc = tool("gcc", "gcc");
     gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror"]);

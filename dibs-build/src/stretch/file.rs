@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use dibs_nostd::format::CRC;
+use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::read::file;
@@ -123,7 +124,7 @@ impl Limited {
         let mut digest = CRC.digest();
         mesh.positions
             .iter()
-            .flat_map(|at| at.to_array())
+            .flat_map(Vec3::to_array)
             .for_each(|x| digest.update(&x.to_le_bytes()));
         mesh.triangles.iter().flatten().for_each(|corner| digest.update(&corner.to_le_bytes()));
         Self { elements: "triangles", count: mesh.triangles.len(), checksum: digest.finalize() }
@@ -134,7 +135,7 @@ impl Limited {
         volume
             .nodes()
             .iter()
-            .flat_map(|at| at.to_array())
+            .flat_map(DVec3::to_array)
             .for_each(|x| digest.update(&x.to_le_bytes()));
         volume
             .tetrahedra()

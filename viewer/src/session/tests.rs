@@ -161,7 +161,7 @@ fn nodes_move_the_surface() {
     let frames: Vec<Vec<Vec3>> = (0..8).map(frame).collect();
     let tree: Tree<'_, u16> = Tree::from_bytes(built.blob().to_vec().leak()).unwrap();
     let nodes = Nodes::of(&tree).unwrap();
-    let mut session = Running::new(tree.clone(), &pack(&frames), 30.0).unwrap();
+    let mut session = Running::new(tree, &pack(&frames), 30.0).unwrap();
     for (number, between) in
         [Between::Held, Between::Interpolated, Between::Extrapolated].into_iter().enumerate()
     {
