@@ -10,7 +10,7 @@ use crate::construct::{Cluster, Construction, Constructor, Surface, widen};
 use crate::error::BuildError;
 use crate::geodesic::{Graph, Topology};
 use crate::mesh::{Mesh, RestSurface};
-use crate::nodes::{Embedding, Volume, least_limit};
+use crate::nodes::{Embedding, Volume};
 use crate::rest::{LimitRatios, Paths, SHARED, has_area, least_limits};
 use crate::rounding::round_up;
 
@@ -103,7 +103,8 @@ impl<'p> Builder<'p> {
         self
     }
 
-    /// A stretch limit for each of the mesh's triangles, each at least 1, instead of one for all.
+    /// A stretch limit for each of the mesh's triangles, or of the tetrahedra of a [volume](Self::nodes), each at least 1,
+    /// instead of one for all.
     ///
     /// Tissue stretches much in few places, so limits for each triangle make spheres smaller everywhere else.
     /// [`MotionStretch::limits`](crate::MotionStretch::limits) derives them from a recorded motion. Along-surface
@@ -125,6 +126,11 @@ impl<'p> Builder<'p> {
     pub fn nodes(mut self, volume: &Volume) -> Self {
         self.nodes = Some(Arc::new(volume.clone()));
         self
+    }
+
+    /// The volume whose nodes move the surface.
+    pub(crate) fn volume(&self) -> Option<&Volume> {
+        self.nodes.as_deref()
     }
 
     /// A label for each of the mesh's triangles, say of its tissue: [`Tree::label`](dibs_nostd::Tree::label).
@@ -286,12 +292,9 @@ impl<'p> Builder<'p> {
         surface: &(impl RestSurface + ?Sized),
         volume: &Volume,
     ) -> Result<BuiltTree, BuildError> {
-        if self.limits.is_some() {
-            return Err(BuildError::LimitsOfTriangles);
-        }
-        let embedding = Embedding::new(volume, surface.mesh())?;
+        let mut embedding = Embedding::new(volume, surface.mesh())?;
         let mesh = embedding.mesh(surface.mesh());
-        let stretch = self.stretch.max(round_up(least_limit(&embedding)?));
+        let stretch = embedding.limit(self.stretch, self.limits.as_deref())?;
         let paths = embedding.paths();
         // No path along the surface is searched.
         let none = Mesh::default();
@@ -357,12 +360,15 @@ impl<'p> Builder<'p> {
             }
             return Err(BuildError::Stretch { stretch: self.stretch });
         };
-        if limits.len() != mesh.triangles.len() {
-            let (limits, triangles) = (limits.len(), mesh.triangles.len());
-            return Err(BuildError::Limits { limits, triangles });
+        let (elements, of, all) = match &self.nodes {
+            Some(volume) => (volume.tetrahedra().len(), "tetrahedron", "tetrahedra"),
+            None => (mesh.triangles.len(), "triangle", "triangles"),
+        };
+        if limits.len() != elements {
+            return Err(BuildError::Limits { limits: limits.len(), elements, of: all });
         }
         match limits.iter().position(|limit| !possible.contains(limit)) {
-            Some(triangle) => Err(BuildError::Limit { triangle, limit: limits[triangle] }),
+            Some(element) => Err(BuildError::Limit { of, element, limit: limits[element] }),
             None => Ok(()),
         }
     }

@@ -65,13 +65,15 @@ pub enum BuildError {
     },
     /// The number of limits differs from that of triangles.
     #[error(
-        "{limits} stretch limits for a mesh of {triangles} triangles: there must be one for each"
+        "{limits} stretch limits, and there are {elements} of {of}: there must be one for each"
     )]
     Limits {
         /// Limits given.
         limits: usize,
-        /// Triangles of the mesh.
-        triangles: usize,
+        /// Triangles of the mesh, or tetrahedra of the volume.
+        elements: usize,
+        /// Which of these, in the plural.
+        of: &'static str,
     },
     /// The number of labels differs from that of triangles.
     #[error("{labels} labels for a mesh of {triangles} triangles: there must be one for each")]
@@ -83,11 +85,13 @@ pub enum BuildError {
     },
     /// A triangle's stretch limit that is not a number of at least 1.
     #[error(
-        "triangle {triangle} has a stretch limit of {limit}: it is a factor of at least 1 (at most 1e6)"
+        "{of} {element} has a stretch limit of {limit}: it is a factor of at least 1 (at most 1e6)"
     )]
     Limit {
-        /// The triangle.
-        triangle: usize,
+        /// `triangle`, or `tetrahedron` of a volume.
+        of: &'static str,
+        /// Its number.
+        element: usize,
         /// Its limit.
         limit: f32,
     },
@@ -120,11 +124,6 @@ pub enum BuildError {
     /// The nodes do not pass their own validation: a defect of the builder.
     #[error("the builder made nodes that its own checker rejects ({0}); please report this mesh")]
     InvalidNodes(#[from] dibs_nostd::nodes::NodesError),
-    /// Limits of single triangles, where a volume's tetrahedra are limited.
-    #[error(
-        "triangles of a surface that a volume carries have no limits of their own: give one for all, by --stretch"
-    )]
-    LimitsOfTriangles,
     /// The tree does not pass its own validation: a defect of the builder.
     #[error("the builder made a tree that its own checker rejects ({0}); please report this mesh")]
     Invalid(#[from] dibs_nostd::FormatError),

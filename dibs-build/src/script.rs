@@ -183,7 +183,13 @@ impl TreeScript {
             MeshSource::Mesh(mesh) => Box::new(mesh),
         };
         let builder = match &self.limits {
-            Some(path) => builder.limits(read_limits(path, surface.mesh())?),
+            Some(path) => {
+                let limits = match builder.volume() {
+                    Some(volume) => volume.read_limits(path)?,
+                    None => read_limits(path, surface.mesh())?,
+                };
+                builder.limits(limits)
+            }
             None => builder,
         };
         let builder = match &self.labels {

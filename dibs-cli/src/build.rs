@@ -24,6 +24,7 @@ Examples:
   dibs build organs.msh -o organs.dibs --labels-from-groups
   dibs build heart.ply -o heart.dibs --motion heart.pc2 --modes 16
   dibs build heart.ply -o heart.dibs --nodes heart-fem.msh --motion nodes.npy
+  dibs build heart.ply -o heart.dibs --nodes heart-fem.vtu --bind-within 2
   dibs build heart.ply -o heart.dibs --nodes lattice:14,12,10")]
 pub struct Args {
     /// The rest shape: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp, .vtu), glTF (.gltf, .glb), Gmsh (.msh) or 3MF, told apart by content
@@ -34,13 +35,16 @@ pub struct Args {
     /// The largest stretch that the tree must cover: a factor of at least 1
     #[arg(long, default_value_t = 1.5)]
     stretch: f32,
-    /// A limit for each triangle instead, as `dibs stretch` writes them
+    /// A limit for each triangle or tetrahedron instead, as `dibs stretch` writes them
     #[arg(long, value_name = "LIMITS", conflicts_with = "stretch")]
     limits: Option<PathBuf>,
     /// A volume whose nodes move the surface: a file of tetrahedra around it (.msh, .vtk, .vtu), or lattice:NX,NY,NZ, a box
     /// of so many cells. Frames are the nodes then, and --stretch limits each tetrahedron
-    #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with_all = ["limits", "modes"])]
+    #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with = "modes")]
     nodes: Option<VolumeSpec>,
+    /// Bind vertices outside of the volume to the nearest tetrahedron, within this distance (mm)
+    #[arg(long, value_name = "MM", requires = "nodes", default_value_t = 0.0)]
+    bind_within: f64,
     /// A label for each face of the file or triangle of the mesh, say of its tissue: text, one number from 0 to 255 a
     /// line, in the file's order
     #[arg(long, value_name = "LABELS")]
@@ -110,7 +114,14 @@ pub fn run(args: &Args) -> Result<()> {
     let Import { mesh, report, groups, .. } = &import;
     let winding = check_winding(mesh).err().map(|error| error.to_string());
     let crossing = crossing_parts(mesh);
-    let limits = args.limits.as_ref().map(|path| read_limits(path, mesh)).transpose()?;
+    let nodes = args.nodes.as_ref();
+    let volume = nodes.map(|nodes| nodes.volume(mesh, &args.reading.lengths)).transpose()?;
+    let volume = volume.map(|volume| volume.bind_within(args.bind_within));
+    let limits = args.limits.as_ref().map(|path| match &volume {
+        Some(volume) => volume.read_limits(path),
+        None => read_limits(path, mesh),
+    });
+    let limits = limits.transpose()?;
     let labels = match (&args.labels, groups) {
         (Some(path), _) => Some(read_labels(path, &import)?),
         (None, Some(groups)) => Some(groups.labels.clone()),
@@ -126,8 +137,6 @@ pub fn run(args: &Args) -> Result<()> {
         (Some(path), Some(_)) => Some(modes::fit(mesh, path, &args.reading.lengths)?),
         _ => None,
     };
-    let nodes = args.nodes.as_ref();
-    let volume = nodes.map(|nodes| nodes.volume(mesh, &args.reading.lengths)).transpose()?;
     let mut tree = build(args, &import, limits, labels, volume.as_ref())
         .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
     if let (Some(path), Some(_)) = (&args.motion, nodes) {

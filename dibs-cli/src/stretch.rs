@@ -3,9 +3,12 @@
 use crate::construction::ConstructionArgs;
 use crate::mesh_file::{self, MeshArgs};
 use crate::motion::MotionFile;
+use crate::nodes::{self, VolumeSpec};
 use crate::overwrite;
 use anyhow::{Context, Result, anyhow, bail};
-use dibs_build::{Mesh, Motion, MotionStretch, Needed, Paths, write_atomically, write_limits};
+use dibs_build::{
+    Mesh, Motion, MotionStretch, Needed, Paths, Volume, write_atomically, write_limits,
+};
 use plotters::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -15,22 +18,26 @@ Examples:
   dibs stretch heart.ply --motion heart.pc2
   dibs stretch heart.ply --motion heart.pc2 --margin 0.1 --limits heart.limits --picture stretch.svg
   dibs build heart.ply -o heart.dibs --limits heart.limits --motion heart.pc2
+  dibs stretch heart.ply --nodes heart-fem.msh --motion nodes.npy --limits heart.limits
 
 A triangle's stretch is the largest singular value of its deformation gradient against the mesh file, or
-with --construction paper the longest of its edges over that edge's length there. Give the same options for reading
+with --construction paper the longest of its edges over that edge's length there; a tetrahedron's is the same. Give the same options for reading
 the mesh as to `dibs build`.")]
 pub struct Args {
     /// The rest shape, a mesh file as for `dibs build`
     mesh: PathBuf,
+    /// The volume whose nodes move the surface, as for `dibs build`: the motion is theirs, and each tetrahedron has a limit
+    #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with = "construction")]
+    nodes: Option<VolumeSpec>,
     #[command(flatten)]
     motion: MotionFile,
     /// What limits leave above the recorded stretch (0.1: a tenth of it)
     #[arg(long, default_value_t = 0.1)]
     margin: f32,
-    /// Write a limit for each triangle, for `dibs build --limits`
+    /// Write a limit for each triangle or tetrahedron, for `dibs build --limits`
     #[arg(long, value_name = "LIMITS")]
     limits: Option<PathBuf>,
-    /// Draw how many triangles stretch how far, SVG
+    /// Draw how many of them stretch how far, SVG
     #[arg(long)]
     picture: Option<PathBuf>,
     #[command(flatten)]
@@ -59,32 +66,45 @@ pub fn run(args: &Args) -> Result<()> {
         );
     }
     let path = args.motion.required()?;
-    overwrite::check([&args.mesh, path], args.limits.iter().chain(&args.picture))?;
+    let volume = args.nodes.as_ref().and_then(VolumeSpec::file);
+    let inputs = [&args.mesh, path].into_iter().chain(volume);
+    overwrite::check(inputs, args.limits.iter().chain(&args.picture))?;
     let import = mesh_file::read(&args.mesh, &args.reading, false)?;
     let mesh = &import.mesh;
     let motion = args.reading.lengths.motion(path, mesh.origin)?;
     let paths = if args.edges { Paths::Edges } else { args.construction.paths() };
-    let needed = measure(mesh, &motion, path, paths)?;
+    let lengths = &args.reading.lengths;
+    let volume = args.nodes.as_ref().map(|nodes| nodes.volume(mesh, lengths)).transpose()?;
+    let elements = volume.as_ref().map_or(Elements::Triangles(mesh), Elements::Tetrahedra);
+    let needed = match &volume {
+        Some(volume) => MotionStretch::of_nodes(volume, &motion, &|_| ())
+            .map_err(|error| anyhow!("{}: {error}", path.display()))?,
+        None => measure(mesh, &motion, path, paths)?,
+    };
+    let (one, all) = elements.names();
     let ranked = needed.ranked();
     let limits = needed.limits(args.margin);
     if let Some(limits_file) = &args.limits {
         let comment = format!(
-            "Stretch limits of the triangles of {}: what {} needs, and {} of it more.",
+            "Stretch limits of the {all} of {}: what {} needs, and {} of it more.",
             args.mesh.display(),
             path.display(),
             args.margin
         );
-        write_limits(limits_file, mesh, &limits, &comment)?;
+        match elements {
+            Elements::Triangles(mesh) => write_limits(limits_file, mesh, &limits, &comment)?,
+            Elements::Tetrahedra(volume) => volume.write_limits(limits_file, &limits, &comment)?,
+        }
     }
     if let Some(path) = &args.picture {
-        let picture = draw(&ranked).with_context(|| path.display().to_string())?;
+        let picture = draw(&ranked, all).with_context(|| path.display().to_string())?;
         write_atomically(path, |out| out.write_all(picture.as_bytes()))?;
     }
     let percentiles = PERCENTILES.map(|share| (share, percentile(&ranked, share)));
     let uniform = limits.iter().copied().fold(1.0, f32::max);
     let worst = ranked.get(..NAMED).unwrap_or(&ranked);
     if args.json {
-        let worst = worst.iter().map(|needed| named(mesh, needed)).collect::<Vec<_>>();
+        let worst = worst.iter().map(|needed| elements.named(needed)).collect::<Vec<_>>();
         println!(
             "{:#}",
             serde_json::json!({
@@ -98,18 +118,18 @@ pub fn run(args: &Args) -> Result<()> {
     println!("read     {}: {}", args.mesh.display(), import.report);
     println!("motion   {}: {} frames", path.display(), motion.frames.len());
     for (share, stretch) in percentiles {
-        println!("stretch  {share:6} % of the triangles stretch by at most {stretch:.4}");
+        println!("stretch  {share:6} % of the {all} stretch by at most {stretch:.4}");
     }
     for &Needed { triangle, stretch, frame } in worst {
-        let [a, b, c] = mesh.triangles[triangle];
-        println!(
-            "worst    triangle {triangle} (vertices {a} {b} {c}): {stretch:.4} in frame {frame}"
-        );
+        let corners = elements.corners(triangle);
+        let corners = corners.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
+        let points = if volume.is_some() { "nodes" } else { "vertices" };
+        println!("worst    {one} {triangle} ({points} {corners}): {stretch:.4} in frame {frame}");
     }
     println!("needs    with a margin of {}: --stretch {uniform:.4} for all alike", args.margin);
     match &args.limits {
-        Some(path) => println!("written  {}: a limit for each triangle", path.display()),
-        None => println!("         or a limit for each triangle: --limits FILE"),
+        Some(path) => println!("written  {}: a limit for each {one}", path.display()),
+        None => println!("         or a limit for each {one}: --limits FILE"),
     }
     if let Some(path) = &args.picture {
         println!("written  {}", path.display());
@@ -131,16 +151,45 @@ fn percentile(ranked: &[Needed], share: f64) -> f64 {
     ranked[beyond.min(ranked.len() - 1)].stretch
 }
 
-fn named(mesh: &Mesh, needed: &Needed) -> serde_json::Value {
-    let Needed { triangle, stretch, frame } = *needed;
-    let vertices = mesh.triangles[triangle];
-    serde_json::json!({
-        "triangle": triangle, "vertices": vertices, "stretch": stretch, "frame": frame
-    })
+/// What is stretched.
+#[derive(Clone, Copy)]
+enum Elements<'m> {
+    Triangles(&'m Mesh),
+    Tetrahedra(&'m Volume),
+}
+
+impl Elements<'_> {
+    /// One of them, and all.
+    const fn names(&self) -> (&'static str, &'static str) {
+        match self {
+            Self::Triangles(_) => ("triangle", "triangles"),
+            Self::Tetrahedra(_) => ("tetrahedron", "tetrahedra"),
+        }
+    }
+
+    /// The vertices or nodes of one.
+    fn corners(&self, number: usize) -> Vec<u32> {
+        match self {
+            Self::Triangles(mesh) => mesh.triangles[number].to_vec(),
+            Self::Tetrahedra(volume) => volume.tetrahedra()[number].to_vec(),
+        }
+    }
+
+    fn named(&self, &Needed { triangle, stretch, frame }: &Needed) -> serde_json::Value {
+        let corners = self.corners(triangle);
+        match self {
+            Self::Triangles(_) => serde_json::json!({
+                "triangle": triangle, "vertices": corners, "stretch": stretch, "frame": frame
+            }),
+            Self::Tetrahedra(_) => serde_json::json!({
+                "tetrahedron": triangle, "nodes": corners, "stretch": stretch, "frame": frame
+            }),
+        }
+    }
 }
 
 /// The share of the triangles that stretch beyond each value, as SVG.
-fn draw(ranked: &[Needed]) -> Result<String> {
+fn draw(ranked: &[Needed], all: &str) -> Result<String> {
     let mut picture = String::new();
     {
         let root = SVGBackend::with_string(&mut picture, (900, 420)).into_drawing_area();
@@ -156,7 +205,7 @@ fn draw(ranked: &[Needed]) -> Result<String> {
         chart
             .configure_mesh()
             .x_desc("largest stretch in the motion")
-            .y_desc("triangles beyond (%)")
+            .y_desc(format!("{all} beyond (%)"))
             .light_line_style(TRANSPARENT)
             .draw()?;
         let points = ranked.iter().enumerate().map(|(i, n)| (n.stretch.max(1.0), share(i + 1)));

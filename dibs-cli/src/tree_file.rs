@@ -111,6 +111,12 @@ pub fn print(summary: &Summary) {
             "nodes    {} of {} tetrahedra, {} bytes of the flash; a frame is their positions",
             v.nodes, v.tetrahedra, v.flash_bytes
         );
+        if v.amplification > 1.0 {
+            println!(
+                "outside  vertices move up to {:.2} times as far as nodes, and so do their errors",
+                v.amplification
+            );
+        }
     }
     if let Some(m) = s.modes {
         println!(

@@ -1,8 +1,9 @@
 //! Surfaces that a volume carries: volumes, motions of their nodes, and their stretch in f64.
 
 use dibs_build::{Mesh, Volume};
-use dibs_nostd::VertexTable;
+use dibs_nostd::format::Link;
 use dibs_nostd::nodes::Nodes;
+use dibs_nostd::{Tree, TriangleRow, VertexTable};
 use fastrand::Rng;
 use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
 
@@ -42,6 +43,80 @@ pub fn hull(mesh: &Mesh, cells: [u32; 3], rng: &mut Rng) -> Volume {
         }
     }
     Volume::new(nodes, tetrahedra).expect("cells that touch")
+}
+
+/// A volume made smaller around its middle, so that vertices are outside: bound within this distance (mm).
+#[must_use]
+pub fn shrunk(volume: &Volume, part: f64, within: f64) -> Volume {
+    let nodes = volume.nodes();
+    let middle = nodes.iter().sum::<DVec3>() / nodes.len() as f64;
+    let nodes = nodes.iter().map(|&at| middle + (at - middle) * part).collect();
+    let smaller = Volume::new(nodes, volume.tetrahedra().to_vec()).expect("as before");
+    smaller.bind_within(within)
+}
+
+/// The triangles below a node of a tree.
+#[derive(Debug)]
+pub struct Section {
+    /// The node's pin.
+    pub pin: u32,
+    /// Its radius (mm).
+    pub radius: f64,
+    /// The rows of the section's vertices.
+    pub covered: Vec<u32>,
+}
+
+/// All sections of a tree.
+#[must_use]
+pub fn sections(tree: &Tree<'_, u16>) -> Vec<Section> {
+    let section = |row: u32| {
+        let (pin, radius, _) = tree.node(row).expect("in the tree");
+        let (mut below, mut covered) = (vec![row], Vec::new());
+        while let Some(row) = below.pop() {
+            match tree.node(row).expect("in the tree").2 {
+                Link::Leaf { first, count } => covered.extend(
+                    (first..first + count)
+                        .filter_map(|row| tree.corners(TriangleRow(row)))
+                        .flatten(),
+                ),
+                Link::Children { first, count } => below.extend(first..first + count),
+            }
+        }
+        covered.sort_unstable();
+        covered.dedup();
+        Section { pin, radius: f64::from(radius), covered }
+    };
+    (0..tree.node_count()).map(section).collect()
+}
+
+/// Climbs, over the positions of the nodes that carry a section, towards a vertex beyond its sphere, and returns how much of
+/// the radius the farthest one took.
+///
+/// # Panics
+/// If one is beyond.
+#[must_use]
+pub fn climb(nodes: &Nodes<'_>, section: &Section, rest: &[Vec3], rng: &mut Rng) -> f64 {
+    let Section { pin, radius, covered } = section;
+    let of = |row: &u32| nodes.weights(*row).expect("in the table").map(|(node, _)| node);
+    let carriers: Vec<u32> = covered.iter().flat_map(of).collect();
+    let part = |frame: &[Vec3]| {
+        let sigma = f64::from(nodes.measure(frame).ok()?.sigma());
+        let at = |row| exact(nodes, frame, row);
+        let away = covered.iter().map(|&row| at(row).distance(at(*pin)));
+        Some(away.fold(0.0, f64::max) / (sigma * radius + 1e-9))
+    };
+    let (mut frame, mut best) = (rest.to_vec(), part(rest).expect("at rest"));
+    for _ in 0..300 {
+        let mut next = frame.clone();
+        let by = Vec3::from([(); 3].map(|()| rng.f32() - 0.5));
+        next[carriers[rng.usize(..carriers.len())] as usize] +=
+            by * 30.0 * 10.0_f32.powf(-2.0 * rng.f32());
+        if let Some(part) = part(&next).filter(|part| *part > best) {
+            assert!(part <= 1.0, "{part} {radius}");
+            (frame, best) = (next, part);
+        }
+    }
+    best
 }
 
 /// A motion of nodes.
@@ -127,7 +202,7 @@ pub fn rows(surface: &(impl VertexTable + ?Sized)) -> Vec<Vec3> {
 #[must_use]
 pub fn exact(nodes: &Nodes<'_>, table: &[Vec3], vertex: u32) -> DVec3 {
     let weights = nodes.weights(vertex).expect("in the table");
-    let term = |(node, weight): (u32, u32)| table[node as usize].as_dvec3() * f64::from(weight);
+    let term = |(node, weight): (u32, i32)| table[node as usize].as_dvec3() * f64::from(weight);
     weights.map(term).into_iter().sum::<DVec3>() / 65_536.0
 }
 

@@ -1,5 +1,6 @@
 //! Errors of a session.
 
+use dibs_nostd::nodes::NodesError;
 use dibs_nostd::{FormatError, QueryError, StretchError, ToolError};
 use thiserror::Error;
 
@@ -9,6 +10,9 @@ pub enum SessionError {
     /// The tree's bytes.
     #[error("the page's tree is damaged: {0}; write the page again with `dibs view`")]
     Tree(#[from] FormatError),
+    /// The tree's nodes.
+    #[error("the page's tree is damaged: {0}; write the page again with `dibs view`")]
+    Nodes(#[from] NodesError),
     /// The motion's bytes.
     #[error(
         "the page's motion has {found} bytes, which is no number of frames of {frame} bytes; write the page again"

@@ -1,7 +1,10 @@
 //! The frames of a motion, and the surface at a moment of it.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Index, MeasuredStretch, Tree, measure_stretch};
+use dibs_nostd::nodes::Nodes;
+use dibs_nostd::{
+    Index, MeasuredStretch, PathKind, StretchError, Tree, VertexTable, measure_stretch,
+};
 
 use crate::SessionError;
 
@@ -17,11 +20,66 @@ pub enum Between {
     Extrapolated,
 }
 
+/// A surface at one time. Of a tree with nodes it is computed from theirs.
+#[derive(Debug, Default)]
+pub struct Frame {
+    positions: Vec<Vec3>,
+    nodes: Vec<Vec3>,
+    error: f32,
+}
+
+impl Frame {
+    /// The surface of these rows, of vertices or of nodes.
+    fn new(nodes: Option<&Nodes<'_>>, rows: Vec<Vec3>) -> Self {
+        let Some(nodes) = nodes else { return Self { positions: rows, ..Self::default() } };
+        let surface = nodes.surface(rows.as_slice());
+        let positions = (0..nodes.vertex_count()).filter_map(|row| surface.position(row)).collect();
+        let error = surface.position_error();
+        Self { positions, nodes: rows, error }
+    }
+
+    /// Positions of the vertices.
+    #[must_use]
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+}
+
+impl VertexTable for Frame {
+    fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.positions.get(vertex as usize).copied()
+    }
+
+    fn position_error(&self) -> f32 {
+        self.error
+    }
+}
+
+/// The stretch of a tree's surface beyond two frames, by a part of the step between them.
+///
+/// # Errors
+/// As [`measure_stretch`] and [`Nodes::measure`].
+pub fn stretch_beyond<I: Index>(
+    tree: &Tree<'_, I>,
+    [before, last]: [&Frame; 2],
+    part: f32,
+    surface: &impl VertexTable,
+) -> Result<MeasuredStretch, StretchError> {
+    let Ok(nodes) = Nodes::of(tree) else { return measure_stretch(tree, surface) };
+    let pairs = before.nodes.iter().zip(&last.nodes);
+    let beyond: Vec<Vec3> = pairs.map(|(&a, &b)| a + (b - a) * (1.0 + part)).collect();
+    nodes.measure(beyond.as_slice())
+}
+
 /// A cyclic motion, in the order of the tree's rows, with the stretch of each frame.
 #[derive(Debug)]
 pub struct Motion {
-    /// Positions, frame by frame. They live as long as the page.
-    pub frames: &'static [Vec<Vec3>],
+    /// They live as long as the page.
+    pub frames: &'static [Frame],
     /// The stretch of each frame.
     pub stretches: Vec<MeasuredStretch>,
     /// Frames a second.
@@ -33,23 +91,37 @@ impl Motion {
     ///
     /// # Errors
     /// [`SessionError::Motion`] for a wrong number of bytes, [`SessionError::NoRest`] for a tree without rest shape and
-    /// no motion, [`SessionError::Stretch`] for a frame beyond the tree's limit.
+    /// no motion, [`SessionError::Stretch`] for a frame beyond the tree's limit, [`SessionError::Nodes`] for damaged nodes.
     pub fn new<I: Index>(
         tree: &Tree<'_, I>,
         packed: &[u8],
         rate: f64,
     ) -> Result<Self, SessionError> {
-        let frames = if packed.is_empty() {
-            let rest = (0..tree.vertex_count()).map(|row| tree.rest_position(row));
+        let nodes = match tree.paths() {
+            PathKind::Volume => Some(Nodes::of(tree)?),
+            _ => None,
+        };
+        let count = nodes.map_or(tree.vertex_count(), |nodes| nodes.count());
+        let rows = if packed.is_empty() {
+            let rest = |row| match &nodes {
+                Some(nodes) => nodes.rest_position(row),
+                None => tree.rest_position(row),
+            };
+            let rest = (0..count).map(rest);
             vec![rest.collect::<Option<Vec<Vec3>>>().ok_or(SessionError::NoRest)?]
         } else {
-            unpack(packed, tree.vertex_count() as usize)?
+            unpack(packed, count as usize)?
         };
-        let measure = |(frame, positions): (usize, &Vec<Vec3>)| {
-            measure_stretch(tree, positions.as_slice())
-                .map_err(|error| SessionError::Stretch { frame, error })
+        let measure = |(frame, rows): (usize, &Vec<Vec3>)| {
+            let stretch = match &nodes {
+                Some(nodes) => nodes.measure(rows.as_slice()),
+                None => measure_stretch(tree, rows.as_slice()),
+            };
+            stretch.map_err(|error| SessionError::Stretch { frame, error })
         };
-        let stretches = frames.iter().enumerate().map(measure).collect::<Result<_, _>>()?;
+        let stretches = rows.iter().enumerate().map(measure).collect::<Result<_, _>>()?;
+        let frames: Vec<Frame> =
+            rows.into_iter().map(|rows| Frame::new(nodes.as_ref(), rows)).collect();
         Ok(Self { frames: frames.leak(), stretches, rate })
     }
 

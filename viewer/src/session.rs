@@ -5,10 +5,11 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Budget, FormatError, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity,
-    Query, Step, Tool, Tracker, Tree, TriangleRow, VertexTable, format, measure_stretch,
+    Query, Step, Tool, Tracker, Tree, TriangleRow, VertexTable, format,
 };
 
 use crate::contacts::{Found, Speeds, Touching, Velocity};
+use crate::motion::{Frame, stretch_beyond};
 use crate::spheres::{self, Recorder};
 use crate::{Between, Instrument, Motion, SessionError};
 
@@ -140,8 +141,6 @@ pub fn open(tree: Vec<u8>, packed: &[u8], rate: f64) -> Result<Box<dyn Session>,
     })
 }
 
-type Frame = [Vec3];
-
 /// The surface as it is now.
 enum Surface {
     Held(dibs_nostd::MovingTable<'static, Frame>),
@@ -160,6 +159,13 @@ impl VertexTable for Surface {
         match self {
             Self::Held(surface) => surface.position(vertex),
             Self::Moving(surface) => surface.position(vertex),
+        }
+    }
+
+    fn position_error(&self) -> f32 {
+        match self {
+            Self::Held(surface) => surface.position_error(),
+            Self::Moving(surface) => surface.position_error(),
         }
     }
 }
@@ -197,7 +203,7 @@ impl<I: Index> Running<I> {
     fn new(tree: Tree<'static, I>, packed: &[u8], rate: f64) -> Result<Self, SessionError> {
         let motion = Motion::new(&tree, packed, rate)?;
         let mut odometer = Odometer::new(&tree);
-        let first = motion.frames[0].as_slice();
+        let first = &motion.frames[0];
         let step = odometer.step(first, first);
         let now = Now {
             surface: Surface::Held(step.after()),
@@ -242,7 +248,7 @@ impl<I: Index> Running<I> {
 
     fn step_to(&mut self, before: usize, frame: usize) {
         let frames = self.motion.frames;
-        self.step = self.odometer.step(frames[before].as_slice(), frames[frame].as_slice());
+        self.step = self.odometer.step(&frames[before], &frames[frame]);
         (self.before, self.last) = (before, frame);
     }
 
@@ -260,12 +266,16 @@ impl<I: Index> Running<I> {
                 (Surface::Moving(self.step.at(share)), before.or_larger(last).unwrap_or(last))
             }
             // An extrapolated surface beyond the limit is not searched: the last frame is held.
-            Between::Extrapolated => match measure_stretch(&self.tree, &self.step.beyond(share)) {
-                Ok(stretch) if stretch.sigma() <= self.settings.limit => {
-                    (Surface::Moving(self.step.beyond(share)), stretch)
+            Between::Extrapolated => {
+                let frames = [self.before, self.last].map(|frame| &self.motion.frames[frame]);
+                let beyond = self.step.beyond(share);
+                match stretch_beyond(&self.tree, frames, share, &beyond) {
+                    Ok(stretch) if stretch.sigma() <= self.settings.limit => {
+                        (Surface::Moving(beyond), stretch)
+                    }
+                    _ => (held, last),
                 }
-                _ => (held, last),
-            },
+            }
         };
     }
 
@@ -422,7 +432,7 @@ impl<I: Index> Session for Running<I> {
             None => (),
         }
         let [before, last] =
-            [self.before, self.last].map(|frame| self.motion.frames[frame].as_slice());
+            [self.before, self.last].map(|frame| self.motion.frames[frame].positions());
         contacts.move_with(&Speeds { before, last, rate: self.now.rate })?;
         Ok(Touching::new(&self.contacts, margin, self.now.velocity))
     }

@@ -185,7 +185,7 @@
 /**
  * Bytes of a tree's storage.
  */
-#define DIBS_TREE_SIZE 384
+#define DIBS_TREE_SIZE 640
 
 /**
  * Bytes of a scrub's storage.
@@ -1794,9 +1794,13 @@ typedef struct {
  */
 typedef struct {
   /**
-   * Vertices: rows of a surface.
+   * Vertices.
    */
   uint32_t vertices;
+  /**
+   * Rows of a frame: the nodes that carry the surface where the tree has any (`dibs build --nodes`), else its vertices.
+   */
+  uint32_t rows;
   /**
    * Triangles.
    */
@@ -1866,7 +1870,7 @@ extern "C" {
  * @param tree     Its tree.
  * @param limits   The guard's limits: the same as for `dibs_guard_init`.
  * @param bus      Receives the bus's address.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_STORAGE_SIZE`
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many rows; `DIBS_CODE_STORAGE_SIZE`
  *         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
  *         `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` where the limits need one; or a misuse.
  */
@@ -1986,7 +1990,7 @@ dibs_code dibs_bus_counters(dibs_bus *bus, uint32_t *counters);
 dibs_code dibs_bus_get_facts(dibs_bus *bus, dibs_bus_facts *facts);
 
 /**
- * Position (mm) of a vertex in the frame published last, for a checksum of the published rows, or a log.
+ * Position (mm) of a vertex, or node, in the frame published last, for a checksum of the published rows, or a log.
  *
  * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex, or a
  *         misuse.
@@ -2265,6 +2269,25 @@ dibs_code dibs_frame_set_vertices(dibs_frame *frame,
                                   float position_error);
 
 /**
+ * Makes the frame the surface that these nodes carry, of a tree that `dibs build --nodes` made. Vertices are computed where a
+ * query reads them. The stretch is not measured: queries take the tree's limit.
+ *
+ * @param frame           The frame; one that a reader holds is released first.
+ * @param tree            The tree, used for as long as the frame has these nodes.
+ * @param positions       x, y and z (mm) of each node, in the order of the volume's file. Not copied: unchanged until the
+ *                        frame is given other positions or released.
+ * @param nodes           Their number.
+ * @param position_error  No node is farther (mm, at least 0) than this from where it is here.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` of another number than the tree's `rows`, `DIBS_CODE_ARGUMENT` where the tree
+ *         has no nodes, or for an error that is negative or not finite, or a misuse.
+ */
+dibs_code dibs_frame_set_nodes(dibs_frame *frame,
+                               dibs_tree *tree,
+                               const float *positions,
+                               uint32_t nodes,
+                               float position_error);
+
+/**
  * Measures the stretch of the frame's vertices, which makes queries on it cheaper. Frames from a receiver are measured.
  *
  * Cost: linear in the triangles.
@@ -2298,7 +2321,7 @@ dibs_code dibs_frame_release(dibs_frame *frame);
  * @param tree     Its tree.
  * @param limits   The guard's limits: the same as for `dibs_bus_init`.
  * @param guard    Receives the guard's address.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_STORAGE_SIZE`
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many rows; `DIBS_CODE_STORAGE_SIZE`
  *         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
  *         `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
  */
@@ -2377,7 +2400,7 @@ dibs_code dibs_answer_force(const dibs_answer *answer, const dibs_wall *wall, di
  *
  * Cost: linear in the bytes; once, at start-up.
  *
- * @param memory  `DIBS_START_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no
+ * @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that carry them), aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no
  *                initial value.
  * @param size    Bytes of the memory.
  * @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
@@ -2385,7 +2408,7 @@ dibs_code dibs_answer_force(const dibs_answer *answer, const dibs_wall *wall, di
  * @param limits  The guard's limits.
  * @param bus     Receives the bus's address.
  * @param guard   Receives the guard's address.
- * @return As of the four functions; `DIBS_CODE_STORAGE_SIZE` where the tree has more vertices than there is room for.
+ * @return As of the four functions; `DIBS_CODE_STORAGE_SIZE` where the tree has more rows than there is room for.
  */
 dibs_code dibs_start(void *memory,
                      size_t size,
@@ -2658,7 +2681,7 @@ dibs_code dibs_scene_contacts(const dibs_scene *scene,
  * @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, or `DIBS_GUARDED_SIZE(vertices)` for a guard, aligned to
  *                  `DIBS_ALIGNMENT`. Needs no initial value. For as long as its two ends and their frames are used.
  * @param size      Bytes of the storage.
- * @param vertices  Vertices of the surface: those of the tree.
+ * @param vertices  Rows of the surface: `rows` of the tree's facts.
  * @param surface   Receives the surface's address.
  */
 dibs_code dibs_surface_init(void *storage,

@@ -40,6 +40,10 @@ struct Frame : Object<dibs_frame, DIBS_FRAME_SIZE, dibs_frame_init> {
     Code set(std::span<const float> positions, float error = 0.0f) {
         return dibs_frame_set_vertices(*this, positions.data(), uint32_t(positions.size() / 3), error);
     }
+    /** x, y and z (mm) of each node that carries the surface, which outlive the frame or its release. */
+    Code set_nodes(dibs_tree *tree, std::span<const float> positions, float error = 0.0f) {
+        return dibs_frame_set_nodes(*this, tree, positions.data(), uint32_t(positions.size() / 3), error);
+    }
 };
 /** Contacts of a query, a scene or a tracker. */
 struct Contacts : Object<dibs_contacts, DIBS_CONTACTS_SIZE, dibs_contacts_init> {

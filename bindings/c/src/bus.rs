@@ -3,8 +3,9 @@
 use core::ffi::c_void;
 
 use dibs_nostd::guard::Bus;
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::{Event, NoMac};
-use dibs_nostd::{Millis, TreeBytes, VertexTable};
+use dibs_nostd::{Advance, Millis, Progress, ReceiveError, TreeBytes, VertexTable};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
@@ -26,7 +27,38 @@ pub const DIBS_BUS_SIZE: usize = 3_072;
 /// later, or the loop works with the interrupt masked.
 pub struct dibs_bus(TheBus);
 
-type TheBus = Bus<'static, 'static, u16>;
+/// Of frames of vertices, or of the nodes that carry the surface.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "its storage has one size, and there is no allocator"
+)]
+enum TheBus {
+    Vertices(Bus<'static, 'static, u16>),
+    Nodes(Bus<'static, 'static, u16, NoMac, Nodes<'static>>),
+}
+
+/// Calls a function of the bus, of either kind.
+macro_rules! with_bus {
+    ($bus:expr, |$own:ident| $call:expr) => {
+        match $bus {
+            TheBus::Vertices($own) => $call,
+            TheBus::Nodes($own) => $call,
+        }
+    };
+}
+
+impl TheBus {
+    const STATUS_BYTES: usize = Bus::<'static, 'static, u16>::STATUS_BYTES;
+    const STATUS_FRAMED: usize = Bus::<'static, 'static, u16>::STATUS_FRAMED;
+
+    fn packet(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
+        with_bus!(self, |bus| bus.packet(packet, now))
+    }
+
+    fn work(&mut self, most: u32) -> Result<Advance, ReceiveError> {
+        with_bus!(self, |bus| bus.work(most))
+    }
+}
 
 const _: () = assert!(TheBus::STATUS_FRAMED == DIBS_STATUS);
 
@@ -43,7 +75,7 @@ impl Kind for dibs_bus {
 /// @param tree     Its tree.
 /// @param limits   The guard's limits: the same as for `dibs_guard_init`.
 /// @param bus      Receives the bus's address.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_STORAGE_SIZE`
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many rows; `DIBS_CODE_STORAGE_SIZE`
 ///         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
 ///         `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` where the limits need one; or a misuse.
 #[unsafe(no_mangle)]
@@ -58,10 +90,17 @@ pub extern "C" fn dibs_bus_init(
     dibs_code::of(|| {
         storage.make(size, bus, || {
             let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?.read()?);
-            surface.check_guarded(tree.tree.vertex_count())?;
-            let tree = (&tree.tree, TreeBytes::new(tree.bytes), &());
-            let bus = surface.with_writer(|writer| {
-                Ok(TheBus::new(&surface.notes, writer, tree, &limits, NoMac)?)
+            surface.check_guarded(tree.rows())?;
+            let (bytes, notes) = (TreeBytes::new(tree.bytes), &surface.notes);
+            let bus = surface.with_writer(|writer| match &tree.nodes {
+                None => {
+                    let tree = (&tree.tree, bytes, &());
+                    Ok(TheBus::Vertices(Bus::new(notes, writer, tree, &limits, NoMac)?))
+                }
+                Some(nodes) => {
+                    let tree = (&tree.tree, bytes, nodes);
+                    Ok(TheBus::Nodes(Bus::new(notes, writer, tree, &limits, NoMac)?))
+                }
             });
             Ok(dibs_bus(bus?))
         })
@@ -86,7 +125,8 @@ pub extern "C" fn dibs_bus_receive(
     now: u32,
 ) -> dibs_code {
     dibs_code::of(|| {
-        bus.open()?.0.receive(bytes.slice(length)?, Millis(now));
+        let (bytes, mut bus) = (bytes.slice(length)?, bus.open()?);
+        with_bus!(&mut bus.0, |bus| bus.receive(bytes, Millis(now)));
         Ok(())
     })
 }
@@ -142,7 +182,7 @@ pub extern "C" fn dibs_bus_frame(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (mut bus, rows) = (bus.open()?, rows(positions, count)?);
-        let _ = bus.0.frame(rows, Millis(captured), Millis(now))?;
+        let _ = with_bus!(&mut bus.0, |bus| bus.frame(rows, Millis(captured), Millis(now)))?;
         Ok(())
     })
 }
@@ -198,9 +238,9 @@ pub extern "C" fn dibs_bus_status(
         let (mut bus, mut packet) = (bus.open()?, [0; TheBus::STATUS_BYTES]);
         let mut line = [0; DIBS_STATUS];
         let status = if framed == 0 {
-            bus.0.status(Millis(now), &mut packet)
+            with_bus!(&mut bus.0, |bus| bus.status(Millis(now), &mut packet))
         } else {
-            bus.0.status_framed(Millis(now), &mut line)
+            with_bus!(&mut bus.0, |bus| bus.status_framed(Millis(now), &mut line))
         };
         length.set(out.fill(status.unwrap_or_default())?);
         Ok(())
@@ -215,7 +255,7 @@ pub extern "C" fn dibs_bus_status(
 pub extern "C" fn dibs_bus_counters(bus: *mut dibs_bus, counters: *mut u32) -> dibs_code {
     dibs_code::of(|| {
         let (out, bus) = (counters.places(DIBS_EVENTS)?, bus.open()?);
-        let all = bus.0.counters();
+        let all = with_bus!(&bus.0, |bus| bus.counters());
         out.fill(&Event::ALL.map(|event| all.of(event))).map(|_| ())
     })
 }
@@ -240,17 +280,18 @@ pub struct dibs_bus_facts {
 pub extern "C" fn dibs_bus_get_facts(bus: *mut dibs_bus, facts: *mut dibs_bus_facts) -> dibs_code {
     dibs_code::of(|| {
         let (facts, bus) = (facts.check()?, bus.open()?);
-        let epoch = bus.0.surface().and_then(|surface| surface.epoch());
+        let surface = with_bus!(&bus.0, |bus| bus.surface());
+        let epoch = surface.and_then(|surface| surface.epoch());
         facts.set(dibs_bus_facts {
             is_published: epoch.is_some().into(),
             epoch: epoch.unwrap_or(0),
-            rounds: bus.0.rounds(),
+            rounds: with_bus!(&bus.0, |bus| bus.rounds()),
         });
         Ok(())
     })
 }
 
-/// Position (mm) of a vertex in the frame published last, for a checksum of the published rows, or a log.
+/// Position (mm) of a vertex, or node, in the frame published last, for a checksum of the published rows, or a log.
 ///
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex, or a
 ///         misuse.
@@ -262,7 +303,7 @@ pub extern "C" fn dibs_bus_position(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (place, bus) = (position.check()?, bus.open()?);
-        let surface = bus.0.surface().ok_or(dibs_code::NoSurface)?;
+        let surface = with_bus!(&bus.0, |bus| bus.surface()).ok_or(dibs_code::NoSurface)?;
         place.set(surface.position(vertex).ok_or(dibs_code::Argument)?.into());
         Ok(())
     })
@@ -274,7 +315,7 @@ pub extern "C" fn dibs_bus_position(
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_register(bus: *mut dibs_bus) -> dibs_code {
     dibs_code::of(|| {
-        bus.open()?.0.register();
+        with_bus!(&mut bus.open()?.0, |bus| bus.register());
         Ok(())
     })
 }

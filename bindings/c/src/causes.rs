@@ -83,9 +83,9 @@ impl From<StretchError> for dibs_code {
         match error {
             StretchError::NoMetric => Self::TreeNoMetric,
             StretchError::VertexCount { .. } => Self::VertexCount,
-            StretchError::Shrunk { .. } => Self::Shrunk,
+            StretchError::Shrunk { .. } | StretchError::ElementsShrunk { .. } => Self::Shrunk,
             StretchError::TooFast { .. } => Self::TooFast,
-            StretchError::InsideOut { .. } => Self::InsideOut,
+            StretchError::InsideOut { .. } | StretchError::Inverted { .. } => Self::InsideOut,
             StretchError::Corrupt { .. } => Self::TreeCorrupt,
             _ => Self::StretchExceeded,
         }

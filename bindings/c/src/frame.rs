@@ -3,6 +3,7 @@
 use core::ffi::c_void;
 
 use dibs_nostd::glam::Vec3;
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{MeasuredStretch, VertexTable, measure_stretch};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
@@ -75,28 +76,52 @@ impl VertexTable for Table {
     }
 }
 
-/// Vertices of the caller's.
+/// Vertices of the caller's, or those that nodes of the caller's carry.
 pub(crate) struct Vertices {
+    rows: Rows,
+    nodes: Option<&'static Nodes<'static>>,
+    stretch: Option<MeasuredStretch>,
+}
+
+/// Positions of the caller's.
+struct Rows {
     rows: &'static [[f32; 3]],
     position_error: f32,
-    stretch: Option<MeasuredStretch>,
 }
 
 impl Vertices {
     /// Vertices whose stretch is not measured.
     pub(crate) const fn new(rows: &'static [[f32; 3]], position_error: f32) -> Self {
-        Self { rows, position_error, stretch: None }
+        Self { rows: Rows { rows, position_error }, nodes: None, stretch: None }
     }
 }
 
-impl VertexTable for Vertices {
+impl VertexTable for Rows {
     fn len(&self) -> usize {
         self.rows.len()
     }
 
     #[inline(always)]
+    fn position(&self, row: u32) -> Option<Vec3> {
+        self.rows.get(row as usize).copied().map(Vec3::from_array)
+    }
+
+    fn position_error(&self) -> f32 {
+        self.position_error
+    }
+}
+
+impl VertexTable for Vertices {
+    fn len(&self) -> usize {
+        self.nodes.map_or(self.rows.len(), |nodes| nodes.surface(&self.rows).len())
+    }
+
+    #[inline(always)]
     fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.rows.get(vertex as usize).copied().map(Vec3::from_array)
+        match self.nodes {
+            None => self.rows.position(vertex),
+            Some(nodes) => nodes.surface(&self.rows).position(vertex),
+        }
     }
 
     fn stretch(&self) -> Option<MeasuredStretch> {
@@ -104,7 +129,8 @@ impl VertexTable for Vertices {
     }
 
     fn position_error(&self) -> f32 {
-        self.position_error
+        let own = self.rows.position_error();
+        self.nodes.map_or(own, |nodes| nodes.surface(&self.rows).position_error())
     }
 }
 
@@ -165,6 +191,41 @@ pub extern "C" fn dibs_frame_set_vertices(
     })
 }
 
+/// Makes the frame the surface that these nodes carry, of a tree that `dibs build --nodes` made. Vertices are computed where a
+/// query reads them. The stretch is not measured: queries take the tree's limit.
+///
+/// @param frame           The frame; one that a reader holds is released first.
+/// @param tree            The tree, used for as long as the frame has these nodes.
+/// @param positions       x, y and z (mm) of each node, in the order of the volume's file. Not copied: unchanged until the
+///                        frame is given other positions or released.
+/// @param nodes           Their number.
+/// @param position_error  No node is farther (mm, at least 0) than this from where it is here.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` of another number than the tree's `rows`, `DIBS_CODE_ARGUMENT` where the tree
+///         has no nodes, or for an error that is negative or not finite, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_frame_set_nodes(
+    frame: *mut dibs_frame,
+    tree: *mut dibs_tree,
+    positions: *const f32,
+    nodes: u32,
+    position_error: f32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (mut frame, tree) = (frame.open()?, tree.share()?);
+        let rows = rows(positions, nodes)?;
+        let own = tree.nodes.as_ref().ok_or(dibs_code::Argument)?;
+        if !(position_error >= 0.0 && position_error.is_finite()) {
+            return Err(dibs_code::Argument);
+        }
+        if own.count() != nodes {
+            return Err(dibs_code::VertexCount);
+        }
+        let vertices = Vertices::new(rows, position_error);
+        frame.table = Table::Vertices(Vertices { nodes: Some(own), ..vertices });
+        Ok(())
+    })
+}
+
 /// So many positions of the caller's.
 pub(crate) fn rows(positions: *const f32, count: u32) -> Result<&'static [[f32; 3]], dibs_code> {
     let floats = (count as usize).checked_mul(3).ok_or(dibs_code::Argument)?;
@@ -193,7 +254,10 @@ pub extern "C" fn dibs_frame_measure(
             Table::Held(held) => held.stretch().ok_or(dibs_code::NoSurface)?,
             Table::Vertices(vertices) => {
                 vertices.stretch = None;
-                let measured = measure_stretch(tree, vertices)?;
+                let measured = match vertices.nodes {
+                    Some(nodes) => nodes.measure(&vertices.rows)?,
+                    None => measure_stretch(tree, vertices)?,
+                };
                 vertices.stretch = Some(measured);
                 measured
             }

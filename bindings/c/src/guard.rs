@@ -7,6 +7,7 @@ use bytemuck::AnyBitPattern;
 use dibs_nostd::filter::{FilterError, Motion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Guard};
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Interval, Millis, Proximity, TreeBytes, Unavailable};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
@@ -32,7 +33,27 @@ pub const DIBS_GUARD_SIZE: usize = 22_272;
 /// One context at a time: the control interrupt, of higher priority than the bus's.
 pub struct dibs_guard(TheGuard);
 
-type TheGuard = Guard<'static, 'static, u16, STACK, DIBS_OPENED>;
+/// Of frames of vertices, or of the nodes that carry the surface.
+enum TheGuard {
+    Vertices(Guard<'static, 'static, u16, STACK, DIBS_OPENED>),
+    Nodes(Guard<'static, 'static, u16, STACK, DIBS_OPENED, Nodes<'static>>),
+}
+
+/// Calls a function of the guard, of either kind.
+macro_rules! with_guard {
+    ($guard:expr, |$own:ident| $call:expr) => {
+        match $guard {
+            TheGuard::Vertices($own) => $call,
+            TheGuard::Nodes($own) => $call,
+        }
+    };
+}
+
+impl TheGuard {
+    fn without_pose(&mut self, now: Millis) -> Answer {
+        with_guard!(self, |guard| guard.without_pose(now))
+    }
+}
 
 impl Kind for dibs_guard {
     const MARK: u32 = 0x6462_6718;
@@ -47,7 +68,7 @@ impl Kind for dibs_guard {
 /// @param tree     Its tree.
 /// @param limits   The guard's limits: the same as for `dibs_bus_init`.
 /// @param guard    Receives the guard's address.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_STORAGE_SIZE`
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many rows; `DIBS_CODE_STORAGE_SIZE`
 ///         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
 ///         `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
 #[unsafe(no_mangle)]
@@ -62,10 +83,18 @@ pub extern "C" fn dibs_guard_init(
     dibs_code::of(|| {
         storage.make(size, guard, || {
             let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?.read()?);
-            surface.check_guarded(tree.tree.vertex_count())?;
-            let tree = (&tree.tree, TreeBytes::new(tree.bytes), ());
-            let guard = surface
-                .with_reader(|reader| Ok(TheGuard::new(&surface.notes, reader, tree, &limits)?));
+            surface.check_guarded(tree.rows())?;
+            let (bytes, notes) = (TreeBytes::new(tree.bytes), &surface.notes);
+            let guard = surface.with_reader(|reader| match tree.nodes {
+                None => {
+                    let tree = (&tree.tree, bytes, ());
+                    Ok(TheGuard::Vertices(Guard::new(notes, reader, tree, &limits)?))
+                }
+                Some(nodes) => {
+                    let tree = (&tree.tree, bytes, nodes);
+                    Ok(TheGuard::Nodes(Guard::new(notes, reader, tree, &limits)?))
+                }
+            });
             Ok(dibs_guard(guard?))
         })
     })
@@ -180,8 +209,12 @@ pub extern "C" fn dibs_guard_closest(
         let shape = tool.get_if_any()?.map(Shape::try_from).transpose();
         // Without a pose the machine takes its step all the same.
         let found = match &shape {
-            Ok(Some(Shape::Sphere(sphere))) => guard.0.closest(sphere, now),
-            Ok(Some(Shape::Capsule(capsule))) => guard.0.closest(capsule, now),
+            Ok(Some(Shape::Sphere(sphere))) => {
+                with_guard!(&mut guard.0, |guard| guard.closest(sphere, now))
+            }
+            Ok(Some(Shape::Capsule(capsule))) => {
+                with_guard!(&mut guard.0, |guard| guard.closest(capsule, now))
+            }
             Ok(None) | Err(_) => guard.0.without_pose(now),
         };
         let mut found = dibs_answer::from(found);
@@ -225,8 +258,12 @@ pub extern "C" fn dibs_guard_admit(
         let (tool, mut guard, now) = (tool.get()?, guard.open()?, Millis(now));
         let shape = Shape::try_from(tool);
         let (found, admitted) = match &shape {
-            Ok(Shape::Sphere(sphere)) => guard.0.admit(&filter, sphere, &command, now),
-            Ok(Shape::Capsule(capsule)) => guard.0.admit(&filter, capsule, &command, now),
+            Ok(Shape::Sphere(sphere)) => {
+                with_guard!(&mut guard.0, |guard| guard.admit(&filter, sphere, &command, now))
+            }
+            Ok(Shape::Capsule(capsule)) => {
+                with_guard!(&mut guard.0, |guard| guard.admit(&filter, capsule, &command, now))
+            }
             // Without a pose the machine takes its step all the same.
             Err(_) => {
                 let no_pose = FilterError::Untrusted(Unavailable::NoPose);
@@ -249,7 +286,7 @@ pub extern "C" fn dibs_guard_admit(
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_ACKNOWLEDGE` unless the last tick waited for it, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_guard_acknowledge(guard: *mut dibs_guard) -> dibs_code {
-    dibs_code::of(|| Ok(guard.open()?.0.acknowledge()?))
+    dibs_code::of(|| Ok(with_guard!(&mut guard.open()?.0, |guard| guard.acknowledge())?))
 }
 
 /// The force of a wall on the tool, from a tick's answer.
@@ -280,7 +317,7 @@ pub const DIBS_START_BASE: usize = DIBS_TREE_SIZE + DIBS_BUS_SIZE + DIBS_GUARD_S
 ///
 /// Cost: linear in the bytes; once, at start-up.
 ///
-/// @param memory  `DIBS_START_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no
+/// @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that carry them), aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no
 ///                initial value.
 /// @param size    Bytes of the memory.
 /// @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
@@ -288,7 +325,7 @@ pub const DIBS_START_BASE: usize = DIBS_TREE_SIZE + DIBS_BUS_SIZE + DIBS_GUARD_S
 /// @param limits  The guard's limits.
 /// @param bus     Receives the bus's address.
 /// @param guard   Receives the guard's address.
-/// @return As of the four functions; `DIBS_CODE_STORAGE_SIZE` where the tree has more vertices than there is room for.
+/// @return As of the four functions; `DIBS_CODE_STORAGE_SIZE` where the tree has more rows than there is room for.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_start(
     memory: *mut c_void,
@@ -307,9 +344,9 @@ pub extern "C" fn dibs_start(
         let (mut bus, mut guard) = (ptr::null_mut(), ptr::null_mut());
         dibs_tree_init(memory, size, bytes, length, &raw mut tree).done()?;
         let room = size.checked_sub(DIBS_START_BASE).ok_or(dibs_code::StorageSize)?;
-        let vertices = tree.share()?.tree.vertex_count();
+        let rows = tree.share()?.rows();
         let at = |offset| memory.wrapping_byte_add(offset);
-        dibs_surface_init(at(DIBS_START_BASE), room, vertices, &raw mut surface).done()?;
+        dibs_surface_init(at(DIBS_START_BASE), room, rows, &raw mut surface).done()?;
         dibs_bus_init(at(BUS), DIBS_BUS_SIZE, surface, tree, limits, &raw mut bus).done()?;
         dibs_guard_init(at(GUARD), DIBS_GUARD_SIZE, surface, tree, limits, &raw mut guard)
             .done()?;

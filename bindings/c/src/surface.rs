@@ -63,7 +63,7 @@ const _: () = assert!(align_of::<Head>() == 4 && align_of::<Position>() == 4);
 /// @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, or `DIBS_GUARDED_SIZE(vertices)` for a guard, aligned to
 ///                  `DIBS_ALIGNMENT`. Needs no initial value. For as long as its two ends and their frames are used.
 /// @param size      Bytes of the storage.
-/// @param vertices  Vertices of the surface: those of the tree.
+/// @param vertices  Rows of the surface: `rows` of the tree's facts.
 /// @param surface   Receives the surface's address.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_surface_init(

@@ -3,14 +3,15 @@
 use core::ffi::c_void;
 
 use dibs_nostd::format::Unit;
-use dibs_nostd::{Scrub, Tree, TriangleRow};
+use dibs_nostd::nodes::Nodes;
+use dibs_nostd::{PathKind, Scrub, Tree, TriangleRow};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
 use crate::tool::dibs_vec3;
 
 /// Bytes of a tree's storage.
-pub const DIBS_TREE_SIZE: usize = 384;
+pub const DIBS_TREE_SIZE: usize = 640;
 
 /// A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices.
 ///
@@ -18,7 +19,16 @@ pub const DIBS_TREE_SIZE: usize = 384;
 pub struct dibs_tree {
     /// The view of the bytes.
     pub(crate) tree: Tree<'static, u16>,
+    /// The nodes that carry the surface, if any.
+    pub(crate) nodes: Option<Nodes<'static>>,
     pub(crate) bytes: &'static [u8],
+}
+
+impl dibs_tree {
+    /// Rows of a frame.
+    pub(crate) fn rows(&self) -> u32 {
+        self.nodes.map_or(self.tree.vertex_count(), |nodes| nodes.count())
+    }
 }
 
 impl Kind for dibs_tree {
@@ -30,8 +40,10 @@ impl Kind for dibs_tree {
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_tree_facts {
-    /// Vertices: rows of a surface.
+    /// Vertices.
     pub vertices: u32,
+    /// Rows of a frame: the nodes that carry the surface where the tree has any (`dibs build --nodes`), else its vertices.
+    pub rows: u32,
     /// Triangles.
     pub triangles: u32,
     /// Nodes.
@@ -74,7 +86,12 @@ pub extern "C" fn dibs_tree_init(
     dibs_code::of(|| {
         storage.make(size, tree, || {
             let bytes = bytes.slice(length)?;
-            Ok(dibs_tree { tree: Tree::from_bytes(bytes)?, bytes })
+            let tree = Tree::from_bytes(bytes)?;
+            let nodes = match tree.paths() {
+                PathKind::Volume => Some(Nodes::of(&tree).map_err(|_| dibs_code::TreeForm)?),
+                _ => None,
+            };
+            Ok(dibs_tree { tree, nodes, bytes })
         })
     })
 }
@@ -86,9 +103,11 @@ pub extern "C" fn dibs_tree_get_facts(
     facts: *mut dibs_tree_facts,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (facts, tree) = (facts.check()?, &tree.share()?.tree);
+        let (facts, tree) = (facts.check()?, tree.share()?);
+        let (rows, tree) = (tree.rows(), &tree.tree);
         facts.set(dibs_tree_facts {
             vertices: tree.vertex_count(),
+            rows,
             triangles: tree.triangle_count(),
             nodes: tree.node_count(),
             mesh_id: tree.mesh_id(),

@@ -7,13 +7,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use dibs_build::{Builder, BuiltTree, generate};
+use dibs_build::glam::DVec3;
+use dibs_build::{Builder, BuiltTree, Volume, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, Reason};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
-use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, Freshness, enframe, framed_bytes};
+use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Rows, Surface, Vertices};
+use dibs_nostd::nodes::Nodes;
+use dibs_nostd::wire::{
+    Encoding, Event, FrameEncoder, FrameId, Freshness, NoMac, enframe, framed_bytes,
+};
 use dibs_nostd::{
     Advance, Capsule, Coverage, Fallback, Interval, Millis, NoSide, Progress, Proximity,
     QueryError, ReceiveError, Side, Sphere, StretchError, TreeBytes, Unavailable,
@@ -23,6 +27,9 @@ use xtask::workspace;
 
 /// Vertices of the generated heart of 1,000 triangles.
 const VERTICES: usize = 502;
+
+/// Nodes of a box of 3 x 3 x 4 cells.
+const NODES: usize = 80;
 
 /// ms between two frames.
 const PERIOD: u32 = 30;
@@ -47,22 +54,24 @@ enum Step {
 /// Frames that come as packets, over a line, and by a call in turn. One is lost, one is damaged, one is stretched too far,
 /// one lacks a vertex.
 /// Then the line falls silent, and comes back.
-fn script() -> (BuiltTree, Vec<Step>) {
-    let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a size");
-    let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+fn script(built: &BuiltTree, frames: &[Vec<Vec3>]) -> Vec<Step> {
     let (mesh_id, mut steps) = (built.summary().mesh_id, Vec::new());
     for now in 1_000..3_600 {
         let number = (now - 1_000) / PERIOD;
         let is_silent = (3_300..3_450).contains(&now) || number == 9;
         let is_due = (now - 1_000) % PERIOD == 0 && !is_silent;
+        let frame = &frames[number as usize % frames.len()];
         if is_due && number % 5 == 3 {
-            let mut positions = motion.frames[number as usize % motion.frames.len()].clone();
-            positions.truncate(if number == 8 { VERTICES - 1 } else { VERTICES });
+            let mut positions = frame.clone();
+            positions.truncate(positions.len() - usize::from(number == 8));
             steps.push(Step::Frame(now, now - number % 4, positions));
         } else if is_due {
-            let mut rows = built.to_rows(&motion.frames[number as usize % motion.frames.len()]);
+            // Nodes come in the order of their file.
+            let is_of_nodes = built.summary().volume.is_some();
+            let mut rows = if is_of_nodes { frame.clone() } else { built.to_rows(frame) };
             if number == 15 {
-                rows[100] += Vec3::new(0.0, 0.0, 15.0);
+                let spoilt = rows.len() / 5;
+                rows[spoilt] += Vec3::new(0.0, 0.0, 15.0);
             }
             let id = FrameId { mesh_id, session: 5, epoch: number };
             let fresh = Freshness { age_ms: number as u16 % 5, echo: Some(now - 1) };
@@ -102,7 +111,27 @@ fn script() -> (BuiltTree, Vec<Step>) {
             steps.extend([Step::Acknowledge, Step::Counters]);
         }
     }
-    (built, steps)
+    steps
+}
+
+/// A heart whose frames are vertices.
+fn vertices() -> (BuiltTree, Vec<Vec<Vec3>>) {
+    let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+    (built, motion.frames)
+}
+
+/// A heart that a box of nodes carries.
+fn embedded() -> (BuiltTree, Vec<Vec<Vec3>>) {
+    let mesh = generate::heart(1_000).expect("a size").mesh;
+    let lattice = Volume::lattice(&mesh, [3, 3, 4]).expect("a lattice");
+    let built = Builder::new().stretch(1.5).nodes(&lattice).build(&mesh).expect("a tree");
+    let frame = |number: usize| {
+        let by = 0.05 * (number as f64 * 0.25).sin();
+        let at = |at: &DVec3| (*at * DVec3::new(1.0 + by, 1.0 - by, 1.0)).as_vec3();
+        lattice.nodes().iter().map(at).collect()
+    };
+    (built, (0..25).map(frame).collect())
 }
 
 fn lines(steps: &[Step]) -> String {
@@ -113,7 +142,7 @@ fn lines(steps: &[Step]) -> String {
             Step::Packet(now, bytes) => writeln!(text, "packet {now} {}", hex(bytes)),
             Step::Receive(now, bytes) => writeln!(text, "receive {now} {}", hex(bytes)),
             Step::Frame(now, captured, positions) => {
-                let numbers = positions.iter().flat_map(|position| position.to_array());
+                let numbers = positions.iter().flat_map(Vec3::to_array);
                 let numbers: String = numbers.map(|number| format!(" {number}")).collect();
                 writeln!(text, "frame {now} {captured}{numbers}")
             }
@@ -134,10 +163,10 @@ fn lines(steps: &[Step]) -> String {
     text
 }
 
-type Ends<'t> = (Bus<'static, 't, u16>, Guard<'static, 't, u16, 512, 256>);
+type Ends<'t, R> = (Bus<'static, 't, u16, NoMac, R>, Guard<'static, 't, u16, 512, 256, R>);
 
 /// The Rust library's answer, in the program's words.
-fn answer((bus, guard): &mut Ends<'_>, step: &Step) -> String {
+fn answer<R: Rows>((bus, guard): &mut Ends<'_, R>, step: &Step) -> String {
     match step {
         Step::Packet(now, bytes) => match bus.packet(bytes, Millis(*now)) {
             Ok(progress) => format!("packet 0 {}", number(progress)),
@@ -386,13 +415,13 @@ fn compile(name: &str, folder: &Path) -> PathBuf {
     program
 }
 
-#[test]
-fn the_loop_in_c_answers_with_the_same_bits() {
+/// The answers of a surface of `N` rows, which are the same in C to the bit.
+fn compared<const N: usize, R: Rows>((built, frames): &(BuiltTree, Vec<Vec<Vec3>>)) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
-    let (built, steps) = script();
-    let surface: &Surface<VERTICES> = Box::leak(Box::new(Surface::new()));
+    let steps = script(built, frames);
+    let surface: &Surface<N, R> = Box::leak(Box::new(Surface::new()));
     let limits = GuardLimits::new(300.0, Millis(80));
-    let mut ends: Ends<'_> = surface.start(TreeBytes::new(built.blob()), limits).expect("valid");
+    let mut ends: Ends<'_, R> = surface.start(TreeBytes::new(built.blob()), limits).expect("valid");
     let expected: Vec<_> = steps.iter().map(|step| answer(&mut ends, step)).collect();
 
     let [tree, script] = ["tree", "script"].map(|name| folder.path().join(name));
@@ -403,7 +432,23 @@ fn the_loop_in_c_answers_with_the_same_bits() {
         assert_eq!(c, rust, "answer {number}");
     }
     assert_eq!(said.lines().count(), expected.len());
+    expected
+}
 
+/// Answers about nodes' frames that a tick may act on, some of them after commands, and frames that are refused.
+#[test]
+fn the_loop_on_nodes_answers_with_the_same_bits() {
+    let expected = compared::<NODES, Nodes<'static>>(&embedded());
+    let acted = expected.iter().filter(|line| line.starts_with("tick 0 0 ")).count();
+    assert!(acted > 700, "{acted}");
+    for start in ["work 0 3", "work 313", "packet 400", "acknowledge 0"] {
+        assert!(expected.iter().any(|line| line.starts_with(start)), "nothing is {start}");
+    }
+}
+
+#[test]
+fn the_loop_in_c_answers_with_the_same_bits() {
+    let expected = compared::<VERTICES, Vertices>(&vertices());
     let ticks: Vec<Vec<&str>> = expected
         .iter()
         .filter(|line| line.starts_with("tick"))

@@ -95,7 +95,7 @@ class Mesh:
         stretch: float,
         limits: Optional[bytes],
         labels: Optional[bytes],
-        volume: Optional[tuple[bytes, bytes]],
+        volume: Optional[tuple[bytes, bytes, float]],
     ) -> Tree: ...
 
 class Tree:

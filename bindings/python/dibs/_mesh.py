@@ -135,14 +135,15 @@ def build(
     labels: Optional[npt.ArrayLike] = None,
     nodes: Optional[npt.ArrayLike] = None,
     tetrahedra: Optional[npt.ArrayLike] = None,
+    bind_within: float = 0.0,
     **reading: Any,
 ) -> Tree:
     """Builds the tree of a mesh: of a file, a `Mesh`, or arrays of vertices and triangles.
 
     `stretch` is the largest factor by which the surface may be stretched along itself; `limits` are one for each
-    triangle instead (`MotionStretch.limits`). `labels` are numbers from 0 to 255, one for each triangle, which answers
+    triangle, or tetrahedron, instead (`MotionStretch.limits`). `labels` are numbers from 0 to 255, one for each triangle, which answers
     then carry. With `nodes` and `tetrahedra` of them, a volume around the surface, a surface's positions are those of the
-    nodes, and `stretch` limits each tetrahedron. Other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
+    nodes, and `stretch` limits each tetrahedron; vertices outside are bound to the nearest one within `bind_within` (mm). Other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
     """
     if isinstance(source, Mesh):
         if triangles is not None or reading:
@@ -157,7 +158,8 @@ def build(
     count = len(mesh.triangles)
     each = None
     if limits is not None:
-        each = np.asarray(_arrays.one_each("limits", limits, count), dtype="<f4").tobytes()
+        limited = count if tetrahedra is None else len(np.asarray(tetrahedra))
+        each = np.asarray(_arrays.one_each("limits", limits, limited), dtype="<f4").tobytes()
     if labels is None:
         labels = mesh.labels
     marks = None if labels is None else _labels(labels, count)
@@ -168,7 +170,8 @@ def build(
     rows: Optional[int] = len(mesh.vertices)
     if nodes is not None and tetrahedra is not None:
         points = _arrays.points("nodes", nodes)
-        volume, rows = (points.tobytes(), _tetrahedra(tetrahedra, len(points))), None
+        within = _arrays.number("bind_within", bind_within)
+        volume, rows = (points.tobytes(), _tetrahedra(tetrahedra, len(points)), within), None
     native = mesh._native.build(_arrays.number("stretch", stretch), each, marks, volume)
     tree = Tree._of(native, rows)
     for sentence in mesh.warnings + native.warnings():

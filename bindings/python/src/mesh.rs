@@ -84,7 +84,7 @@ impl Mesh {
         stretch: f32,
         limits: Option<&[u8]>,
         labels: Option<&[u8]>,
-        volume: Option<(&[u8], &[u8])>,
+        volume: Option<(&[u8], &[u8], f64)>,
     ) -> PyResult<Tree> {
         let builder = match limits {
             Some(limits) => Builder::new().limits(bytes::floats(limits)),
@@ -94,8 +94,10 @@ impl Mesh {
             Some(labels) => builder.labels(labels.to_vec()),
             None => builder,
         };
-        let volume = volume
-            .map(|(nodes, tetrahedra)| Volume::new(bytes::points(nodes), bytes::cells(tetrahedra)));
+        let volume = volume.map(|(nodes, tetrahedra, within)| {
+            let volume = Volume::new(bytes::points(nodes), bytes::cells(tetrahedra));
+            volume.map(|volume| volume.bind_within(within))
+        });
         let builder = match volume.transpose().map_err(invalid)? {
             Some(volume) => builder.nodes(&volume),
             None => builder,

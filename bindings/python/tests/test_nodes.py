@@ -6,6 +6,7 @@ import unittest
 import numpy as np
 
 import dibs
+from test_guard import SPHERE, Loop
 
 
 def lattice(low, high, cells):
@@ -58,6 +59,46 @@ class Nodes(unittest.TestCase):
                 self.assertTrue(np.all(one["coverage"] == dibs.Coverage.MEASURED))
         again = dibs.Tree(tree.blob).rest.query(tools[0])["separation"]
         np.testing.assert_array_equal(again, tree.query(tools[0])["separation"])
+
+    def test_a_guard_takes_nodes(self):
+        tree = self.build(stretch=1.3)
+        matrix = np.array([[1.05, 0.0, 0.1], [0.0, 0.98, 0.0], [0.0, 0.05, 1.0]])
+        moved = self.nodes @ matrix.T
+        loop = Loop(tree, moved)
+        answer = loop.run(200)
+        self.assertEqual((answer.state, answer.reason), (dibs.State.NOMINAL, None))
+        truth = tree.query(SPHERE, surface=moved)
+        low, high = answer.closest["interval"]
+        self.assertTrue(low <= truth["separation"] <= high)
+        # An inverted frame is refused, and the last good one stays.
+        for wrong, why in [(moved * [1, 1, -1], "inverted"), (moved * 1.5, "stretched by")]:
+            with self.assertRaisesRegex(ValueError, why):
+                loop.send(wrong)
+            after = loop.tick()
+            self.assertAlmostEqual(float(after.closest["separation"]), float(answer.closest["separation"]), places=2)
+
+    def test_limits_of_each_tetrahedron(self):
+        limits = np.full(len(self.tetrahedra), 1.5)
+        limits[: len(limits) // 2] = 1.1
+        tree = self.build(limits=limits)
+        self.assertAlmostEqual(tree.summary["stretch"], 1.5, delta=1e-3)
+        with self.assertRaisesRegex(ValueError, "is stretched by"):
+            tree.surface(self.nodes * [1.0, 1.0, 1.2])
+        with self.assertRaisesRegex(ValueError, "limits"):
+            self.build(limits=limits[:-1])
+
+    def test_vertices_outside_are_bound(self):
+        nodes = self.nodes * 0.97
+        with self.assertRaisesRegex(ValueError, "bind vertices within that distance"):
+            self.build(nodes=nodes, bind_within=0.01)
+        tree = self.build(nodes=nodes, bind_within=3.0)
+        self.assertGreater(tree.summary["volume"]["amplification"], 1.01)
+        self.assertEqual(self.build().summary["volume"]["amplification"], 1.0)
+        matrix = np.array([[1.05, 0.0, 0.1], [0.0, 0.98, 0.0], [0.0, 0.05, 1.0]])
+        tool = dibs.spheres((90.0, 10.0, 20.0), 5.0)
+        found = tree.surface(nodes @ matrix.T).query(tool)["separation"]
+        truth = dibs.build(self.mesh).surface(self.mesh.vertices @ matrix.T).query(tool)["separation"]
+        np.testing.assert_allclose(found, truth, atol=2e-2)
 
     def test_what_is_no_volume_is_refused(self):
         tree = self.build()

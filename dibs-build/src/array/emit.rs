@@ -94,6 +94,8 @@ pub struct VolumeSummary {
     pub nodes: u32,
     /// Tetrahedra.
     pub tetrahedra: u32,
+    /// The most that a vertex moves for each millimetre of a node: 1 without vertices outside of the volume.
+    pub amplification: f32,
     /// Flash of nodes, tetrahedra and weights, part of the tree's.
     pub flash_bytes: usize,
     /// RAM of the nodes: `dibs_nostd::Frames`, two buffers of f32 positions, and their labels.
@@ -313,6 +315,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         volume: Nodes::of(tree).ok().map(|nodes| VolumeSummary {
             nodes: nodes.count(),
             tetrahedra: nodes.element_count(),
+            amplification: nodes.amplification(),
             flash_bytes: nodes.flash_bytes(),
             ram_bytes: ram_of(nodes.count()),
         }),

@@ -1,12 +1,14 @@
 //! The binding of a surface's vertices to the tetrahedra of a volume.
 
-use dibs_nostd::nodes::WHOLE;
+use dibs_nostd::nodes::{MOST_SIZES, SIGNED_ZERO, STEP, WHOLE};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::encode::least_limit;
 use super::paths::VolumePaths;
 use super::{Volume, VolumeError};
 use crate::Mesh;
+use crate::rounding::round_up;
 
 /// A surface bound to a volume: for each vertex its tetrahedron, and the weights of its nodes.
 #[derive(Debug)]
@@ -15,8 +17,14 @@ pub(crate) struct Embedding {
     pub nodes: Vec<Vec3>,
     /// The tetrahedra in the order of their latest nodes, which is that in which frames arrive.
     pub tetrahedra: Vec<[u32; 4]>,
+    /// The volume's number of each.
+    order: Vec<usize>,
+    /// The limit of each as a part of the tree's; empty if all have that.
+    ratios: Vec<f64>,
     pub is_box: bool,
     pub vertices: Vec<Bound>,
+    /// Whether a vertex is outside of its tetrahedron, so that weights are signed.
+    pub is_signed: bool,
     /// Largest distance (mm) of a vertex from its position in the mesh, caused by rounding its weights.
     pub error: f64,
 }
@@ -25,13 +33,33 @@ pub(crate) struct Embedding {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
     pub tetrahedron: u32,
-    /// They sum up to [`WHOLE`]; the first three are below it.
-    pub weights: [u32; 4],
+    /// Parts of [`WHOLE`], to which they sum up. The first three can be [stored](Embedding::stored).
+    pub weights: [i32; 4],
 }
 
 impl Bound {
+    /// Whether the vertex is outside of its tetrahedron.
+    pub fn is_outside(&self) -> bool {
+        self.weights.iter().any(|&weight| weight < 0)
+    }
+
+    /// The sum of the sizes of its weights.
+    fn sizes(&self) -> u32 {
+        self.weights.iter().map(|weight| weight.unsigned_abs()).sum()
+    }
+}
+
+/// A vertex's place: its tetrahedron, its barycentric coordinates there, and the distance from it.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    tetrahedron: u32,
+    weights: [f64; 4],
+    distance: f64,
+}
+
+impl Place {
     /// Of a vertex that nothing reads.
-    const NONE: Self = Self { tetrahedron: 0, weights: [0, 0, 0, WHOLE] };
+    const NONE: Self = Self { tetrahedron: 0, weights: [0.0, 0.0, 0.0, 1.0], distance: 0.0 };
 }
 
 impl Embedding {
@@ -39,34 +67,92 @@ impl Embedding {
     pub fn new(volume: &Volume, mesh: &Mesh) -> Result<Self, VolumeError> {
         let nodes: Vec<Vec3> =
             volume.nodes().iter().map(|&node| (node - mesh.origin).as_vec3()).collect();
-        let mut tetrahedra = volume.tetrahedra().to_vec();
-        tetrahedra.sort_by_key(|corners| corners.iter().copied().max());
+        let mut order: Vec<usize> = (0..volume.tetrahedra().len()).collect();
+        order.sort_by_key(|&number| volume.tetrahedra()[number].into_iter().max());
+        let tetrahedra: Vec<[u32; 4]> =
+            order.iter().map(|&number| volume.tetrahedra()[number]).collect();
         let cells: Vec<Cell> =
             tetrahedra.iter().map(|&corners| Cell::new(&nodes, corners)).collect();
         let grid = Grid::new(&cells);
         // A vertex of no triangle may be anywhere.
         let mut is_used = vec![false; mesh.positions.len()];
         mesh.triangles.iter().flatten().for_each(|&vertex| is_used[vertex as usize] = true);
-        let bind = |(position, is_used): (&Vec3, &bool)| match is_used {
-            true => grid.bind(&cells, position.as_dvec3()),
-            false => Ok(Bound::NONE),
+        let place = |(position, is_used): (&Vec3, &bool)| match is_used {
+            true => grid.place_of(&cells, position.as_dvec3()),
+            false => Place::NONE,
         };
-        let bound: Vec<Result<Bound, f64>> =
-            mesh.positions.par_iter().zip(&is_used).map(bind).collect();
-        if let Some(first) = bound.iter().position(Result::is_err) {
-            let outside = bound.iter().filter_map(|bound| bound.err());
-            let (count, distance) =
-                outside.fold((0, 0.0), |(count, far), at| (count + 1, f64::max(far, at)));
+        let places: Vec<Place> = mesh.positions.par_iter().zip(&is_used).map(place).collect();
+        // Written so that a distance of NaN binds none.
+        let is_beyond =
+            |place: &&Place| place.distance > 0.0 && !(place.distance <= volume.within());
+        if let Some(first) = places.iter().position(|place| is_beyond(&place)) {
+            let count = places.iter().filter(is_beyond).count();
+            let distance = places.iter().map(|place| place.distance).fold(0.0, f64::max);
             return Err(VolumeError::Outside { count, first, distance });
         }
-        let vertices: Vec<Bound> = bound.into_iter().flatten().collect();
+        let is_signed = places.iter().any(|place| place.distance > 0.0);
+        let bind = |&Place { tetrahedron, weights, distance }: &Place| Bound {
+            tetrahedron,
+            weights: match (is_signed, distance > 0.0) {
+                (false, _) => rounded(weights.map(|weight| weight.clamp(0.0, 1.0)), 1),
+                (true, false) => rounded(weights.map(|weight| weight.clamp(0.0, 1.0)), STEP),
+                (true, true) => rounded(weights, STEP),
+            },
+        };
+        let vertices: Vec<Bound> = places.iter().map(bind).collect();
+        if let Some(vertex) = vertices.iter().position(|bound| bound.sizes() >= MOST_SIZES) {
+            let distance = places[vertex].distance;
+            return Err(VolumeError::Lever { vertex, distance });
+        }
+        // Lines to a vertex outside leave the box.
+        let is_box = volume.is_box() && !is_signed;
+        let ratios = Vec::new();
         let mut embedding =
-            Self { nodes, tetrahedra, is_box: volume.is_box(), vertices, error: 0.0 };
+            Self { nodes, tetrahedra, order, ratios, is_box, vertices, is_signed, error: 0.0 };
         let moved = mesh.positions.iter().zip(embedding.positions());
         let moved = moved.map(|(position, at)| position.as_dvec3().distance(at));
         let moved = moved.zip(is_used).filter(|(_, is_used)| *is_used);
         embedding.error = moved.map(|(moved, _)| moved).fold(0.0, f64::max);
         Ok(embedding)
+    }
+
+    /// Limits the stretch of all tetrahedra, or of each by the volume's numbers, and returns the tree's limit: the largest,
+    /// at least what the controller's check tells from the rest shape.
+    pub fn limit(&mut self, stretch: f32, limits: Option<&[f32]>) -> Result<f32, VolumeError> {
+        let mut own = Vec::new();
+        for (tetrahedron, &number) in self.order.iter().enumerate() {
+            let corners = self.tetrahedra[tetrahedron].map(|node| self.nodes[node as usize]);
+            let least = least_limit(corners.map(Vec3::as_dvec3));
+            let least = least.ok_or(VolumeError::Shape { tetrahedron: number })?;
+            own.push(limits.map_or(stretch, |limits| limits[number]).max(round_up(least)));
+        }
+        let most = own.iter().copied().fold(1.0, f32::max);
+        if limits.is_some() && own.iter().any(|&limit| limit < most) {
+            let part = |limit: f32| f64::from(limit) / f64::from(most);
+            self.ratios = own.into_iter().map(part).collect();
+        }
+        Ok(most)
+    }
+
+    /// Whether all tetrahedra have the tree's limit.
+    pub fn is_uniform(&self) -> bool {
+        self.ratios.is_empty()
+    }
+
+    /// A tetrahedron's limit as a part of the tree's.
+    pub fn ratio(&self, tetrahedron: u32) -> f64 {
+        self.ratios.get(tetrahedron as usize).copied().unwrap_or(1.0)
+    }
+
+    /// The volume's number of a tetrahedron.
+    pub fn number(&self, tetrahedron: usize) -> usize {
+        self.order[tetrahedron]
+    }
+
+    /// A weight as a tree stores it.
+    pub const fn stored(&self, weight: i32) -> u16 {
+        let signed = weight / STEP as i32 + SIGNED_ZERO as i32;
+        (if self.is_signed { signed } else { weight }) as u16
     }
 
     /// The vertices at rest as the weights give them.
@@ -175,23 +261,32 @@ impl Grid {
         x + self.size[0] * (y + self.size[1] * z)
     }
 
-    /// The binding of a position, or its distance from the volume.
-    fn bind(&self, tetrahedra: &[Cell], position: DVec3) -> Result<Bound, f64> {
+    /// The tetrahedron around a position, or the nearest one. Of several as near it is the one that extrapolates least.
+    fn place_of(&self, tetrahedra: &[Cell], position: DVec3) -> Place {
         let near = &self.cells[self.row(self.place(position))];
         let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
         let weights = near.iter().map(|&at| (at, tetrahedra[at as usize].weights(position)));
         let inner = weights.max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)).then(b.0.cmp(&a.0)));
         match inner {
             Some((tetrahedron, weights)) if least(&weights) >= -OUTSIDE => {
-                Ok(Bound { tetrahedron, weights: rounded(weights) })
+                Place { tetrahedron, weights, distance: 0.0 }
             }
             _ => {
-                let nearer = |nearest: f64, cell: &Cell| {
+                let sizes = |place: &Place| place.weights.iter().map(|w| w.abs()).sum::<f64>();
+                let nearer = |nearest: Place, (tetrahedron, cell): (u32, &Cell)| {
                     let [low, high] = cell.bounds();
-                    let is_far = position.clamp(low, high).distance(position) >= nearest;
-                    if is_far { nearest } else { nearest.min(cell.distance(position)) }
+                    let as_near = nearest.distance * (1.0 + 1e-9);
+                    if position.clamp(low, high).distance(position) > as_near {
+                        return nearest;
+                    }
+                    let (weights, distance) = (cell.weights(position), cell.distance(position));
+                    let place = Place { tetrahedron, weights, distance };
+                    let is_nearer = distance * (1.0 + 1e-9) < nearest.distance
+                        || distance <= as_near && sizes(&place) < sizes(&nearest);
+                    if is_nearer { place } else { nearest }
                 };
-                Err(tetrahedra.iter().fold(f64::INFINITY, nearer))
+                let none = Place { distance: f64::INFINITY, ..Place::NONE };
+                (0..).zip(tetrahedra).fold(none, nearer)
             }
         }
     }
@@ -200,27 +295,30 @@ impl Grid {
 /// A vertex is not outside by less than a weight's unit.
 const OUTSIDE: f64 = 1.0 / WHOLE as f64;
 
-/// Barycentric coordinates as integers with an exact sum, each off by one at most.
-fn rounded(weights: [f64; 4]) -> [u32; 4] {
-    let exact = weights.map(|weight| weight.clamp(0.0, 1.0) * f64::from(WHOLE));
-    let mut rounded = exact.map(|weight| weight as u32);
+/// Barycentric coordinates as parts of [`WHOLE`] with an exact sum, in steps of so many parts, each off by one step at most.
+fn rounded(weights: [f64; 4], step: u32) -> [i32; 4] {
+    let whole = (WHOLE / step) as i32;
+    let exact = weights.map(|weight| weight * f64::from(whole));
+    let mut rounded = exact.map(|weight| weight.floor() as i32);
     let mut order = [0, 1, 2, 3];
-    order.sort_by(|&i, &j| exact[j].fract().total_cmp(&exact[i].fract()));
+    let part = |at: usize| exact[at] - exact[at].floor();
+    order.sort_by(|&i, &j| part(j).total_cmp(&part(i)));
     for at in order.into_iter().cycle().take(16) {
-        let sum: u32 = rounded.iter().sum();
-        match sum.cmp(&WHOLE) {
+        let sum: i32 = rounded.iter().sum();
+        match sum.cmp(&whole) {
             std::cmp::Ordering::Less => rounded[at] += 1,
             std::cmp::Ordering::Equal => break,
-            std::cmp::Ordering::Greater => rounded[at] = rounded[at].saturating_sub(1),
+            // No weight that is not negative becomes so.
+            std::cmp::Ordering::Greater => rounded[at] -= i32::from(rounded[at] != 0),
         }
     }
     // A stored weight has 16 bits.
     for at in 0..3 {
-        if rounded[at] == WHOLE {
-            (rounded[at], rounded[3]) = (WHOLE - 1, 1);
+        if rounded[at] == WHOLE as i32 {
+            (rounded[at], rounded[3]) = (WHOLE as i32 - 1, 1);
         }
     }
-    rounded
+    rounded.map(|weight| weight * step as i32)
 }
 
 /// The distance of a point from a triangle.

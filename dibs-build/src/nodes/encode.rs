@@ -1,6 +1,6 @@
 //! The nodes of a tree as bytes: section 11 of `dibs-nostd`'s `docs/format.md`.
 
-use dibs_nostd::nodes::{LEAST_VOLUME, MARGIN};
+use dibs_nostd::nodes::{HEADER_BYTES, LEAST_VOLUME, MARGIN, SIGNED_ZERO};
 use glam::{DMat3, DVec3};
 
 use super::VolumeError;
@@ -21,7 +21,9 @@ pub(crate) fn encode(
     bytes.extend((shapes.len() as u32).to_le_bytes());
     bytes.extend(round_up(embedding.paths().extent(shapes[0].corners[0])).to_le_bytes());
     bytes.extend(round_up(longest).to_le_bytes());
-    bytes.resize(32, 0);
+    let zero = if embedding.is_signed { SIGNED_ZERO } else { 0 };
+    bytes.extend(zero.to_le_bytes());
+    bytes.resize(HEADER_BYTES, 0);
     for node in &embedding.nodes {
         node.to_array().into_iter().for_each(|x| bytes.extend(x.to_le_bytes()));
     }
@@ -37,16 +39,18 @@ pub(crate) fn encode(
         let of =
             |node: u32| (0..4).find(|&at| corners[at] == node).map_or(0, |at| bound.weights[at]);
         let [a, b, c, _] = shapes[bound.tetrahedron as usize].corners;
-        [a, b, c].into_iter().for_each(|node| bytes.extend((of(node) as u16).to_le_bytes()));
+        [a, b, c]
+            .into_iter()
+            .for_each(|node| bytes.extend(embedding.stored(of(node)).to_le_bytes()));
     }
     Ok(bytes)
 }
 
-/// The least stretch limit that the controller's check tells from the rest shape.
-pub(crate) fn least_limit(embedding: &Embedding) -> Result<f64, VolumeError> {
-    let shapes = shapes(embedding, 1.0)?;
-    let least = |shape: &Shape| (1.0 + 3.0 * MARGIN / shape.openness).sqrt();
-    Ok(shapes.iter().map(least).fold(1.0, f64::max) * (1.0 + 1.0 / 65_536.0))
+/// The least stretch limit of a tetrahedron that the controller's check tells from the rest shape; `None` for a flat one.
+pub(crate) fn least_limit(corners: [DVec3; 4]) -> Option<f64> {
+    let (_, _, openness) = path(corners);
+    let least = (1.0 + 3.0 * MARGIN / openness).sqrt() * (1.0 + 1.0 / 65_536.0);
+    (openness >= FLAT).then_some(least)
 }
 
 /// A tetrahedron at rest.
@@ -56,26 +60,34 @@ struct Shape {
     edges: DMat3,
     /// The least eigenvalue of the edges' products, scaled to a diagonal of ones.
     openness: f64,
+    /// Its limit as a part of the tree's.
+    ratio: f64,
 }
 
-/// The path through the corners is the one whose edges are nearest to orthogonal.
+/// The path through four corners whose edges are nearest to orthogonal: the corners' order, the edges, their openness.
+fn path(corners: [DVec3; 4]) -> ([usize; 4], DMat3, f64) {
+    let along = |order: [usize; 4]| {
+        let edges = edges(order.map(|at| corners[at]));
+        (order, edges, openness(edges))
+    };
+    let [first, others @ ..] = PATHS.map(along);
+    others.into_iter().fold(first, |a, b| if b.2 > a.2 { b } else { a })
+}
+
 fn shapes(embedding: &Embedding, stretch: f32) -> Result<Vec<Shape>, VolumeError> {
     let possible = LEAST_SQUARED..=LARGEST_SQUARED / f64::from(stretch).powi(2);
     let shape = |(tetrahedron, &corners): (usize, &[u32; 4])| {
-        let at = |order: [usize; 4]| {
-            let corners = order.map(|at| corners[at]);
-            let edges = edges(corners.map(|node| embedding.nodes[node as usize].as_dvec3()));
-            Shape { corners, edges, openness: openness(edges) }
-        };
-        let shape =
-            PATHS.map(at).into_iter().reduce(|a, b| if b.openness > a.openness { b } else { a });
-        let shape = shape.filter(|shape| {
-            let volume = f64::from(shape.numbers(stretch)[6]) * 2.0;
-            shape.openness >= FLAT
-                && shape.edges.determinant() > volume
-                && shape.squares().iter().all(|square| possible.contains(square))
-        });
-        shape.ok_or(VolumeError::Shape { tetrahedron })
+        let at = corners.map(|node| embedding.nodes[node as usize].as_dvec3());
+        let (order, edges, openness) = path(at);
+        let corners = order.map(|at| corners[at]);
+        let ratio = embedding.ratio(tetrahedron as u32);
+        let shape = Shape { corners, edges, openness, ratio };
+        let volume = f64::from(shape.numbers(stretch)[6]) * 2.0;
+        let is_possible = openness >= FLAT
+            && edges.determinant() > volume
+            && shape.squares().iter().all(|square| possible.contains(square));
+        let number = embedding.number(tetrahedron);
+        if is_possible { Ok(shape) } else { Err(VolumeError::Shape { tetrahedron: number }) }
     };
     embedding.tetrahedra.iter().enumerate().map(shape).collect()
 }
@@ -92,8 +104,9 @@ const LARGEST_SQUARED: f64 = 1e8;
 const FLAT: f64 = 1e-4;
 
 impl Shape {
+    /// The squares of its edges, times that of its limit's part.
     fn squares(&self) -> [f64; 3] {
-        self.columns().map(DVec3::length_squared)
+        self.columns().map(|edge| (edge * self.ratio).length_squared())
     }
 
     const fn columns(&self) -> [DVec3; 3] {
@@ -106,10 +119,11 @@ impl Shape {
         [a, b, c, a + b, b + c, a + b + c].map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// What the check compares: the edges' products, made smaller by its largest rounding, and the least volume.
+    /// What the check compares: the edges' products, made smaller by its largest rounding, and the least volume. A shape
+    /// that is smaller by its limit's part is stretched by so much more, so that one limit serves all.
     fn numbers(&self, stretch: f32) -> [f32; 7] {
         let scale = 1.0 / (1.0 + MARGIN / self.openness);
-        let [a, b, c] = self.columns();
+        let [a, b, c] = self.columns().map(|edge| edge * self.ratio);
         let own = |edge: DVec3| round_down(edge.length_squared() * scale);
         let of = |one: DVec3, other: DVec3| (one.dot(other) * scale) as f32;
         let lengths = a.length() * b.length() * c.length();

@@ -9,3 +9,4 @@ pub(crate) use binding::Embedding;
 pub(crate) use encode::{encode, least_limit};
 pub(crate) use paths::VolumePaths;
 pub use volume::{Volume, VolumeError};
+pub(crate) use volume::{edges, largest_stretch};

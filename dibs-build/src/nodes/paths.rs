@@ -9,7 +9,8 @@ use super::binding::{Cell, Embedding};
 
 /// The distances between vertices, straight where a line stays in the volume, else along its edges.
 ///
-/// Both are upper bounds on the shortest path: each part of a path lies in one tetrahedron.
+/// Both are upper bounds on the shortest path: each part of a path lies in one tetrahedron. Lengths in a tetrahedron with a
+/// limit of its own are as many times smaller as that is.
 pub(crate) struct VolumePaths<'e> {
     embedding: &'e Embedding,
     /// The vertices at rest.
@@ -17,8 +18,8 @@ pub(crate) struct VolumePaths<'e> {
     cells: Vec<Cell>,
     /// The tetrahedron across the face that lacks each corner.
     across: Vec<[Option<u32>; 4]>,
-    /// The nodes at the other ends of each node's edges.
-    neighbours: Vec<Vec<u32>>,
+    /// The nodes at the other ends of each node's edges, and the edges' lengths.
+    neighbours: Vec<Vec<(u32, f64)>>,
 }
 
 /// Far more than the rounding of a length in f64.
@@ -34,19 +35,24 @@ impl<'e> VolumePaths<'e> {
     pub fn new(embedding: &'e Embedding) -> Self {
         let (nodes, tetrahedra) = (&embedding.nodes, &embedding.tetrahedra);
         let positions = embedding.positions().collect();
-        if embedding.is_box {
+        if embedding.is_box && embedding.is_uniform() {
             let (cells, across, neighbours) = Default::default();
             return Self { embedding, positions, cells, across, neighbours };
         }
         let mut neighbours = vec![Vec::new(); nodes.len()];
-        for corners in tetrahedra {
+        for (tetrahedron, corners) in (0..).zip(tetrahedra) {
             for &node in corners {
-                neighbours[node as usize].extend(corners.iter().filter(|&&other| other != node));
+                let others = corners.iter().filter(|&&other| other != node);
+                neighbours[node as usize].extend(others.map(|&other| {
+                    let [a, b] = [node, other].map(|node| nodes[node as usize].as_dvec3());
+                    (other, a.distance(b) * embedding.ratio(tetrahedron))
+                }));
             }
         }
+        // Of an edge in several tetrahedra the shortest.
         for neighbours in &mut neighbours {
-            neighbours.sort_unstable();
-            neighbours.dedup();
+            neighbours.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            neighbours.dedup_by_key(|(node, _)| *node);
         }
         let cells = tetrahedra.iter().map(|&corners| Cell::new(nodes, corners)).collect();
         Self { embedding, positions, cells, across: across(tetrahedra), neighbours }
@@ -65,14 +71,16 @@ impl<'e> VolumePaths<'e> {
     /// The distance of each of these vertices from another one.
     pub fn distances(&self, from: u32, to: &[u32]) -> Vec<f64> {
         let start = self.position(from);
-        let straight = |&vertex: &u32| self.position(vertex).distance(start) * ROUNDED_UP;
-        if self.embedding.is_box {
-            return to.iter().map(straight).collect();
-        }
-        let mut distances: Vec<f64> = to
-            .iter()
-            .map(|vertex| if self.is_straight(from, *vertex) { straight(vertex) } else { f64::NAN })
-            .collect();
+        let straight = |&vertex: &u32| {
+            let length = self.position(vertex).distance(start) * ROUNDED_UP;
+            match self.embedding.is_box {
+                true if self.embedding.is_uniform() => length,
+                // No limit is larger than the tree's.
+                true => length * self.straight(from, vertex).unwrap_or(1.0),
+                false => self.straight(from, vertex).map_or(f64::NAN, |part| length * part),
+            }
+        };
+        let mut distances: Vec<f64> = to.iter().map(straight).collect();
         let around = to.iter().zip(&distances).filter(|(_, distance)| distance.is_nan());
         let mut wanted: Vec<u32> = around.flat_map(|(&vertex, _)| self.corners(vertex)).collect();
         wanted.sort_unstable();
@@ -80,13 +88,14 @@ impl<'e> VolumePaths<'e> {
         if wanted.is_empty() {
             return distances;
         }
-        let starts = self.corners(from).map(|node| (node, self.node(node).distance(start)));
+        let own = self.ratio(from);
+        let starts = self.corners(from).map(|node| (node, self.node(node).distance(start) * own));
         let along = self.along_edges(&starts, &wanted);
         for (&vertex, distance) in to.iter().zip(&mut distances) {
             if distance.is_nan() {
-                let end = self.position(vertex);
-                let ways =
-                    self.corners(vertex).map(|node| along[&node] + self.node(node).distance(end));
+                let (end, own) = (self.position(vertex), self.ratio(vertex));
+                let to_end = |node| self.node(node).distance(end) * own;
+                let ways = self.corners(vertex).map(|node| along[&node] + to_end(node));
                 *distance = ways.into_iter().fold(f64::INFINITY, f64::min) * ROUNDED_UP;
             }
         }
@@ -113,19 +122,28 @@ impl<'e> VolumePaths<'e> {
         self.embedding.tetrahedra[bound.tetrahedron as usize]
     }
 
+    /// The part of the tree's limit at a vertex.
+    fn ratio(&self, vertex: u32) -> f64 {
+        self.embedding.ratio(self.embedding.vertices[vertex as usize].tetrahedron)
+    }
+
     fn node(&self, node: u32) -> DVec3 {
         self.embedding.nodes[node as usize].as_dvec3()
     }
 
-    /// Whether the straight line between two vertices is known to stay in the volume.
-    fn is_straight(&self, from: u32, to: u32) -> bool {
-        let [start, end] =
-            [from, to].map(|vertex| self.embedding.vertices[vertex as usize].tetrahedron);
+    /// The mean part of the tree's limit along the straight line between two vertices; `None` unless it is known to stay in
+    /// the volume. From a vertex outside it leads to the vertex's tetrahedron first, and is part of that.
+    fn straight(&self, from: u32, to: u32) -> Option<f64> {
         let [a, b] = [from, to].map(|vertex| self.position(vertex));
-        let (mut at, mut before, mut passed) = (start, None, 0.0);
+        let [from, to] = [from, to].map(|vertex| &self.embedding.vertices[vertex as usize]);
+        let [start, end] = [from, to].map(|bound| bound.tetrahedron);
+        let (mut at, mut before, mut sum, mut counted) = (start, None, 0.0, 0.0);
+        // The part of the line at which it comes into the tetrahedron.
+        let mut passed = if from.is_outside() { self.entry(start, a, b) } else { 0.0 };
         for _ in 0..MOST_CROSSED {
+            let ratio = self.embedding.ratio(at);
             if at == end {
-                return true;
+                return Some(sum + ratio * (1.0 - counted));
             }
             let cell = &self.cells[at as usize];
             let (here, there) = (cell.weights(a), cell.weights(b));
@@ -136,16 +154,27 @@ impl<'e> VolumePaths<'e> {
             let part = |corner: usize| here[corner] / (here[corner] - there[corner]);
             let Some(out) = leaves.min_by(|&i, &j| part(i).total_cmp(&part(j))) else {
                 // The end is in this tetrahedron, too.
-                return there.iter().all(|&weight| weight >= 0.0);
+                let is_in = !to.is_outside() && there.iter().all(|&weight| weight >= 0.0);
+                return is_in.then_some(sum + ratio * (1.0 - counted));
             };
             // A line through an edge or a corner may go astray by rounding.
             let is_ahead = part(out) >= passed - ASTRAY && here[out] >= -ASTRAY;
-            let (true, Some(next)) = (is_ahead, self.across[at as usize][out]) else {
-                return false;
-            };
-            (at, before, passed) = (next, Some(at), part(out));
+            let next = self.across[at as usize][out].filter(|_| is_ahead)?;
+            sum += ratio * (part(out) - counted);
+            (at, before, passed, counted) = (next, Some(at), part(out), part(out));
         }
-        false
+        None
+    }
+
+    /// The part of a line from outside at which it comes through the last plane of a tetrahedron's faces that it begins
+    /// beyond.
+    fn entry(&self, tetrahedron: u32, from: DVec3, to: DVec3) -> f64 {
+        let cell = &self.cells[tetrahedron as usize];
+        let ends = cell.weights(from).into_iter().zip(cell.weights(to));
+        let outer = ends.filter(|(here, _)| *here < 0.0);
+        outer
+            .map(|(here, there)| if there > 0.0 { here / (here - there) } else { f64::INFINITY })
+            .fold(0.0, f64::max)
     }
 
     /// Dijkstra's distances of nodes along the volume's edges, until all `wanted` are known.
@@ -170,9 +199,9 @@ impl<'e> VolumePaths<'e> {
                     break;
                 }
             }
-            for &next in &self.neighbours[node as usize] {
+            for &(next, edge) in &self.neighbours[node as usize] {
                 if !known.contains_key(&next) {
-                    let length = length + self.node(node).distance(self.node(next));
+                    let length = length + edge;
                     heap.push(Reverse((length.to_bits(), next)));
                 }
             }

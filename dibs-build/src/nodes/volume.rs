@@ -20,6 +20,8 @@ pub struct Volume {
     tetrahedra: Vec<[u32; 4]>,
     /// Whether the tetrahedra fill a box, so that every straight line in it is a path through them.
     is_box: bool,
+    /// The distance (mm) from which vertices outside are bound.
+    within: f64,
 }
 
 /// Why a volume cannot carry a surface.
@@ -81,7 +83,7 @@ pub enum VolumeError {
     /// Vertices of the surface that are in no tetrahedron.
     #[error(
         "{count} vertices of the surface are outside the volume (the first is {first}), the farthest by {distance:.3} mm: \
-         give a volume that holds the surface, in its unit and coordinates"
+         give a volume that holds the surface, in its unit and coordinates, or bind vertices within that distance"
     )]
     Outside {
         /// Their number.
@@ -89,6 +91,17 @@ pub enum VolumeError {
         /// The first of them.
         first: usize,
         /// The largest distance from the volume (mm).
+        distance: f64,
+    },
+    /// A vertex that a thin tetrahedron would carry at the end of a lever: errors of its nodes would grow threefold.
+    #[error(
+        "vertex {vertex} of the surface is {distance:.3} mm outside of a tetrahedron that is about as thin: mesh the volume \
+         coarser there, or let it hold the vertex"
+    )]
+    Lever {
+        /// The first such vertex.
+        vertex: usize,
+        /// Its distance from the volume (mm).
         distance: f64,
     },
     /// A lattice without cells, or with too many.
@@ -109,7 +122,7 @@ impl Volume {
     /// # Errors
     /// [`VolumeError`] names the first defect.
     pub fn new(nodes: Vec<DVec3>, tetrahedra: Vec<[u32; 4]>) -> Result<Self, VolumeError> {
-        let volume = Self { nodes, tetrahedra, is_box: false };
+        let volume = Self { nodes, tetrahedra, is_box: false, within: 0.0 };
         volume.check().map(|()| volume)
     }
 
@@ -158,8 +171,20 @@ impl Volume {
             })
         });
         let tetrahedra = tetrahedra.collect();
-        let volume = Self { nodes, tetrahedra, is_box: true };
+        let volume = Self { nodes, tetrahedra, is_box: true, within: 0.0 };
         volume.check().map(|()| volume)
+    }
+
+    /// Binds vertices of a surface that are outside, within this distance (mm), to the nearest tetrahedron: they move as if
+    /// it went on. Others are refused still.
+    ///
+    /// Such a vertex moves farther than the nodes, and their errors grow with it:
+    /// [`amplification`](dibs_nostd::nodes::Nodes::amplification) says how much. A vertex at a lever of three is refused, which
+    /// is about as far outside as the tetrahedron is high. If any vertex is outside, weights have 14 bits instead of 16.
+    #[must_use]
+    pub fn bind_within(mut self, distance: f64) -> Self {
+        self.within = distance;
+        self
     }
 
     /// Its nodes.
@@ -172,6 +197,17 @@ impl Volume {
     #[must_use]
     pub fn tetrahedra(&self) -> &[[u32; 4]] {
         &self.tetrahedra
+    }
+
+    /// The nodes in f32, from an origin, and the faces of the tetrahedra: what a motion of them is compared with.
+    pub(crate) fn skeleton(&self, origin: DVec3) -> Mesh {
+        let positions = self.nodes.iter().map(|&node| (node - origin).as_vec3()).collect();
+        let faces = self.tetrahedra.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [b, c, d]]);
+        Mesh { origin, positions, triangles: faces.collect() }
+    }
+
+    pub(super) const fn within(&self) -> f64 {
+        self.within
     }
 
     pub(super) const fn is_box(&self) -> bool {
@@ -231,7 +267,24 @@ fn grid(size: UVec3) -> impl Iterator<Item = UVec3> {
     (0..size.z).flat_map(layer)
 }
 
+/// The largest singular value of the gradient from edges at rest to edges now.
+pub(crate) fn largest_stretch(rest: DMat3, now: DMat3) -> f64 {
+    let gradient = now * rest.inverse();
+    let [a, b, c] = [gradient.x_axis, gradient.y_axis, gradient.z_axis];
+    let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
+    let (ab, ac, bc) = (a.dot(b), a.dot(c), b.dot(c));
+    // The largest root of the characteristic polynomial of the products, which is all real.
+    let mean = (aa + bb + cc) / 3.0;
+    let (x, y, z) = (aa - mean, bb - mean, cc - mean);
+    let size = ((x * x + y * y + z * z) / 6.0 + (ab * ab + ac * ac + bc * bc) / 3.0).sqrt();
+    let determinant = x * (y * z - bc * bc) - ab * (ab * z - bc * ac) + ac * (ab * bc - y * ac);
+    let cosine = (determinant / (2.0 * size.powi(3))).clamp(-1.0, 1.0);
+    // NaN of a gradient that is a rotation.
+    let spread = if size > 0.0 { 2.0 * size * (cosine.acos() / 3.0).cos() } else { 0.0 };
+    (mean + spread).sqrt()
+}
+
 /// The edges along the path through four nodes.
-pub(super) fn edges([a, b, c, d]: [DVec3; 4]) -> DMat3 {
+pub(crate) fn edges([a, b, c, d]: [DVec3; 4]) -> DMat3 {
     DMat3::from_cols(b - a, c - b, d - c)
 }

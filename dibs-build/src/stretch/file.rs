@@ -1,15 +1,17 @@
-//! The file that `dibs stretch` writes and `dibs build` reads: a limit for each triangle.
+//! The file that `dibs stretch` writes and `dibs build` reads: a limit for each triangle, or tetrahedron of a volume.
 //!
 //! Text: lines that start with `#` are comments; then `dibs-limits 1`, `mesh` with the mesh's checksum
-//! in hexadecimal digits, `triangles` with their number, and one number a line, in the mesh's order.
+//! in hexadecimal digits, `triangles` with their number, and one number a line, in the mesh's order. Of a volume it is
+//! `tetrahedra` and the volume's order.
 
 use std::path::{Path, PathBuf};
 
 use dibs_nostd::format::CRC;
+use glam::{DVec3, Vec3};
 use thiserror::Error;
 
 use crate::read::file;
-use crate::{Mesh, WriteError, write_atomically};
+use crate::{Mesh, Volume, WriteError, write_atomically};
 
 /// A file of limits that cannot be used.
 #[derive(Debug, Error)]
@@ -33,8 +35,8 @@ pub enum LimitsErrorKind {
     NotLimits,
     /// The limits are of another mesh.
     #[error(
-        "is of mesh {found:08x}, this one is {expected:08x}: write it anew for this mesh, with the same \
-         options for reading it"
+        "is of mesh {found:08x}, this one is {expected:08x}: write it anew for this mesh or volume, with \
+         the same options for reading it"
     )]
     OtherMesh {
         /// Checksum of the mesh.
@@ -42,10 +44,10 @@ pub enum LimitsErrorKind {
         /// Checksum in the file.
         found: u32,
     },
-    /// The number of limits differs from that of triangles.
-    #[error("has {found} limits for {expected} triangles: it is cut off or was edited")]
+    /// The number of limits is another one.
+    #[error("has {found} limits, {expected} are needed: it is cut off or was edited")]
     Count {
-        /// Triangles of the mesh.
+        /// Triangles of the mesh, or tetrahedra of the volume.
         expected: usize,
         /// Limits in the file.
         found: usize,
@@ -73,15 +75,7 @@ pub fn write_limits(
     limits: &[f32],
     comment: &str,
 ) -> Result<(), WriteError> {
-    assert_eq!(limits.len(), mesh.triangles.len(), "a limit for each triangle");
-    write_atomically(path, |out| {
-        for line in comment.lines() {
-            writeln!(out, "# {line}")?;
-        }
-        writeln!(out, "dibs-limits 1\nmesh {:08x}\ntriangles {}", checksum(mesh), limits.len())?;
-        // The shortest digits that give the same number back.
-        limits.iter().try_for_each(|limit| writeln!(out, "{limit}"))
-    })
+    Limited::triangles(mesh).write(path.as_ref(), limits, comment)
 }
 
 /// Reads the limits of a mesh's triangles.
@@ -89,13 +83,93 @@ pub fn write_limits(
 /// # Errors
 /// [`LimitsError`] names the file and its defect, such as limits of another mesh.
 pub fn read_limits(path: impl AsRef<Path>, mesh: &Mesh) -> Result<Vec<f32>, LimitsError> {
-    let path = path.as_ref();
-    let text = file::text(path).map_err(LimitsErrorKind::from);
-    text.and_then(|text| parse(&text, mesh))
-        .map_err(|kind| LimitsError { path: path.to_path_buf(), kind })
+    Limited::triangles(mesh).read(path.as_ref())
 }
 
-fn parse(text: &str, mesh: &Mesh) -> Result<Vec<f32>, LimitsErrorKind> {
+impl Volume {
+    /// Writes limits for its tetrahedra, after a comment.
+    ///
+    /// # Errors
+    /// [`WriteError`]; the file is complete or untouched.
+    ///
+    /// # Panics
+    /// If the number of limits differs from that of tetrahedra.
+    pub fn write_limits(
+        &self,
+        path: impl AsRef<Path>,
+        limits: &[f32],
+        comment: &str,
+    ) -> Result<(), WriteError> {
+        Limited::tetrahedra(self).write(path.as_ref(), limits, comment)
+    }
+
+    /// Reads the limits of its tetrahedra.
+    ///
+    /// # Errors
+    /// [`LimitsError`] names the file and its defect, such as limits of another volume.
+    pub fn read_limits(&self, path: impl AsRef<Path>) -> Result<Vec<f32>, LimitsError> {
+        Limited::tetrahedra(self).read(path.as_ref())
+    }
+}
+
+/// What a file's limits are of.
+struct Limited {
+    elements: &'static str,
+    count: usize,
+    checksum: u32,
+}
+
+impl Limited {
+    fn triangles(mesh: &Mesh) -> Self {
+        let mut digest = CRC.digest();
+        mesh.positions
+            .iter()
+            .flat_map(Vec3::to_array)
+            .for_each(|x| digest.update(&x.to_le_bytes()));
+        mesh.triangles.iter().flatten().for_each(|corner| digest.update(&corner.to_le_bytes()));
+        Self { elements: "triangles", count: mesh.triangles.len(), checksum: digest.finalize() }
+    }
+
+    fn tetrahedra(volume: &Volume) -> Self {
+        let mut digest = CRC.digest();
+        volume
+            .nodes()
+            .iter()
+            .flat_map(DVec3::to_array)
+            .for_each(|x| digest.update(&x.to_le_bytes()));
+        volume
+            .tetrahedra()
+            .iter()
+            .flatten()
+            .for_each(|corner| digest.update(&corner.to_le_bytes()));
+        Self {
+            elements: "tetrahedra",
+            count: volume.tetrahedra().len(),
+            checksum: digest.finalize(),
+        }
+    }
+
+    fn write(&self, path: &Path, limits: &[f32], comment: &str) -> Result<(), WriteError> {
+        let Self { elements, count, checksum } = self;
+        assert_eq!(limits.len(), *count, "a limit for each of the {elements}");
+        write_atomically(path, |out| {
+            for line in comment.lines() {
+                writeln!(out, "# {line}")?;
+            }
+            writeln!(out, "dibs-limits 1\nmesh {checksum:08x}\n{elements} {count}")?;
+            // The shortest digits that give the same number back.
+            limits.iter().try_for_each(|limit| writeln!(out, "{limit}"))
+        })
+    }
+
+    fn read(&self, path: &Path) -> Result<Vec<f32>, LimitsError> {
+        let text = file::text(path).map_err(LimitsErrorKind::from);
+        text.and_then(|text| parse(&text, self))
+            .map_err(|kind| LimitsError { path: path.to_path_buf(), kind })
+    }
+}
+
+fn parse(text: &str, of: &Limited) -> Result<Vec<f32>, LimitsErrorKind> {
     let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     let mut lines = lines.filter(|(_, line)| !line.starts_with('#') && !line.is_empty());
     let mut field = |name: &str| {
@@ -106,34 +180,20 @@ fn parse(text: &str, mesh: &Mesh) -> Result<Vec<f32>, LimitsErrorKind> {
         return Err(LimitsErrorKind::NotLimits);
     }
     let found = field("mesh").and_then(|digits| u32::from_str_radix(digits, 16).ok());
-    let count = field("triangles").and_then(|digits| digits.parse::<usize>().ok());
+    let count = field(of.elements).and_then(|digits| digits.parse::<usize>().ok());
     let (Some(found), Some(count)) = (found, count) else {
         return Err(LimitsErrorKind::NotLimits);
     };
-    let expected = checksum(mesh);
-    if found != expected {
-        return Err(LimitsErrorKind::OtherMesh { expected, found });
+    if found != of.checksum {
+        return Err(LimitsErrorKind::OtherMesh { expected: of.checksum, found });
     }
     let limit = |(line, text): (usize, &str)| match text.parse::<f32>() {
         Ok(limit) if (1.0..=1e6).contains(&limit) => Ok(limit),
         _ => Err(LimitsErrorKind::Line { line, text: text.to_owned() }),
     };
     let limits = lines.map(limit).collect::<Result<Vec<f32>, _>>()?;
-    let triangles = mesh.triangles.len();
-    if limits.len() != triangles || count != triangles {
-        return Err(LimitsErrorKind::Count { expected: triangles, found: limits.len() });
+    if limits.len() != of.count || count != of.count {
+        return Err(LimitsErrorKind::Count { expected: of.count, found: limits.len() });
     }
     Ok(limits)
-}
-
-/// CRC-32 of a mesh's positions and triangles.
-fn checksum(mesh: &Mesh) -> u32 {
-    let mut digest = CRC.digest();
-    for position in &mesh.positions {
-        position.to_array().iter().for_each(|x| digest.update(&x.to_le_bytes()));
-    }
-    for corner in mesh.triangles.iter().flatten() {
-        digest.update(&corner.to_le_bytes());
-    }
-    digest.finalize()
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 pub use file::{LimitsError, LimitsErrorKind, read_limits, write_limits};
 
 use crate::motion::MotionMismatchError;
+use crate::nodes::{Volume, edges, largest_stretch as largest_stretch_of, least_limit};
 use crate::rest::{RestShape, SHARED, least_limits};
 use crate::rounding::round_up;
 use crate::{Mesh, Motion, Paths};
@@ -78,14 +79,52 @@ impl MotionStretch {
         progress: &(dyn Fn(usize) + Sync),
     ) -> Result<Self, MotionMismatchError> {
         motion.check_fits(mesh)?;
+        let stretch = |triangle: usize, positions: &[Vec3]| {
+            let corners = mesh.triangles[triangle];
+            let rest = RestShape::new(mesh.corners(corners), paths.kind()).corners;
+            stretch(rest, corners.map(|v| positions[v as usize].as_dvec3()), paths)
+        };
+        let rounding = least_limits(mesh, paths.kind()).collect();
+        Ok(Self::of_elements(mesh.triangles.len(), rounding, motion, progress, stretch))
+    }
+
+    /// The same of the tetrahedra of a volume, whose nodes the motion moves: [`Needed::triangle`] is a tetrahedron then.
+    ///
+    /// # Errors
+    /// [`MotionMismatchError`] where a frame does not fit the nodes.
+    pub fn of_nodes(
+        volume: &Volume,
+        motion: &Motion,
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Result<Self, MotionMismatchError> {
+        let rest = volume.skeleton(motion.origin);
+        motion.check_fits(&rest)?;
+        let shape = |tetrahedron: usize, positions: &[Vec3]| {
+            volume.tetrahedra()[tetrahedron].map(|node| positions[node as usize].as_dvec3())
+        };
+        let stretch = |tetrahedron: usize, positions: &[Vec3]| {
+            let rest = edges(shape(tetrahedron, &rest.positions));
+            largest_stretch_of(rest, edges(shape(tetrahedron, positions)))
+        };
+        let count = volume.tetrahedra().len();
+        let least = |tetrahedron| least_limit(shape(tetrahedron, &rest.positions));
+        // A flat one is refused by the builder.
+        let rounding = (0..count).map(|at| least(at).unwrap_or(1.0)).collect();
+        Ok(Self::of_elements(count, rounding, motion, progress, stretch))
+    }
+
+    fn of_elements(
+        count: usize,
+        rounding: Vec<f64>,
+        motion: &Motion,
+        progress: &(dyn Fn(usize) + Sync),
+        stretch: impl Fn(usize, &[Vec3]) -> f64 + Sync,
+    ) -> Self {
         let done = std::sync::atomic::AtomicUsize::new(0);
         let needed = |triangle: usize| {
-            let corners = mesh.triangles[triangle];
-            let at = |positions: &[Vec3]| corners.map(|v| positions[v as usize].as_dvec3());
-            let rest = RestShape::new(mesh.corners(corners), paths.kind()).corners;
             let mut worst = Needed { triangle, stretch: 0.0, frame: 0 };
             for (frame, positions) in motion.frames.iter().enumerate() {
-                let stretch = stretch(rest, at(positions), paths);
+                let stretch = stretch(triangle, positions);
                 // Written so that the NaN of a triangle without area is kept.
                 if !(stretch <= worst.stretch) {
                     worst = Needed { stretch, frame, ..worst };
@@ -97,9 +136,7 @@ impl MotionStretch {
             }
             worst
         };
-        let triangles = (0..mesh.triangles.len()).into_par_iter().map(needed).collect();
-        let rounding = least_limits(mesh, paths.kind()).collect();
-        Ok(Self { triangles, rounding })
+        Self { triangles: (0..count).into_par_iter().map(needed).collect(), rounding }
     }
 
     /// The largest stretch of each triangle of the mesh.
@@ -126,7 +163,7 @@ impl MotionStretch {
     }
 
     /// Limits for the builder: each triangle's largest stretch, at least 1, plus `margin` (0.1: a tenth), plus the rounding
-    /// of the controller's measurement: 0.0006, and up to 0.016 for a triangle with a sharp corner. A tree with them
+    /// of the controller's measurement: 0.0006, and up to 0.016 for a triangle with a sharp corner or a flat tetrahedron. A tree with them
     /// admits every frame of the motion that does not turn a closed surface inside out, even with a margin of 0.
     #[must_use]
     pub fn limits(&self, margin: f32) -> Vec<f32> {

@@ -9,8 +9,8 @@ use crate::tree_file::{self, AnyTree};
 use crate::{overwrite, tool};
 use anyhow::{Context, Result, bail, ensure};
 use dibs_build::glam::Vec3;
-use dibs_build::write_atomically;
-use dibs_nostd::{Index, PathKind, Tree, measure_stretch};
+use dibs_build::{SurfaceRows, write_atomically};
+use dibs_nostd::{Index, Tree};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -96,12 +96,6 @@ fn read_page(path: &Path) -> Result<String> {
 
 /// The elements with the tree, the motion and the facts about them.
 fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<String> {
-    if tree.paths() == PathKind::Volume {
-        bail!(
-            "{}: a surface that nodes move cannot be shown; build it without --nodes",
-            args.tree.display()
-        );
-    }
     let (frames, rate) = match args.motion.given() {
         Some(path) => motion(args, tree, path)?,
         None => (Vec::new(), 1.0),
@@ -132,7 +126,7 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
     Ok(data)
 }
 
-/// The frames of a motion in the order of the tree's rows, none of them stretched too far.
+/// The frames of a motion, of vertices in the order of the tree's rows or of nodes, none of them stretched too far.
 fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec<Vec<Vec3>>, f64)> {
     let name = path.display();
     let motion = args.lengths.motion_of(tree, path)?;
@@ -140,7 +134,7 @@ fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec
     let mut frames = Vec::with_capacity(motion.frames.len());
     for (number, frame) in motion.frames.iter().enumerate() {
         let frame = rows(tree, path, number, frame)?;
-        if let Err(error) = measure_stretch(tree, frame.as_slice()) {
+        if let Err(error) = SurfaceRows::of(tree, frame.clone())?.stretch {
             bail!(
                 "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with --limits that \
                  allow it"

@@ -94,6 +94,32 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
     }
     assert!(answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
 
+    // Limits of each tetrahedron.
+    let line = "stretch heart.ply --nodes volume.msh --motion nodes.pc2 --margin 0.05 --limits heart.limits";
+    let told = succeeds(folder, line);
+    assert!(told.contains("written  heart.limits: a limit for each tetrahedron"), "{told}");
+    let learned = json(folder, &format!("{line} --json"));
+    assert_eq!(learned["worst"][0]["nodes"].as_array().unwrap().len(), 4);
+    let line =
+        "build heart.ply -o learned.dibs --limits heart.limits --motion nodes.pc2 --json --nodes";
+    let tree = json(folder, &format!("{line} volume.msh"));
+    let stated = |limit: &serde_json::Value| limit.as_f64().unwrap();
+    assert_eq!(stated(&tree["tree"]["stretch"]), stated(&learned["uniform_limit"]));
+    let error = fails(folder, &format!("{line} lattice:2,2,2"));
+    assert!(error.contains("heart.limits: is of mesh"), "{error}");
+
+    // A volume that vertices stick out of.
+    let smaller: Vec<DVec3> = volume.nodes().iter().map(|at| *at * 0.97).collect();
+    std::fs::write(folder.join("smaller.vtk"), vtk(&smaller, volume.tetrahedra())).unwrap();
+    let bound = "build heart.ply -o bound.dibs --nodes smaller.vtk --bind-within";
+    assert!(fails(folder, &format!("{bound} 0.01")).contains("bind vertices within that distance"));
+    let bound = json(folder, &format!("{bound} 3 --json"));
+    assert!(bound["tree"]["volume"]["amplification"].as_f64().unwrap() > 1.01);
+    assert!(succeeds(folder, "inspect bound.dibs").contains("outside  vertices move up to 1."));
+    let ask = "query bound.dibs --tool sphere:0,0,150,5 --json --vertices smaller.vtk";
+    let apart = json(folder, ask)["separation"].as_f64().unwrap() - answers[0].0.as_f64().unwrap();
+    assert!(apart.abs() < 1e-2, "{apart}");
+
     std::fs::write(folder.join("tools.csv"), "sphere:0,0,120,5\n".repeat(200)).unwrap();
     for surface in ["held", "interpolated", "extrapolated"] {
         let line =
@@ -140,8 +166,12 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
         assert!(error.contains(part), "{vertices}: {error}");
     }
     std::fs::write(folder.join("page.html"), "<!--data-->").unwrap();
-    let error = fails(folder, "view heart.dibs -o heart.html --page page.html");
-    assert!(error.contains("build it without --nodes"), "{error}");
+    for motion in ["", "--motion nodes.pc2"] {
+        let view = format!("view heart.dibs -o heart.html --page page.html {motion}");
+        assert!(succeeds(folder, &view).starts_with("written  heart.html"));
+    }
+    let error = fails(folder, "view bound.dibs --motion heart.ply -o heart.html --page page.html");
+    assert!(error.contains("heart.ply"), "{error}");
     assert_eq!(std::fs::read(folder.join("heart.dibs")).unwrap(), before);
 }
 

@@ -172,7 +172,7 @@ impl Rows for crate::nodes::Nodes<'static> {
         for (corner, weight) in corners.into_iter().zip(weights) {
             let parts = nodes.weights(corner).unwrap_or_default();
             let [a, b, c, d] = parts;
-            let part = |(_, part): (u32, u32)| part as f32 * (1.0 / crate::nodes::WHOLE as f32);
+            let part = |(_, part): (u32, i32)| part as f32 * (1.0 / crate::nodes::WHOLE as f32);
             let parts = [part(a), part(b), part(c), part(d)];
             velocity += rows.velocity([a.0, b.0, c.0, d.0], parts) * weight;
         }

@@ -56,11 +56,12 @@ pub enum NodesError {
         /// Elements of the surface.
         elements: u32,
     },
-    /// A vertex's three stored weights sum up to more than the whole.
+    /// A vertex is outside of its element, of a tree whose vertices are not, or too far outside.
     Weights {
         /// Row of the vertex.
         vertex: u32,
-        /// Their sum; the whole is 65,536.
+        /// The sum of its weights' sizes in parts of 65,536: that is the sum of one inside, and three times as much too
+        /// large.
         sum: u32,
     },
 }
@@ -87,7 +88,10 @@ impl fmt::Display for NodesError {
                 write!(f, "vertex {vertex} is bound to element {element}, there are {elements}")
             }
             Self::Weights { vertex, sum } => {
-                write!(f, "the weights of vertex {vertex} sum up to {sum}, 65536 is the whole")
+                write!(
+                    f,
+                    "the sizes of the weights of vertex {vertex} sum up to {sum} parts of 65536"
+                )
             }
         }
     }

@@ -15,6 +15,13 @@ pub const ELEMENT_BYTES: usize = 36;
 pub const BINDING_BYTES: usize = 8;
 /// The sum of a vertex's four weights.
 pub const WHOLE: u32 = 1 << 16;
+/// A stored weight of zero where vertices lie outside of their elements: weights are signed then, and each is as many
+/// parts of 65,536 as [`STEP`] times what is stored above it.
+pub const SIGNED_ZERO: u32 = 1 << 15;
+/// Parts of a signed weight's unit.
+pub const STEP: u32 = 4;
+/// The sizes of a vertex's signed weights sum up to less than so many parts.
+pub const MOST_SIZES: u32 = 3 * WHOLE;
 
 /// The header, and the tables of nodes, elements and bindings.
 #[derive(Clone, Copy, Debug)]
@@ -23,9 +30,50 @@ pub(super) struct Parts<'a> {
     pub extent: f32,
     /// Longest edge at rest (mm).
     pub edge: f32,
+    pub scale: Scale,
+    /// The largest sum of the sizes of a vertex's weights: no vertex moves farther than so many times its farthest node.
+    pub amplification: f32,
     pub nodes: &'a [[u8; NODE_BYTES]],
     pub elements: &'a [[u8; ELEMENT_BYTES]],
     pub bindings: &'a [[u8; BINDING_BYTES]],
+}
+
+/// How weights are stored.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scale {
+    /// What stands for zero.
+    zero: u32,
+    /// The unit, as a part of the whole.
+    pub unit: f32,
+    /// The whole in units.
+    pub whole: u32,
+}
+
+impl Scale {
+    const fn of(zero: u32) -> Self {
+        let whole = if zero == 0 { WHOLE } else { WHOLE / STEP };
+        Self { zero, unit: 1.0 / whole as f32, whole }
+    }
+
+    /// A weight in units.
+    #[inline(always)]
+    pub const fn weight(&self, stored: u32) -> i32 {
+        stored.wrapping_sub(self.zero) as i32
+    }
+
+    /// The four weights in units, of the three that are stored.
+    #[inline(always)]
+    pub const fn weights(&self, [u, v, w]: [u32; 3]) -> [i32; 4] {
+        let (u, v, w) = (self.weight(u), self.weight(v), self.weight(w));
+        // Each has 17 bits at most.
+        let sum = u.wrapping_add(v).wrapping_add(w);
+        [u, v, w, (self.whole as i32).wrapping_sub(sum)]
+    }
+
+    /// Parts of 65,536 in so many units.
+    pub const fn parts(&self, units: u32) -> u32 {
+        units.saturating_mul(if self.zero == 0 { 1 } else { STEP })
+    }
 }
 
 /// An element: its nodes, and its shape at rest.
@@ -44,7 +92,7 @@ pub(super) struct AtRest<T> {
     pub least: T,
 }
 
-/// A vertex's element, and the weights of its first three nodes.
+/// A vertex's element, and the weights of its first three nodes as they are stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Binding {
     pub element: u32,
@@ -67,6 +115,7 @@ pub(super) fn parts(bytes: &[u8], vertices: u32) -> Result<Parts<'_>, NodesError
         4 => !(1..=MAX_ELEMENTS).contains(&elements),
         8 => !is_length(extent),
         12 => !is_length(edge),
+        16 => word(16) != 0 && word(16) != SIGNED_ZERO,
         _ => word(offset.into()) != 0,
     };
     let mut fields = [0, 4, 8, 12, 16, 20, 24, 28].into_iter();
@@ -82,18 +131,21 @@ pub(super) fn parts(bytes: &[u8], vertices: u32) -> Result<Parts<'_>, NodesError
     let [of_nodes, of_elements, _] = lengths.map(|length| length as usize);
     let (nodes, tables) = tables.split_at_checked(of_nodes).unwrap_or_default();
     let (elements, bindings) = tables.split_at_checked(of_elements).unwrap_or_default();
-    let parts = Parts {
+    let mut parts = Parts {
         extent,
         edge,
+        scale: Scale::of(word(16)),
+        amplification: 1.0,
         nodes: nodes.as_chunks().0,
         elements: elements.as_chunks().0,
         bindings: bindings.as_chunks().0,
     };
-    check(&parts).map(|()| parts)
+    parts.amplification = check(&parts)?;
+    Ok(parts)
 }
 
-/// Checks every row.
-fn check(parts: &Parts<'_>) -> Result<(), NodesError> {
+/// Checks every row, and returns the amplification, rounded up.
+fn check(parts: &Parts<'_>) -> Result<f32, NodesError> {
     for (node, row) in (0..).zip(parts.nodes) {
         let Vec3 { x, y, z } = position(row).abs();
         // So that products of lengths do not overflow. Written so that NaN is wrong.
@@ -128,17 +180,23 @@ fn check(parts: &Parts<'_>) -> Result<(), NodesError> {
         }
     }
     let elements = parts.elements.len() as u32;
+    let mut largest = WHOLE;
     for (vertex, row) in (0..).zip(parts.bindings) {
         let binding = binding(row);
         if binding.element >= elements {
             return Err(NodesError::Binding { vertex, element: binding.element, elements });
         }
-        let sum = binding.weights.iter().sum();
-        if sum > WHOLE {
+        let weights = parts.scale.weights(binding.weights);
+        let sum = parts.scale.parts(weights.into_iter().map(i32::unsigned_abs).sum());
+        let is_possible = if parts.scale.zero == 0 { sum == WHOLE } else { sum < MOST_SIZES };
+        if !is_possible {
             return Err(NodesError::Weights { vertex, sum });
         }
+        largest = largest.max(sum);
     }
-    Ok(())
+    // Exact, and more than the rounding of what it is multiplied with.
+    let above = if largest > WHOLE { 1.0 + 1.0 / 65_536.0 } else { 1.0 };
+    Ok(largest as f32 * (above / WHOLE as f32))
 }
 
 /// The position of a node.

@@ -28,7 +28,9 @@ use layout::Parts;
 pub use error::NodesError;
 /// The layout of the nodes' bytes, for their builder.
 #[doc(hidden)]
-pub use layout::{BINDING_BYTES, ELEMENT_BYTES, HEADER_BYTES, NODE_BYTES, WHOLE};
+pub use layout::{
+    BINDING_BYTES, ELEMENT_BYTES, HEADER_BYTES, MOST_SIZES, NODE_BYTES, SIGNED_ZERO, STEP, WHOLE,
+};
 use measure::Pass;
 pub use monitor::NodeMonitor;
 pub use surface::EmbeddedSurface;
@@ -107,9 +109,10 @@ impl<'a> Nodes<'a> {
         if !matches!(tree.paths(), PathKind::Volume) {
             return Err(NodesError::Absent);
         }
+        let parts = layout::parts(section, tree.vertex_count())?;
         Ok(Self {
-            parts: layout::parts(section, tree.vertex_count())?,
-            motion: MotionUnit::of(tree),
+            parts,
+            motion: MotionUnit::of(tree).times(parts.amplification),
             mesh_id: tree.mesh_id(),
             facts: tree.surface_facts(),
             limit: tree.stretch(),
@@ -168,13 +171,25 @@ impl<'a> Nodes<'a> {
         self.parts.elements.get(element as usize).map(layout::corners)
     }
 
-    /// The nodes of a vertex and their weights, in parts of 65,536, which sum up exactly; `None` outside the table.
+    /// The nodes of a vertex and their weights, in parts of 65,536, which sum up exactly; `None` outside the table. A
+    /// vertex outside of its element has negative ones.
     #[must_use]
-    pub fn weights(&self, vertex: u32) -> Option<[(u32, u32); 4]> {
-        let ([a, b, c, d], [u, v, w]) = self.binding(vertex)?;
-        // The layout's check admits no larger sum.
-        let rest = WHOLE.saturating_sub(u.saturating_add(v).saturating_add(w));
-        Some([(a, u), (b, v), (c, w), (d, rest)])
+    pub fn weights(&self, vertex: u32) -> Option<[(u32, i32); 4]> {
+        let ([a, b, c, d], stored) = self.binding(vertex)?;
+        let parts = self.parts.scale.parts(1) as i32;
+        let [u, v, w, x] =
+            self.parts.scale.weights(stored).map(|weight| weight.wrapping_mul(parts));
+        Some([(a, u), (b, v), (c, w), (d, x)])
+    }
+
+    /// The most that a vertex moves for each millimetre of the farthest node of its element: 1 if none is outside of its
+    /// element, else the largest sum of the sizes of a vertex's weights, below 3.
+    ///
+    /// Errors of the nodes' positions count so many times in an answer's accuracy, as do their motion and their
+    /// extrapolation.
+    #[must_use]
+    pub const fn amplification(&self) -> f32 {
+        self.parts.amplification
     }
 
     /// The surface at these nodes: a row for each, in the order of the volume's file. No vertex is computed yet. Of a
@@ -225,7 +240,7 @@ impl<'a> Nodes<'a> {
         self.element_count().div_ceil(REGIONS as u32)
     }
 
-    /// The nodes of a vertex, and the weights of the first three.
+    /// The nodes of a vertex, and the weights of the first three as they are stored.
     #[inline(always)]
     fn binding(&self, vertex: u32) -> Option<([u32; 4], [u32; 3])> {
         let binding = layout::binding(self.parts.bindings.get(vertex as usize)?);

@@ -14,6 +14,7 @@ use crate::tree::SurfaceFacts;
 ///
 /// It refuses frames with an element stretched beyond the tree's limit, shrunk, or inverted, and nodes that move too far,
 /// as [`StretchMonitor`](crate::StretchMonitor) does of triangles and vertices, and gives the query the measured stretch.
+/// Nodes may move as far as keeps every vertex within the limits: see [`Nodes::amplification`].
 /// An element is measured once its nodes have come; of a partial frame all elements are.
 ///
 /// An inverted element is a local defect: a body bent until its ends overlap passes.
@@ -167,6 +168,6 @@ impl<const SURFACES: usize> Gate for NodeMonitor<'_, SURFACES> {
     }
 
     fn farthest(&self, elapsed: Millis) -> f32 {
-        farthest(self.limits.speed, self.limits.recovery, elapsed)
+        farthest(self.limits.speed, self.limits.recovery, elapsed) / self.nodes.amplification()
     }
 }

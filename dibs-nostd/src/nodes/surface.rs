@@ -3,15 +3,15 @@
 use glam::Vec3;
 
 use super::Nodes;
-use super::layout::WHOLE;
+use super::layout::Scale;
 use crate::surface::motion::sealed::Sealed;
 use crate::surface::{MeasuredStretch, MotionReading, MovingSurface, VertexTable};
 
 /// The surface that a table of nodes carries: [`Nodes::surface`] makes one.
 ///
 /// It is as the nodes are: between frames where they are interpolated, beyond the last where they are extrapolated, with
-/// their stretch and their motion. No vertex moves farther than a node of its element, because weights are not negative
-/// and sum up to one.
+/// their stretch and their motion. A vertex moves at most [`amplification`](Nodes::amplification) times as far as the
+/// farthest node of its element: 1 for one inside, whose weights are not negative and sum up to one.
 ///
 /// A vertex is the fourth node of its element plus weighted edges from there to the other three, which rounds less than
 /// a sum of weighted positions.
@@ -39,7 +39,8 @@ impl<'n, 'a, V: VertexTable + ?Sized> EmbeddedSurface<'n, 'a, V> {
         let [node, ..] = self.nodes.element(0).unwrap_or_default();
         let size = self.table.position(node).unwrap_or(Vec3::NAN).length();
         let coordinates = size + stretch * self.nodes.parts.extent;
-        (3.0 * coordinates + 16.0 * stretch * self.nodes.parts.edge) * ROUNDING
+        let sum = 3.0 * coordinates + 16.0 * stretch * self.nodes.parts.edge;
+        sum * (self.nodes.parts.amplification * ROUNDING)
     }
 }
 
@@ -58,11 +59,12 @@ impl<V: VertexTable + ?Sized> VertexTable for EmbeddedSurface<'_, '_, V> {
     fn position(&self, vertex: u32) -> Option<Vec3> {
         let ([a, b, c, d], weights) = self.nodes.binding(vertex)?;
         let d = self.table.position(d)?;
-        let [u, v, w] = weights.map(|weight| weight as f32);
+        let Scale { unit, .. } = self.nodes.parts.scale;
+        let [u, v, w] = weights.map(|weight| self.nodes.parts.scale.weight(weight) as f32);
         let sum = (self.table.position(a)? - d) * u
             + (self.table.position(b)? - d) * v
             + (self.table.position(c)? - d) * w;
-        Some(d + sum * (1.0 / WHOLE as f32))
+        Some(d + sum * unit)
     }
 
     fn epoch(&self) -> Option<u32> {
@@ -75,7 +77,7 @@ impl<V: VertexTable + ?Sized> VertexTable for EmbeddedSurface<'_, '_, V> {
 
     /// That of the nodes, and the rounding of f32.
     fn position_error(&self) -> f32 {
-        self.table.position_error() + self.rounding()
+        self.table.position_error() * self.nodes.parts.amplification + self.rounding()
     }
 }
 
@@ -84,5 +86,49 @@ impl<V: MovingSurface + ?Sized> Sealed for EmbeddedSurface<'_, '_, V> {}
 impl<V: MovingSurface + ?Sized> MovingSurface for EmbeddedSurface<'_, '_, V> {
     fn motion(&self) -> Option<MotionReading> {
         self.table.motion()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use dibs_build::{Builder, Volume, generate};
+
+    use super::*;
+    use crate::surface::MotionUnit;
+    use crate::tree::Tree;
+
+    /// The odometer of a surface counts all of a vertex's motion, of one outside of its element, too.
+    #[test]
+    fn motion_counts_the_lever() {
+        let mesh = generate::heart(600).expect("a valid size").mesh;
+        let lattice = Volume::lattice(&mesh, [3, 3, 3]).expect("a lattice");
+        let nodes = lattice.nodes().iter().map(|at| *at * 0.8).collect();
+        let smaller = Volume::new(nodes, lattice.tetrahedra().to_vec()).expect("valid");
+        let built = Builder::new().nodes(&smaller.bind_within(40.0)).build(&mesh).expect("bound");
+        let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+        let nodes = Nodes::of(&tree).expect("valid");
+        let unit = MotionUnit::of(&tree);
+        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+        let (mut odometer, mut longest) = (nodes.odometer(), 0.0_f32);
+        for vertex in 0..nodes.vertex_count() {
+            let mut next = rest.clone();
+            for (node, weight) in nodes.weights(vertex).expect("in the table") {
+                next[node as usize].x += if weight < 0 { -1.0 } else { 1.0 };
+            }
+            let before = odometer.start(rest.as_slice()).motion().expect("measured");
+            let step = odometer.step(rest.as_slice(), next.as_slice());
+            let after = step.after();
+            let counted = nodes.surface(&after).motion().expect("measured");
+            let at = |frame: &[Vec3]| nodes.surface(frame).position(vertex).expect("a vertex");
+            let way = at(&next).distance(at(&rest));
+            let counted = counted.since(&before).expect("one run");
+            assert!(counted >= unit.units_of(way - 1e-4) && way > 0.99, "{vertex}: {way}");
+            longest = longest.max(way);
+        }
+        assert!(longest > 1.5 && (longest - nodes.amplification()).abs() < 1e-3, "{longest}");
     }
 }

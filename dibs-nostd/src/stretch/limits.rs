@@ -59,7 +59,8 @@ impl SurfaceLimits {
     }
 
     /// The least size of each of the [`REGIONS`](crate::REGIONS), as a part of its size at rest; 0 for no limit. The
-    /// size is the root mean square of an edge of each triangle, whatever the triangles' stretch limits. It
+    /// size is the root mean square of an edge of each triangle, whatever the triangles' stretch limits. An element with a
+    /// limit of its own counts at rest as smaller by that part of the tree's limit. The size
     /// is checked from the first frame on, so a collapsed surface, one of zeros, or one in metres instead of
     /// millimetres is refused at once.
     #[must_use]

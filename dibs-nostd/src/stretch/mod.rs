@@ -56,9 +56,10 @@ pub enum StretchError {
     ElementExceeded {
         /// The element.
         element: u32,
-        /// Its stretch; infinite if a node is not finite.
+        /// Its stretch; infinite if a node is not finite. Where elements have limits of their own it is divided by that one
+        /// and multiplied by the tree's.
         stretch: f32,
-        /// Its limit.
+        /// The tree's limit.
         limit: f32,
     },
     /// An element is turned inside out, or flat.

@@ -216,6 +216,16 @@ impl MotionUnit {
         Self { tree: tree.checksum(), unit: Unit::of(tree) }
     }
 
+    /// The unit for rows of which vertices move so many times as far.
+    #[cfg(feature = "nodes")]
+    pub(crate) const fn times(self, amplification: f32) -> Self {
+        let Unit { length, inverse } = self.unit;
+        Self {
+            unit: Unit { length: length / amplification, inverse: inverse * amplification },
+            ..self
+        }
+    }
+
     /// The units of a step whose square was rounded to nearest, rounded up; `None` if it is not finite.
     #[cfg(feature = "bus")]
     pub(crate) fn units_of_step(&self, squared: f32) -> Option<u64> {

@@ -3,31 +3,35 @@
 //! One file, because all tests need the same trees.
 
 use dibs_build::{Builder, BuiltTree, Mesh, Volume, generate};
-use dibs_nostd::format::{Link, MAX_STACK};
+use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::{NodeMonitor, Nodes};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
     Admission, Advance, Assembler, Coverage, Fallback, FrameExtent, Frames, Gate, IncomingSurface,
     Millis, MovingSurface, Options, Query, ReceiveError, Sphere, StretchError, SurfaceLimits,
-    Tracker, Tree, TriangleRow, VertexTable,
+    Tracker, VertexTable,
 };
 use dibs_tests::bus::collect;
-use dibs_tests::embedded::{NodeMotion, exact, gradient, hull, largest_stretch, rows, stretch_of};
+use dibs_tests::embedded::{
+    NodeMotion, Section, exact, gradient, hull, largest_stretch, rows, sections, shrunk, stretch_of,
+};
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::poses::pose;
 use dibs_tests::{ask, sample, surfaces};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
-/// A heart and a brain in lattices and in volumes that are no box.
+/// A heart and a brain in lattices, in volumes that are no box, and in one that vertices stick out of.
 fn built(rng: &mut Rng) -> Vec<(Mesh, BuiltTree)> {
     let heart = generate::heart(1_000).expect("a valid size").mesh;
     let brain = generate::brain(2_000).expect("a valid size");
     let mut trees = Vec::new();
     for (mesh, stretch) in [(heart, 1.3), (brain, 1.6)] {
+        let hull = hull(&mesh, [9, 8, 7], rng);
         let volumes = [
             Volume::lattice(&mesh, [3, 4, 5]).expect("a lattice"),
-            hull(&mesh, [9, 8, 7], rng),
+            shrunk(&hull, 0.9, 20.0),
+            hull,
             Volume::lattice(&mesh, [1, 1, 1]).expect("a lattice"),
         ];
         for volume in volumes {
@@ -36,28 +40,6 @@ fn built(rng: &mut Rng) -> Vec<(Mesh, BuiltTree)> {
         }
     }
     trees
-}
-
-/// A node's pin, its radius, and the rows of its section.
-fn sections(tree: &Tree<'_, u16>) -> Vec<(u32, f64, Vec<u32>)> {
-    let section = |row: u32| {
-        let (pin, radius, _) = tree.node(row).expect("in the tree");
-        let (mut below, mut covered) = (vec![row], Vec::new());
-        while let Some(row) = below.pop() {
-            match tree.node(row).expect("in the tree").2 {
-                Link::Leaf { first, count } => covered.extend(
-                    (first..first + count)
-                        .filter_map(|row| tree.corners(TriangleRow(row)))
-                        .flatten(),
-                ),
-                Link::Children { first, count } => below.extend(first..first + count),
-            }
-        }
-        covered.sort_unstable();
-        covered.dedup();
-        (pin, f64::from(radius), covered)
-    };
-    (0..tree.node_count()).map(section).collect()
 }
 
 /// Every vertex lies within its spheres' measured stretch times radius, in f64, whatever the motion; and the radius is
@@ -77,7 +59,7 @@ fn coverage_holds_in_every_admitted_frame() {
             let sigma = f64::from(nodes.measure(frame.as_slice()).expect("weakened").sigma());
             let now: Vec<DVec3> =
                 (0..nodes.vertex_count()).map(|row| exact(&nodes, &frame, row)).collect();
-            for (pin, radius, covered) in &sections {
+            for Section { pin, radius, covered } in &sections {
                 let away =
                     covered.iter().map(|&row| now[row as usize].distance(now[*pin as usize]));
                 let away = away.fold(0.0, f64::max);
@@ -87,7 +69,7 @@ fn coverage_holds_in_every_admitted_frame() {
         // Along the line from a pin to a vertex.
         let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
         for _ in 0..sample(400) {
-            let (pin, radius, covered) = &sections[rng.usize(..sections.len())];
+            let Section { pin, radius, covered } = &sections[rng.usize(..sections.len())];
             let at = |row| exact(&nodes, &rest, row);
             let far = |row: &&u32| at(**row).distance(at(*pin));
             let far = covered.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
@@ -173,7 +155,7 @@ fn no_admitted_element_is_stretched_further_than_measured() {
 #[test]
 fn frames_beyond_the_limit_are_refused() {
     let mut rng = Rng::with_seed(3);
-    let (_, built) = &built(&mut rng)[1];
+    let (_, built) = &built(&mut rng)[2];
     let tree = built.tree::<u16>().expect("valid");
     let nodes = Nodes::of(&tree).expect("valid");
     let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();

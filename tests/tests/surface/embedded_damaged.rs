@@ -74,7 +74,7 @@ fn damaged_nodes_are_refused() {
     let error = defect(&built, |bytes| put(bytes, bindings + 8 * 9, &72_u16.to_le_bytes()));
     assert_eq!(error, Some(NodesError::Binding { vertex: 9, element: 72, elements: 72 }));
     let error = defect(&built, |bytes| put(bytes, bindings + 8 * 9 + 2, &[0xFF; 6]));
-    assert_eq!(error, Some(NodesError::Weights { vertex: 9, sum: 3 * 65_535 }));
+    assert_eq!(error, Some(NodesError::Weights { vertex: 9, sum: 6 * 65_535 - 65_536 }));
 }
 
 /// Nodes belong to trees whose radii are lengths of paths through a volume, and to no others; metrics do not.
@@ -146,7 +146,15 @@ fn volumes_that_cannot_carry_a_surface_are_refused() {
     assert!(matches!(error, Some(VolumeError::Shape { .. } | VolumeError::Outside { .. })));
     let limits =
         Builder::new().limits(vec![1.5; mesh.triangles.len()]).nodes(&lattice).build(&mesh);
-    assert!(matches!(limits, Err(BuildError::LimitsOfTriangles)));
+    let elements = tetrahedra.len();
+    assert!(matches!(
+        limits,
+        Err(BuildError::Limits { limits: 320, elements: found, of: "tetrahedra" }) if found == elements
+    ));
+    let mut below = vec![1.5; elements];
+    below[7] = 0.9;
+    let below = Builder::new().limits(below).nodes(&lattice).build(&mesh);
+    assert!(matches!(below, Err(BuildError::Limit { of: "tetrahedron", element: 7, .. })));
 }
 
 /// A vertex on a node, an edge or a face is bound exactly, and a volume whose skin is the surface holds it.

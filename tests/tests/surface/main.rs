@@ -3,6 +3,8 @@
 mod as_configured;
 mod embedded;
 mod embedded_damaged;
+mod embedded_limits;
+mod embedded_outside;
 mod facts;
 mod frames;
 mod memory;

@@ -277,11 +277,14 @@ fn what_cannot_be_built_is_named() {
         assert!(matches!(error, BuildError::LeafSize { triangles } if triangles == leaf));
     }
     let error = built(&mesh, new().limits(vec![1.5; 319]));
-    assert!(matches!(error, BuildError::Limits { limits: 319, triangles: 320 }), "{error}");
+    assert!(
+        matches!(error, BuildError::Limits { limits: 319, elements: 320, of: "triangles" }),
+        "{error}"
+    );
     let mut limits = vec![1.5; 320];
     limits[7] = 0.9;
     let error = built(&mesh, new().limits(limits));
-    assert!(matches!(error, BuildError::Limit { triangle: 7, .. }), "{error}");
+    assert!(matches!(error, BuildError::Limit { element: 7, of: "triangle", .. }), "{error}");
     let mut broken = mesh.clone();
     broken.positions[7].y = f32::NAN;
     assert!(matches!(built(&broken, new()), BuildError::Coordinate { vertex: 7 }));

@@ -59,7 +59,8 @@ fn triangles_below(tree: &Tree<'_, u16>, row: u32) -> Vec<u32> {
 #[test]
 fn unpacked_motion_has_the_bits_of_the_packed() {
     let (session, frames) = heart();
-    assert_eq!(session.motion.frames, frames);
+    let unpacked = session.motion.frames.iter().map(|frame| frame.positions().to_vec());
+    assert_eq!(unpacked.collect::<Vec<_>>(), frames);
 }
 
 #[test]
@@ -141,4 +142,58 @@ fn contacts_move_as_the_surface_does() {
     session.advance(&pose, &pose, [0.110, 0.111], 1).unwrap();
     assert!(session.touching().unwrap().contacts.iter().all(|c| c.velocity == Vec3::ZERO));
     assert!(frames.len() > 4);
+}
+
+/// A lattice moves the heart: the surface is the one that its nodes give, at their frames, between and beyond, and is asked as
+/// vertices are.
+#[test]
+fn nodes_move_the_surface() {
+    use dibs_build::Volume;
+    use dibs_nostd::nodes::Nodes;
+
+    let mesh = generate::heart(1_000).unwrap().mesh;
+    let lattice = Volume::lattice(&mesh, [3, 3, 4]).unwrap();
+    let built = Builder::new().stretch(1.5).nodes(&lattice).build(&mesh).unwrap();
+    let frame = |number: usize| -> Vec<Vec3> {
+        let by = 0.02 * (number as f64 * 0.8).sin();
+        lattice.nodes().iter().map(|at| (*at * (1.0 + by)).as_vec3()).collect()
+    };
+    let frames: Vec<Vec<Vec3>> = (0..8).map(frame).collect();
+    let tree: Tree<'_, u16> = Tree::from_bytes(built.blob().to_vec().leak()).unwrap();
+    let nodes = Nodes::of(&tree).unwrap();
+    let mut session = Running::new(tree, &pack(&frames), 30.0).unwrap();
+    for (number, between) in
+        [Between::Held, Between::Interpolated, Between::Extrapolated].into_iter().enumerate()
+    {
+        session.settings().between = between;
+        session.restart();
+        for tick in 0..250 {
+            let (before, now) = (f64::from(tick) / 1e3, f64::from(tick + 1) / 1e3);
+            session.advance(&pose(tick), &pose(tick + 1), [before, now], 1).unwrap();
+            let [a, b] = [session.before, session.last].map(|frame| &frames[frame]);
+            let part = [1.0, session.motion.share(now), 1.0 + session.motion.share(now)][number];
+            let at = a.iter().zip(b).map(|(&a, &b)| a + (b - a) * part).collect::<Vec<Vec3>>();
+            let stretch = nodes.measure(at.as_slice()).unwrap();
+            assert!(session.stretch() >= stretch.sigma() - 1e-5);
+            let surface = nodes.surface(at.as_slice());
+            for row in (0..nodes.vertex_count()).step_by(17) {
+                let [shown, own] =
+                    [session.now.surface.position(row), surface.position(row)].map(Option::unwrap);
+                assert!(shown.distance(own) < 1e-3, "{between:?}, tick {tick}: {shown} {own}");
+            }
+            assert!(session.now.surface.position_error() > 0.0);
+            let tool = session.now.tool.as_ref().unwrap();
+            let Instrument::Capsule(tool) = tool else { panic!("a capsule") };
+            let mut query = Query::<u16, STACK>::new(&tree).unwrap();
+            let truth = query.closest(&surface, tool, &Options::cold()).unwrap();
+            let shown = session.answer().unwrap();
+            // A depth is known to its tolerance.
+            let (truth, shown) = (truth.interval(), shown.interval());
+            let is_apart = truth.lower > shown.upper + 2e-3 || shown.lower > truth.upper + 2e-3;
+            assert!(!is_apart, "{between:?}, tick {tick}: {truth:?} {shown:?}");
+        }
+    }
+    assert_eq!(session.positions().len(), 3 * nodes.vertex_count() as usize);
+    let rest = Running::new(tree, &[], 1.0).unwrap();
+    assert_eq!(rest.motion.frames.len(), 1);
 }

@@ -111,6 +111,7 @@ static void values(const float *positions, uint32_t vertices) {
     EXPECT(MISALIGNED,
            dibs_frame_set_vertices(frame, (const float *)(const void *)((const char *)positions + 1), 1, 0.0f));
     EXPECT(ARGUMENT, dibs_frame_set_vertices(frame, positions, vertices, -1.0f));
+    EXPECT(ARGUMENT, dibs_frame_set_nodes(frame, tree, positions, vertices, 0.0f));
     EXPECT(OK, dibs_frame_set_vertices(frame, positions, vertices - 1, 0.0f));
     EXPECT(VERTEX_COUNT, dibs_query_closest(query, frame, &tool, NULL, &found));
     EXPECT(VERTEX_COUNT, dibs_frame_measure(frame, tree, NULL));
