@@ -29,14 +29,14 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         captured: Millis,
         now: Millis,
     ) -> Result<Progress, ReceiveError> {
-        let limit = self.max_coordinate;
-        let source = |_: &Self| check(positions.clone(), 0, limit);
-        let store = |slots: &[Position]| {
-            for (slot, position) in slots.iter().zip(positions.clone()) {
+        let (limit, rows, checked) = (self.max_coordinate, positions.len(), positions.clone());
+        let source = move |_: &Self| check(checked, 0, limit);
+        let store = move |slots: &[Position]| {
+            for (slot, position) in slots.iter().zip(positions) {
                 slot.set(position);
             }
         };
-        self.local(Content::Whole, positions.len(), source, store, [captured, now])
+        self.local(Content::Whole, rows, source, store, [captured, now])
     }
 
     /// The same, of weights of displacement modes.
