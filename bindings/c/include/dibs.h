@@ -11,7 +11,7 @@
  * A pointer is null, or it points to as much as its function says: more is not checked. Lengths are in the mesh's own unit,
  * mm in these comments; positions are in the mesh's frame.
  */
-/* Generated from bindings/c/src by `DIBS_WRITE=1 cargo test -p dibs-c --test header`. */
+/* Generated from bindings/c/src by `DIBS_WRITE=1 cargo test -p dibs-c header`. */
 
 
 #ifndef DIBS_H

@@ -1,7 +1,5 @@
 //! The filter of commands in C: the same bits as in Rust, for a chain pushed into a moving surface.
 
-mod programs;
-
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -11,7 +9,8 @@ use dibs_build::{Builder, generate};
 use dibs_nostd::filter::{Filter, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, Cost, MovingTable, Odometer, Tracker, Tree};
-use programs::{include, library, run, tool};
+
+use crate::programs::{include, library, run, tool};
 
 const TICKS: usize = 1_500;
 

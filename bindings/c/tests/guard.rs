@@ -1,7 +1,5 @@
 //! The loop of bus and guard in C: the same bits as in Rust, its misuses, and the README's loop.
 
-mod programs;
-
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,8 +20,9 @@ use dibs_nostd::{
     Advance, Capsule, Coverage, Fallback, Interval, Millis, NoSide, Progress, Proximity,
     QueryError, ReceiveError, Side, Sphere, StretchError, TreeBytes, Unavailable,
 };
-use programs::{include, library, run, tool, tree_and_stream};
 use xtask::workspace;
+
+use crate::programs::{include, library, run, tool, tree_and_stream};
 
 /// Vertices of the generated heart of 1,000 triangles.
 const VERTICES: usize = 502;

@@ -1,14 +1,11 @@
 //! The layers below bus and guard answer a script with the same bits as the Rust library.
 
-mod programs;
-mod script;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use programs::{include, library, run, tool};
-use script::Script;
+use crate::programs::{include, library, run, tool};
+use crate::script::Script;
 
 #[test]
 fn c_and_rust_answer_a_script_with_the_same_bits() {

@@ -1,11 +1,9 @@
 //! Misuse in C returns a code, and touches no memory outside the object.
 
-mod programs;
-
 use std::path::Path;
 use std::process::Command;
 
-use programs::{include, library, run, tool, tree_and_stream};
+use crate::programs::{include, library, run, tool, tree_and_stream};
 
 #[test]
 fn misuse_is_a_code_under_the_sanitizers() {

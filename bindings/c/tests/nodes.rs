@@ -1,7 +1,5 @@
 //! Queries in C on a surface that nodes carry: the same bits as in Rust, and what is refused.
 
-mod programs;
-
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -11,7 +9,8 @@ use dibs_build::{Builder, Volume, generate};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Capsule, Options, Query, Tree, VertexTable};
-use programs::{include, library, run, tool};
+
+use crate::programs::{include, library, run, tool};
 
 /// Nodes' positions that may be a quarter of a millimetre off.
 struct Inexact<'a>(&'a [Vec3]);

@@ -1,11 +1,9 @@
 //! `include/dibs.hpp` compiles as C++20 without exceptions, and its queries answer.
 
-mod programs;
-
 use std::path::Path;
 use std::process::Command;
 
-use programs::{include, library, run, tool, tree_and_stream};
+use crate::programs::{include, library, run, tool, tree_and_stream};
 
 #[test]
 fn the_wrapper_answers_without_exceptions() {

@@ -143,7 +143,8 @@ def build(
     `stretch` is the largest factor by which the surface may be stretched along itself; `limits` are one for each
     triangle, or tetrahedron, instead (`MotionStretch.limits`). `labels` are numbers from 0 to 255, one for each triangle, which answers
     then carry. With `nodes` and `tetrahedra` of them, a volume around the surface, a surface's positions are those of the
-    nodes, and `stretch` limits each tetrahedron; vertices outside are bound to the nearest one within `bind_within` (mm). Other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
+    nodes, and `stretch` limits each tetrahedron; vertices outside are bound to the nearest one within `bind_within` (mm).
+    Other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
     """
     if isinstance(source, Mesh):
         if triangles is not None or reading:

@@ -8,23 +8,27 @@ use pyo3::exceptions::{PyConnectionError, PyFileNotFoundError, PyOSError, PyValu
 use std::fmt::Display;
 use std::io::ErrorKind;
 
-/// Options of the command line that its sentences advise, and their names here.
-const OPTIONS: [(&str, &str); 8] = [
-    ("`dibs build --orient` turns them", "orient=True turns them"),
+/// Advice that the library words for the command line, and its words here.
+const ADVICE: [(&str, &str); 12] = [
+    ("with --orient", "with orient=True"),
+    ("--orient, unless", "orient=True, unless"),
     ("without --strict", "with strict=False"),
     ("--largest-component", "largest_component=True"),
     ("--weld 0", "weld=0"),
-    ("--unit m", "unit='m'"),
+    ("--unit mm", "unit='mm'"),
+    ("--unit cm", "unit='cm'"),
+    ("--unit in", "unit='in'"),
     ("--unit um", "unit='um'"),
-    ("--stretch", "stretch"),
-    ("--limits", "limits"),
+    ("--unit m", "unit='m'"),
+    ("(--unit)", "(unit)"),
+    ("`dibs stretch MESH MOTION --limits FILE` writes one", "`MotionStretch.limits` makes one"),
 ];
 
 /// A sentence of the library with the names that things have here.
 pub fn sentence(of_library: impl Display) -> String {
     let mut sentence = of_library.to_string();
-    for (option, here) in OPTIONS {
-        sentence = sentence.replace(option, here);
+    for (there, here) in ADVICE {
+        sentence = sentence.replace(there, here);
     }
     sentence
 }

@@ -75,7 +75,8 @@ impl Mesh {
         let winding = check_winding(&self.import.mesh).err().map(|error| error.to_string());
         let crossing = crossing_parts(&self.import.mesh);
         let crossing = crossing.iter().map(ToString::to_string);
-        self.import.report.warnings().chain(winding).chain(crossing).collect()
+        let warnings = self.import.report.warnings().chain(winding).chain(crossing);
+        warnings.map(crate::error::sentence).collect()
     }
 
     fn build(

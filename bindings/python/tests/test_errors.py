@@ -120,6 +120,7 @@ class Errors(unittest.TestCase):
                 self.assertIs(type(caught.exception), kind)
                 self.assertIn(part, str(caught.exception))
                 self.assertEqual(str(caught.exception).count("\n"), 0)
+                self.assertNotIn("--", str(caught.exception))
 
     def test_files_are_named(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -142,10 +143,13 @@ class Errors(unittest.TestCase):
         self.assertIn("open boundary", dibs.SIDE_REASONS[answer["side_reason"]])
         with self.assertWarnsRegex(dibs.MeshWarning, "degenerate triangle dropped"):
             dibs.build(TRIANGLE, [[0, 1, 2], [0, 1, 1]])
+        with self.assertWarnsRegex(dibs.MeshWarning, "as in unit='m'"):
+            dibs.build(np.array(TRIANGLE) / 1e4, [[0, 1, 2]])
 
     def test_a_mesh_turns_outwards(self):
         inward = dibs.Mesh(VERTICES, TRIANGLES[:, ::-1])
-        self.assertTrue(inward.warnings)
+        self.assertRegex("".join(inward.warnings), "orient=True")
+        self.assertNotIn("--", "".join(inward.warnings))
         outward = dibs.Mesh(VERTICES, TRIANGLES[:, ::-1], orient=True)
         self.assertEqual(outward.warnings, [])
         answers = dibs.build(outward).query(spheres(50))

@@ -65,14 +65,16 @@ class Nodes(unittest.TestCase):
         matrix = np.array([[1.05, 0.0, 0.1], [0.0, 0.98, 0.0], [0.0, 0.05, 1.0]])
         moved = self.nodes @ matrix.T
         loop = Loop(tree, moved)
-        answer = loop.run(200)
+        answer = loop.run(1_200)
         self.assertEqual((answer.state, answer.reason), (dibs.State.NOMINAL, None))
         truth = tree.query(SPHERE, surface=moved)
         low, high = answer.closest["interval"]
         self.assertTrue(low <= truth["separation"] <= high)
-        # An inverted frame is refused, and the last good one stays.
         for wrong, why in [(moved * [1, 1, -1], "inverted"), (moved * 1.5, "stretched by")]:
             with self.assertRaisesRegex(ValueError, why):
+                Loop(tree, wrong).send()
+            # After a good frame they come too fast, and the good one stays.
+            with self.assertRaisesRegex(ValueError, "moved by"):
                 loop.send(wrong)
             after = loop.tick()
             self.assertAlmostEqual(float(after.closest["separation"]), float(answer.closest["separation"]), places=2)

@@ -155,7 +155,7 @@ fn limits_that_cannot_be_used_are_named() {
     write("none.limits", "v 1 2 3");
     for (line, expected) in [
         ("build other.ply -o t.dibs --limits heart.limits", "is of mesh"),
-        ("build heart.ply -o t.dibs --limits short.limits", "limits for 1000 triangles"),
+        ("build heart.ply -o t.dibs --limits short.limits", "has 496 limits, 1000 are needed"),
         ("build heart.ply -o t.dibs --limits low.limits", "'0.5' is not a limit"),
         ("build heart.ply -o t.dibs --limits none.limits", "no file of stretch limits"),
         ("build heart.ply -o t.dibs --limits missing.limits", "cannot be read"),

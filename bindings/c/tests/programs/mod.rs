@@ -1,8 +1,8 @@
 //! Builds and runs programs in C and C++.
-#![allow(dead_code, reason = "no test uses all of it")]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use std::{env, fs};
 
@@ -39,6 +39,9 @@ pub fn run(command: &mut Command) -> String {
 
 /// A command by name, installed where it is missing.
 pub fn tool(name: &str, package: &str) -> Command {
+    // Two installations would refuse each other.
+    static ONE: Mutex<()> = Mutex::new(());
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     let version = quiet(Command::new(name).arg("--version"), Duration::from_secs(20));
     if version.is_err() {
         apt::install(&[package]).unwrap_or_else(|error| panic!("no {name}: {error:#}"));

@@ -1,0 +1,13 @@
+//! The C interface: programs in C and C++ that link the library, against the answers of Rust.
+//!
+//! One program for all, because each would compile the queries of Rust anew.
+
+mod filter;
+mod guard;
+mod header;
+mod layers;
+mod misuse;
+mod nodes;
+mod programs;
+mod script;
+mod wrapper;
