@@ -9,7 +9,8 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 
 /// Advice that the library words for the command line, and its words here.
-const ADVICE: [(&str, &str); 12] = [
+const ADVICE: [(&str, &str); 13] = [
+    ("`dibs build --orient` turns them", "orient=True turns them"),
     ("with --orient", "with orient=True"),
     ("--orient, unless", "orient=True, unless"),
     ("without --strict", "with strict=False"),
