@@ -76,7 +76,7 @@ impl Mesh {
         let crossing = crossing_parts(&self.import.mesh);
         let crossing = crossing.iter().map(ToString::to_string);
         let warnings = self.import.report.warnings().chain(winding).chain(crossing);
-        warnings.map(crate::error::sentence).collect()
+        warnings.map(error::sentence).collect()
     }
 
     fn build(
