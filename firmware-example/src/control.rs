@@ -180,6 +180,8 @@ fn write(closest: &Proximity, record: &mut Tick) {
     record.lower = closest.lower;
     record.accuracy = closest.accuracy;
     record.point_on_surface = closest.point_on_surface.to_array();
+    record.axis_parameter = closest.axis_parameter;
+    record.direction = closest.direction.to_array();
     record.triangle = closest.triangle.map_or(u32::MAX, |triangle| triangle.0);
     record.node_tests = closest.node_tests;
     record.triangle_tests = closest.triangle_tests;

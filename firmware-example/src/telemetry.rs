@@ -57,6 +57,10 @@ pub struct Tick {
     pub accuracy: f32,
     /// The surface's point of the closest pair, in mm.
     pub point_on_surface: [f32; 3],
+    /// The pair's parameter along the instrument's axis: 0 at its start, 1 at its end.
+    pub axis_parameter: f32,
+    /// The direction that leads out: `dibs_nostd::Proximity::direction`.
+    pub direction: [f32; 3],
     /// Its triangle's row in the tree; `u32::MAX` where there is none.
     pub triangle: u32,
     /// Tests of spheres and planes.

@@ -47,6 +47,8 @@ static void write_searched(const dibs_searched *searched, tick_record *record) {
         record->lower = found->lower;
         record->accuracy = found->accuracy;
         record->point_on_surface = found->point_on_surface;
+        record->axis_parameter = found->axis_parameter;
+        record->direction = found->direction;
         record->triangle = found->triangle;
         record->node_tests = found->node_tests;
         record->triangle_tests = found->triangle_tests;

@@ -29,6 +29,8 @@ typedef struct {
     float lower;
     float accuracy;
     dibs_vec3 point_on_surface;
+    float axis_parameter;
+    dibs_vec3 direction;
     uint32_t triangle;
     uint32_t node_tests;
     uint32_t triangle_tests;

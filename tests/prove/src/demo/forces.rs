@@ -17,6 +17,8 @@ pub struct Forces {
     /// Ticks whose force was compared with that of the wall, and those of them that were within its margin.
     forces_compared: usize,
     forces_pushing: usize,
+    /// Those whose search a budget ended, along the last tick's direction.
+    forces_kept: usize,
     /// Ticks with another force.
     forces_wrong: usize,
     /// The first of them.
@@ -34,6 +36,7 @@ impl Forces {
             touches,
             forces_compared: pushed.checked,
             forces_pushing: pushed.pushing,
+            forces_kept: pushed.kept,
             forces_wrong: pushed.wrong,
             first_wrong_force: pushed.first,
         })
@@ -65,8 +68,8 @@ impl Forces {
         rows.push((
             "forces compared",
             format!(
-                "{}, {} of them within the margin, {} differ",
-                self.forces_compared, self.forces_pushing, self.forces_wrong
+                "{}, {} of them within the margin, {} along the last tick's direction, {} differ",
+                self.forces_compared, self.forces_pushing, self.forces_kept, self.forces_wrong
             ),
         ));
         rows

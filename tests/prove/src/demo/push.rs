@@ -5,11 +5,13 @@ use controller::{DAMPING, MARGIN, MAX_FORCE, STIFFNESS, TICK_RATE};
 use dibs_nostd::failsafe::State;
 use glam::{DVec3, Vec3};
 
+use super::check::accuracy_of;
+
 /// Least distance (mm) of the axis from the surface: below, the direction between them is not exact enough, and a
 /// crossing axis has another.
 const CLEAR: f64 = 0.5;
 
-/// How far a force may be off, in N.
+/// How far a force may be off, in N: along its direction, and across it the largest one.
 const TOLERANCE: f64 = 0.01;
 
 /// The forces of a run.
@@ -19,7 +21,9 @@ pub struct Pushed {
     pub checked: usize,
     /// Of these, the ones within the wall's margin.
     pub pushing: usize,
-    /// Ticks with another force than the wall's, and the first of them.
+    /// And the ones whose search a budget ended, which push along the last tick's direction.
+    pub kept: usize,
+    /// Ticks with another force than the wall's, or along another direction than the pair's; and the first of them.
     pub wrong: usize,
     pub first: u32,
 }
@@ -30,12 +34,17 @@ impl Pushed {
         let mut pushed = Self::default();
         for pair in ticks.windows(2) {
             let [before, tick] = pair else { continue };
-            let Some(expected) = expected(before, tick) else { continue };
+            let Some(expected) = Expected::of(before, tick) else { continue };
             pushed.checked += 1;
-            pushed.pushing += usize::from(expected != DVec3::ZERO);
-            let off = (Vec3::from(tick.force).as_dvec3() - expected).length();
+            pushed.pushing += usize::from(expected.force != DVec3::ZERO);
+            let off = (Vec3::from(tick.force).as_dvec3() - expected.force).length();
+            let is_pair = expected.turned * f64::from(MAX_FORCE) <= TOLERANCE
+                && expected.farther <= accuracy_of(tick);
+            let is_kept = !is_pair && is_cut(tick) && tick.direction == before.direction;
+            pushed.kept += usize::from(is_kept);
             // A NaN is wrong, too.
-            if off.is_nan() || off > TOLERANCE {
+            let is_right = off <= TOLERANCE && (is_pair || is_kept);
+            if !is_right {
                 if pushed.wrong == 0 {
                     pushed.first = tick.tick;
                 }
@@ -46,31 +55,53 @@ impl Pushed {
     }
 }
 
-/// The force of a spring and a damper between the surface and the point of the axis that is nearest to it; `None` where
-/// the record does not tell.
-fn expected(before: &Tick, tick: &Tick) -> Option<DVec3> {
-    if !tick.is_answered() || tick.state == State::Safe as u32 || before.tick + 1 != tick.tick {
-        return None;
+/// Whether a budget ended the search: the interval is wider than its rounding.
+fn is_cut(tick: &Tick) -> bool {
+    f64::from(tick.separation) - f64::from(tick.lower) > 2.0 * accuracy_of(tick)
+}
+
+/// What a tick's record lets one expect.
+struct Expected {
+    /// The force of a spring and a damper along the recorded direction, in N.
+    force: DVec3,
+    /// How far (radians) the recorded direction is from that between the recorded points.
+    turned: f64,
+    /// How much farther (mm) the recorded point of the axis is than the axis' nearest. Where the axis runs along the
+    /// surface, many are nearest within rounding, and each has its own direction.
+    farther: f64,
+}
+
+impl Expected {
+    /// `None` where the record does not tell.
+    fn of(before: &Tick, tick: &Tick) -> Option<Self> {
+        if !tick.is_answered() || tick.state == State::Safe as u32 || before.tick + 1 != tick.tick {
+            return None;
+        }
+        let ends =
+            |tick: &Tick| [tick.tool_start, tick.tool_end].map(|end| Vec3::from(end).as_dvec3());
+        let ([start, end], [was_start, was_end]) = (ends(tick), ends(before));
+        let surface = Vec3::from(tick.point_on_surface).as_dvec3();
+        let axis = end - start;
+        let nearest = ((surface - start).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
+        let distance = (start + axis * nearest - surface).length();
+        let is_outside = f64::from(tick.separation) > CLEAR - f64::from(tick.tool_radius);
+        if !is_outside || distance < CLEAR {
+            return None;
+        }
+        let along = f64::from(tick.axis_parameter);
+        let away = start + axis * along - surface;
+        let direction = Vec3::from(tick.direction).as_dvec3();
+        let moved = (start - was_start).lerp(end - was_end, along);
+        let flow = Vec3::from(tick.surface_velocity).as_dvec3();
+        let speed = (moved * f64::from(TICK_RATE) - flow).dot(direction);
+        let separation = f64::from(tick.lower) - f64::from(tick.accuracy) - f64::from(tick.margin);
+        let depth = f64::from(MARGIN) - separation;
+        let force = f64::from(STIFFNESS) * depth - f64::from(DAMPING) * speed;
+        let size = if depth > 0.0 { force.clamp(0.0, f64::from(MAX_FORCE)) } else { 0.0 };
+        Some(Self {
+            force: direction * size,
+            turned: (direction - away.normalize()).length(),
+            farther: away.length() - distance,
+        })
     }
-    let ends = |tick: &Tick| [tick.tool_start, tick.tool_end].map(|end| Vec3::from(end).as_dvec3());
-    let ([start, end], [was_start, was_end]) = (ends(tick), ends(before));
-    let surface = Vec3::from(tick.point_on_surface).as_dvec3();
-    let axis = end - start;
-    let along = ((surface - start).dot(axis) / axis.length_squared()).clamp(0.0, 1.0);
-    let away = start + axis * along - surface;
-    let is_outside = f64::from(tick.separation) > CLEAR - f64::from(tick.tool_radius);
-    if !is_outside || away.length() < CLEAR {
-        return None;
-    }
-    let direction = away.normalize();
-    let moved = (start - was_start).lerp(end - was_end, along);
-    let flow = Vec3::from(tick.surface_velocity).as_dvec3();
-    let speed = (moved * f64::from(TICK_RATE) - flow).dot(direction);
-    let separation = f64::from(tick.lower) - f64::from(tick.accuracy) - f64::from(tick.margin);
-    let depth = f64::from(MARGIN) - separation;
-    if depth <= 0.0 {
-        return Some(DVec3::ZERO);
-    }
-    let force = f64::from(STIFFNESS) * depth - f64::from(DAMPING) * speed;
-    Some(direction * force.clamp(0.0, f64::from(MAX_FORCE)))
 }
