@@ -171,6 +171,17 @@ impl FrameCheck {
     /// # Errors
     /// [`FrameError`] for another number of vertices, for another size, and for a closed surface turned inside out.
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, FrameError> {
+        let mut rows = Vec::new();
+        self.to_rows_in(positions, &mut rows)?;
+        Ok(rows)
+    }
+
+    /// The same in memory that is used again: what it held is gone.
+    ///
+    /// # Errors
+    /// As [`to_rows`](Self::to_rows).
+    pub fn to_rows_in(&self, positions: &[Vec3], rows: &mut Vec<Vec3>) -> Result<(), FrameError> {
+        rows.clear();
         if positions.len() != self.vertices {
             let (expected, found) = (self.vertices, positions.len());
             return Err(if self.is_of_nodes {
@@ -190,8 +201,12 @@ impl FrameCheck {
                 return Err(FrameError::InsideOut { part });
             }
         }
-        let missing = FrameError::Vertices { expected: self.vertices, found: positions.len() };
-        self.order.iter().map(|&vertex| at(vertex)).collect::<Option<_>>().ok_or(missing)
+        rows.extend(self.order.iter().filter_map(|&vertex| at(vertex)));
+        if rows.len() != self.order.len() {
+            let (expected, found) = (self.vertices, positions.len());
+            return Err(FrameError::Vertices { expected, found });
+        }
+        Ok(())
     }
 
     /// Checks that each triangle of the tree is one of these faces, or a part of one. A file without faces passes, and so do

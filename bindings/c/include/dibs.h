@@ -148,6 +148,17 @@
 #define DIBS_SURFACES 8
 
 /**
+ * Bytes of a sender's storage.
+ */
+#define DIBS_SENDER_SIZE 1024
+
+/**
+ * The age of a frame whose time of capture is not known: it counts as captured when it is sent, unless it equals the
+ * last one in every bit.
+ */
+#define DIBS_AGE_UNKNOWN UINT32_MAX
+
+/**
  * Bytes of a surface's storage besides its vertices.
  */
 #define DIBS_SURFACE_BASE 448
@@ -517,6 +528,26 @@ enum dibs_code
    * A stand-off, speed, lever, approach, period or uncertainty of a filter is out of range.
    */
   DIBS_CODE_FILTER = 507,
+  /**
+   * A sender's target is none, or cannot be opened.
+   */
+  DIBS_CODE_SENDER_TARGET = 600,
+  /**
+   * The positions are no frame of the sender's surface, or cannot be sent.
+   */
+  DIBS_CODE_SENDER_FRAME = 601,
+  /**
+   * The sender's connection broke.
+   */
+  DIBS_CODE_SENDER_LINE = 602,
+  /**
+   * Another sender has taken over the receiver.
+   */
+  DIBS_CODE_SENDER_SUPERSEDED = 603,
+  /**
+   * The receiver has another surface than the sender.
+   */
+  DIBS_CODE_SENDER_OTHER_SURFACE = 604,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -930,6 +961,14 @@ typedef struct dibs_receiver dibs_receiver;
  * One context at a time.
  */
 typedef struct dibs_scrub dibs_scrub;
+
+/**
+ * Sends the frames of a moving surface to a controller, and takes the statuses that come back.
+ *
+ * In the library for a computer alone. Its calls wait for the line, and are no work for a control loop. A thread reads the
+ * line. `dibs_sender_close` ends both: a sender has more than its storage.
+ */
+typedef struct dibs_sender dibs_sender;
 
 /**
  * Two buffers of vertices: one end fills one, the other end holds the other, and neither waits. A third keeps the frame
@@ -1788,6 +1827,88 @@ typedef struct {
    */
   dibs_proximity proximity;
 } dibs_closest;
+
+/**
+ * How a surface is sent. `dibs_sender_settings_of` makes one.
+ */
+typedef struct {
+  /**
+   * Other than 0 for 6 bytes a vertex instead of 12, in a box that is fitted to each frame.
+   */
+  uint32_t quantised;
+  /**
+   * Sends only the vertices that moved by more than this (mm); below 0 every frame whole.
+   */
+  float partial;
+  /**
+   * With partial frames, the most frames from one whole frame to the next.
+   */
+  uint32_t whole_every;
+  /**
+   * Time between two heartbeats, in ms; 0 sends none.
+   */
+  uint32_t heartbeat;
+  /**
+   * Number of this run, later than that of every previous run. By default the time in tenths of a second.
+   */
+  uint32_t session;
+} dibs_sender_settings;
+
+/**
+ * A frame that was sent.
+ */
+typedef struct {
+  /**
+   * Its number.
+   */
+  uint32_t epoch;
+  /**
+   * 0 for a whole frame.
+   */
+  uint32_t is_partial;
+  /**
+   * Rows in it.
+   */
+  uint32_t rows;
+  /**
+   * Packets that it took.
+   */
+  uint32_t packets;
+  /**
+   * Bytes of the packets, without a serial line's framing.
+   */
+  uint32_t bytes;
+  /**
+   * Largest distance (mm) of a vertex from its position at the receiver.
+   */
+  float error;
+} dibs_sent;
+
+/**
+ * Facts about a sender.
+ */
+typedef struct {
+  /**
+   * Frames sent since the start.
+   */
+  uint32_t frames;
+  /**
+   * Statuses that came back.
+   */
+  uint32_t statuses;
+  /**
+   * Frames that the receiver has not acknowledged.
+   */
+  uint32_t in_flight;
+  /**
+   * 0 until the receiver has published a frame of this sender; then `acknowledged` is 0, too.
+   */
+  uint32_t is_acknowledged;
+  /**
+   * The last of them.
+   */
+  uint32_t acknowledged;
+} dibs_sender_facts;
 
 /**
  * Facts about a tree.
@@ -2674,6 +2795,85 @@ dibs_code dibs_scene_contacts(const dibs_scene *scene,
                               const dibs_options *options,
                               dibs_contacts *contacts,
                               dibs_closest *closest);
+
+/**
+ * The settings by default: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
+ */
+dibs_sender_settings dibs_sender_settings_of(void);
+
+/**
+ * Connects to a controller, and makes the sender of a surface.
+ *
+ * @param storage   `DIBS_SENDER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size      Bytes of the storage.
+ * @param tree      The surface's tree: the controller's, or one built from the same mesh in the same way. Not used after
+ *                  the call.
+ * @param target    `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`, ended by a zero.
+ * @param settings  How to send; or null for `dibs_sender_settings_of`.
+ * @param sender    Receives the sender's address.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_TARGET` for a target that is none, or that cannot be opened; or a misuse.
+ */
+dibs_code dibs_sender_init(void *storage,
+                           size_t size,
+                           dibs_tree *tree,
+                           const char *target,
+                           const dibs_sender_settings *settings,
+                           dibs_sender **sender);
+
+/**
+ * Sends a frame, with heartbeats in between when due. From the second whole frame on nothing is allocated.
+ *
+ * @param sender     The sender.
+ * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order; or of
+ *                   each node that carries the surface.
+ * @param count      Their number.
+ * @param age        Time (ms) since the surface was so; or `DIBS_AGE_UNKNOWN`.
+ * @param sent       Receives what was sent; or null.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are no frame of the surface: nothing was sent;
+ *         `DIBS_CODE_SENDER_LINE` where the connection broke: close the sender, and make another;
+ *         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the whole
+ *         sentence.
+ */
+dibs_code dibs_sender_send(dibs_sender *sender,
+                           const float *positions,
+                           uint32_t count,
+                           uint32_t age,
+                           dibs_sent *sent);
+
+/**
+ * Sends a heartbeat if one is due, and takes the statuses that have come. Does not wait. Call it a few times between two
+ * heartbeats: without it the controller takes the link for lost, and no transit time is measured.
+ *
+ * @return As `dibs_sender_send`.
+ */
+dibs_code dibs_sender_poll(dibs_sender *sender);
+
+/**
+ * The last error of a sender, as a sentence.
+ *
+ * @param sender    The sender.
+ * @param text      Receives the sentence, ended by a zero; empty before the first error.
+ * @param capacity  Bytes that there is room for.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
+ */
+dibs_code dibs_sender_error(dibs_sender *sender, uint8_t *text, size_t capacity);
+
+/**
+ * Reads the facts about a sender.
+ *
+ * @param sender    The sender.
+ * @param facts     Receives the facts.
+ * @param counters  Room for `DIBS_EVENTS` numbers: the receiver's count of each event, in the order of
+ *                  `dibs_event_name`, as its statuses report it; or null.
+ */
+dibs_code dibs_sender_get_facts(dibs_sender *sender, dibs_sender_facts *facts, uint32_t *counters);
+
+/**
+ * Ends the connection. The storage has no sender from then on.
+ *
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_sender_close(dibs_sender *sender);
 
 /**
  * Makes a surface without a frame.

@@ -132,6 +132,19 @@ struct Guard : Object<dibs_guard, DIBS_GUARD_SIZE, dibs_guard_init> {
     }
     Code acknowledge() { return dibs_guard_acknowledge(*this); }
 };
+/** Sends a surface's frames to a controller, until it goes out of scope. In the library for a computer alone. */
+struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
+    ~Sender() { dibs_sender_close(*this); }
+    /** `target` is text that a zero ends, as for `dibs_sender_init`. */
+    Code init(dibs_tree *tree, const char *target, const dibs_sender_settings *settings = nullptr) {
+        return Object::init(tree, target, settings);
+    }
+    /** x, y and z of each vertex, in the mesh's order, so many milliseconds ago. */
+    Code send(std::span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent *sent = nullptr) {
+        return dibs_sender_send(*this, positions.data(), uint32_t(positions.size() / 3), age, sent);
+    }
+    Code poll() { return dibs_sender_poll(*this); }
+};
 /** Frames of positions that the caller has. */
 struct Writer : Object<dibs_writer, DIBS_WRITER_SIZE, dibs_writer_init> {
     Code begin() { return dibs_writer_begin(*this); }

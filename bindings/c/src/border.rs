@@ -6,6 +6,8 @@
 
 use core::cell::UnsafeCell;
 use core::ffi::c_void;
+#[cfg(not(target_os = "none"))]
+use core::ffi::{CStr, c_char};
 use core::ops::{Deref, DerefMut};
 use core::slice;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -262,6 +264,9 @@ pub trait Handle<T: Kind> {
     /// The object, this call's alone.
     fn open(self) -> Result<Open<T>, dibs_code>;
 
+    /// The object, out of its storage, which has none from then on.
+    fn take(self) -> Result<T, dibs_code>;
+
     /// The object, shared with other contexts. Only for kinds that are never opened.
     fn share(self) -> Result<&'static T, dibs_code>
     where
@@ -279,6 +284,16 @@ impl<T: Kind> Handle<T> for *mut T {
             Err(found) if found == in_use => Err(dibs_code::InUse),
             Err(_) => Err(dibs_code::NotInitialised),
         }
+    }
+
+    fn take(self) -> Result<T, dibs_code> {
+        let object = self.open()?;
+        // SAFETY: its mark keeps everybody else out, now and, because it is replaced, from now on.
+        let body = unsafe { (*object.0).body.get().read() };
+        // SAFETY: the storage is still there.
+        unsafe { &*object.0 }.mark.store(0, Ordering::Release);
+        core::mem::forget(object);
+        Ok(body)
     }
 
     fn share(self) -> Result<&'static T, dibs_code>
@@ -361,4 +376,13 @@ fn check<T>(pointer: *const T) -> Result<(), dibs_code> {
     } else {
         Ok(())
     }
+}
+
+/// A text that a zero ends.
+#[cfg(not(target_os = "none"))]
+pub fn text(pointer: *const c_char) -> Result<&'static str, dibs_code> {
+    check(pointer)?;
+    // SAFETY: not null, so the caller promises a zero at the end.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    text.to_str().map_err(|_| dibs_code::Argument)
 }

@@ -162,6 +162,16 @@ pub enum dibs_code {
     LimitUntrippable = 506,
     /// A stand-off, speed, lever, approach, period or uncertainty of a filter is out of range.
     Filter = 507,
+    /// A sender's target is none, or cannot be opened.
+    SenderTarget = 600,
+    /// The positions are no frame of the sender's surface, or cannot be sent.
+    SenderFrame = 601,
+    /// The sender's connection broke.
+    SenderLine = 602,
+    /// Another sender has taken over the receiver.
+    SenderSuperseded = 603,
+    /// The receiver has another surface than the sender.
+    SenderOtherSurface = 604,
 }
 
 impl dibs_code {
@@ -258,6 +268,11 @@ impl dibs_code {
         Self::Acknowledge,
         Self::LimitUntrippable,
         Self::Filter,
+        Self::SenderTarget,
+        Self::SenderFrame,
+        Self::SenderLine,
+        Self::SenderSuperseded,
+        Self::SenderOtherSurface,
     ];
 
     /// The code of a number from C.
@@ -345,6 +360,11 @@ impl dibs_code {
             Self::Acknowledge => c"the acknowledgement came too early",
             Self::LimitUntrippable => c"a limit can never be exceeded",
             Self::Filter => c"a number of the filter is out of range",
+            Self::SenderTarget => c"the sender's target is none, or cannot be opened",
+            Self::SenderFrame => c"the positions are no frame of the sender's surface",
+            Self::SenderLine => c"the sender's connection broke",
+            Self::SenderSuperseded => c"another sender has taken over the receiver",
+            Self::SenderOtherSurface => c"the receiver has another surface than the sender",
         }
     }
 }

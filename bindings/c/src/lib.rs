@@ -11,7 +11,7 @@
 // Parameters are named in Doxygen's way.
 #![allow(clippy::doc_markdown)]
 
-// Brings the host's panic handler.
+// Brings the host's panic handler, and the sender's memory.
 #[cfg(not(target_os = "none"))]
 extern crate std;
 
@@ -32,6 +32,8 @@ mod query;
 mod reader;
 mod receiver;
 mod scene;
+#[cfg(not(target_os = "none"))]
+mod sender;
 mod surface;
 mod tool;
 mod tracker;

@@ -10,4 +10,5 @@ mod misuse;
 mod nodes;
 mod programs;
 mod script;
+mod sender;
 mod wrapper;

@@ -24,22 +24,10 @@ pub struct Sent {
 #[derive(Debug)]
 pub struct Prepared {
     pub(super) sent: Sent,
-    pub(super) packets: Vec<Vec<u8>>,
+    pub(super) packets: Packets,
 }
 
 impl Prepared {
-    pub(super) fn new(
-        epoch: u32,
-        content: Content,
-        rows: usize,
-        error: f32,
-        packets: Vec<Vec<u8>>,
-    ) -> Self {
-        let bytes = packets.iter().map(Vec::len).sum();
-        let sent = Sent { epoch, content, rows, packets: packets.len(), bytes, error };
-        Self { sent, packets }
-    }
-
     /// The counts once it is sent.
     #[must_use]
     pub const fn sent(&self) -> &Sent {
@@ -47,16 +35,44 @@ impl Prepared {
     }
 }
 
-/// All packets of a frame.
-pub(super) fn packets_of<M: Mac, const MTU: usize>(
-    mut frame: FrameEncoder<'_, [Vec3], MTU, M>,
-) -> Vec<Vec<u8>> {
-    let mut buffer = [0; MTU];
-    let mut packets = Vec::new();
-    while let Some(packet) = frame.next_packet(&mut buffer) {
-        packets.push(packet.to_vec());
+/// Packets one after the other, in memory that is used again.
+#[derive(Debug, Default)]
+pub(super) struct Packets {
+    bytes: Vec<u8>,
+    /// Where each ends.
+    ends: Vec<usize>,
+}
+
+impl Packets {
+    pub fn clear(&mut self) {
+        self.bytes.clear();
+        self.ends.clear();
     }
-    packets
+
+    pub fn push(&mut self, packet: &[u8]) {
+        self.bytes.extend_from_slice(packet);
+        self.ends.push(self.bytes.len());
+    }
+
+    /// The packets of this frame, instead of those before.
+    pub fn fill<M: Mac, const MTU: usize>(&mut self, mut frame: FrameEncoder<'_, [Vec3], MTU, M>) {
+        self.clear();
+        let mut buffer = [0; MTU];
+        while let Some(packet) = frame.next_packet(&mut buffer) {
+            self.push(packet);
+        }
+    }
+
+    /// What a frame of these packets is once it is sent.
+    pub fn sent(&self, epoch: u32, content: Content, rows: usize, error: f32) -> Sent {
+        let (packets, bytes) = (self.ends.len(), self.bytes.len());
+        Sent { epoch, content, rows, packets, bytes, error }
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &[u8]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        starts.zip(&self.ends).map(|(&start, &end)| &self.bytes[start..end])
+    }
 }
 
 /// Applies the packets to the positions as the receiver will; returns their number.

@@ -29,7 +29,7 @@ use dibs_nostd::wire::{
 
 use crate::transport::Transport;
 use clock::Clock;
-use frame::{apply, coarsened, packets_of};
+use frame::{Packets, apply, coarsened};
 use greeting::Greeting;
 use objection::Objection;
 
@@ -77,6 +77,8 @@ pub struct Sender<T, const MTU: usize, M = NoMac> {
     capture: Option<(Vec<f32>, Duration)>,
     /// The last frame of positions, as the receiver has it if it arrived.
     held: Option<(u32, Vec<Vec3>)>,
+    /// Memory of the next frame: its rows and its packets.
+    memory: (Vec<Vec3>, Packets),
     since_whole: u32,
     whole_wanted: bool,
     /// The last whole frame: until it is acknowledged, requests for a whole frame may be from before it.
@@ -134,6 +136,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             last_beat: None,
             capture: None,
             held: None,
+            memory: Default::default(),
             since_whole: 0,
             whole_wanted: true,
             whole: None,
@@ -214,38 +217,60 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     ) -> Result<Prepared, SendError> {
         self.check()?;
         let freshness = self.freshness(ago);
-        let rows = self.surface.to_rows(positions)?;
-        let encoding = self.encoding(&rows)?;
-        let is_partial = self.is_partial_wanted();
-        let base = self.held.take().filter(|_| is_partial);
+        let (mut memory, mut held) = (std::mem::take(&mut self.memory), self.held.take());
+        match self.make_packets(positions, freshness, &mut memory, &mut held) {
+            Ok((sent, held)) => {
+                let (rows, packets) = memory;
+                (self.memory.0, self.held) = (rows, Some((sent.epoch, held)));
+                if sent.content == Content::Whole {
+                    self.since_whole = 0;
+                } else {
+                    self.since_whole += 1;
+                }
+                // A receiver refuses a frame of an age that cannot be stated: none can build on it.
+                self.whole_wanted = freshness.age_ms == u16::MAX;
+                Ok(Prepared { sent, packets })
+            }
+            // The receiver's frame is the same as before.
+            Err(error) => {
+                (self.memory, self.held) = (memory, held);
+                Err(error)
+            }
+        }
+    }
+
+    /// Makes a frame's packets in this memory. Returns it, and `held` as it is once it has arrived.
+    fn make_packets(
+        &mut self,
+        positions: &[Vec3],
+        freshness: Freshness,
+        (rows, packets): &mut (Vec<Vec3>, Packets),
+        held: &mut Option<(u32, Vec<Vec3>)>,
+    ) -> Result<(Sent, Vec<Vec3>), SendError> {
+        self.surface.to_rows_in(positions, rows)?;
+        let encoding = self.encoding(rows)?;
         let id = self.next_id();
-        let frame = match &base {
+        let base = held.as_ref().filter(|_| self.is_partial_wanted());
+        let frame = match base {
             Some((epoch, held)) => {
                 FrameEncoder::partial(id, encoding, &rows[..], *epoch, &held[..])
             }
             None => FrameEncoder::new(id, encoding, &rows[..]),
         };
+        let content = match base {
+            Some(&(base_epoch, _)) => Content::Partial { base_epoch },
+            None => Content::Whole,
+        };
         let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
         let facts = self.surface.facts;
         let frame = frame
             .and_then(|frame| frame.with_freshness(freshness).with_surface(facts).with_mac(mac));
-        let packets = packets_of::<_, MTU>(frame.map_err(SendError::Frame)?);
+        packets.fill::<_, MTU>(frame.map_err(SendError::Frame)?);
 
-        let content = match base {
-            Some((base_epoch, _)) => Content::Partial { base_epoch },
-            None => Content::Whole,
-        };
-        let mut held = base.map_or_else(|| vec![Vec3::ZERO; rows.len()], |(_, held)| held);
-        let rows_sent = packets.iter().map(|packet| apply(packet, encoding, &mut held)).sum();
-        self.held = Some((id.epoch, held));
-        if content == Content::Whole {
-            self.since_whole = 0;
-        } else {
-            self.since_whole += 1;
-        }
-        // A receiver refuses a frame of an age that cannot be stated: none can build on it.
-        self.whole_wanted = freshness.age_ms == u16::MAX;
-        Ok(Prepared::new(id.epoch, content, rows_sent, encoding.error(), packets))
+        let mut held = held.take().map_or_else(Vec::new, |(_, held)| held);
+        held.resize(rows.len(), Vec3::ZERO);
+        let rows = packets.iter().map(|packet| apply(packet, encoding, &mut held)).sum();
+        Ok((packets.sent(id.epoch, content, rows, encoding.error()), held))
     }
 
     /// Makes the packets of a modal frame: the weights of the receiver's displacement modes.
@@ -273,11 +298,13 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         let frame = WeightsEncoder::<MTU>::new(id, weights).map_err(SendError::Frame)?;
         let frame = frame.with_freshness(freshness).with_surface(self.surface.facts);
         let mut frame = frame.with_mac(mac);
-        let (mut buffer, mut packets) = ([0; MTU], Vec::new());
+        let (mut buffer, mut packets) = ([0; MTU], std::mem::take(&mut self.memory.1));
+        packets.clear();
         while let Some(packet) = frame.next_packet(&mut buffer) {
-            packets.push(packet.to_vec());
+            packets.push(packet);
         }
-        Ok(Prepared::new(id.epoch, Content::Modal, weights.len(), 0.0, packets))
+        let sent = packets.sent(id.epoch, Content::Modal, weights.len(), 0.0);
+        Ok(Prepared { sent, packets })
     }
 
     /// Sends a prepared frame, with heartbeats in between when due.
@@ -298,11 +325,12 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         mut wait: impl FnMut(),
     ) -> Result<Sent, SendError> {
         let Prepared { sent, packets } = frame;
-        for packet in &packets {
+        for packet in packets.iter() {
             wait();
             self.heartbeat()?;
             self.put(packet)?;
         }
+        self.memory.1 = packets;
         if sent.content == Content::Whole {
             self.whole = Some((sent.epoch, self.clock.now()));
         }
@@ -384,13 +412,14 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// Time since these numbers last changed.
     fn since_change(&mut self, numbers: impl Iterator<Item = f32> + Clone) -> Duration {
         let now = self.clock.now();
-        match &self.capture {
-            Some((last, at)) if numbers.clone().eq(last.iter().copied()) => now.saturating_sub(*at),
-            _ => {
-                self.capture = Some((numbers.collect(), now));
-                Duration::ZERO
-            }
+        let (last, at) = self.capture.get_or_insert_default();
+        if numbers.clone().eq(last.iter().copied()) && !last.is_empty() {
+            return now.saturating_sub(*at);
         }
+        last.clear();
+        last.extend(numbers);
+        *at = now;
+        Duration::ZERO
     }
 
     fn freshness(&self, age: Duration) -> Freshness {
@@ -411,8 +440,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         let mut buffer = [0; 64];
         let Some(mac) = &self.mac else { return Ok(()) };
         let echo = self.status.map(|status| status.clock);
-        let beat = encode_heartbeat(&self.id(), self.beat, echo, mac, &mut buffer).to_vec();
-        self.put(&beat)
+        let beat = encode_heartbeat(&self.id(), self.beat, echo, mac, &mut buffer);
+        self.put(beat)
     }
 
     fn put(&mut self, packet: &[u8]) -> Result<(), SendError> {

@@ -72,16 +72,26 @@ impl SurfaceOrder {
     /// [`SendError::Vertices`] if a vertex of the tree has no position, and where the order is that of a tree
     /// [`SendError::Positions`] if they are no frame of its surface.
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
-        let row = |&vertex: &u32| {
-            positions
-                .get(vertex as usize)
-                .copied()
-                .ok_or(SendError::Vertices { vertex, found: positions.len() })
-        };
-        let rows: Result<Vec<Vec3>, SendError> = self.order.iter().map(row).collect();
-        match &self.check {
-            Some(check) if rows.is_ok() => Ok(check.to_rows(positions)?),
-            _ => rows,
+        let mut rows = Vec::new();
+        self.to_rows_in(positions, &mut rows)?;
+        Ok(rows)
+    }
+
+    /// The same in memory that is used again.
+    pub(super) fn to_rows_in(
+        &self,
+        positions: &[Vec3],
+        rows: &mut Vec<Vec3>,
+    ) -> Result<(), SendError> {
+        rows.clear();
+        let found = positions.len();
+        if let Some(&vertex) = self.order.iter().find(|&&vertex| vertex as usize >= found) {
+            return Err(SendError::Vertices { vertex, found });
         }
+        match &self.check {
+            Some(check) => check.to_rows_in(positions, rows)?,
+            None => rows.extend(self.order.iter().map(|&vertex| positions[vertex as usize])),
+        }
+        Ok(())
     }
 }

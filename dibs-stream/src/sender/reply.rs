@@ -61,8 +61,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         let mut buffer = [0; 64];
         // A hello's tag is the same under every challenge.
         let mac = (self.keyed_mac)(0);
-        let hello = encode_hello(&self.id(), nonce, &mac, &mut buffer).to_vec();
-        self.put(&hello)
+        let hello = encode_hello(&self.id(), nonce, &mac, &mut buffer);
+        self.put(hello)
     }
 
     fn ask(&mut self) {

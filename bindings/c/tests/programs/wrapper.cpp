@@ -16,7 +16,7 @@ namespace {
 /* The library keeps the addresses of objects. */
 template <class T> constexpr bool stays = !std::is_copy_constructible_v<T> && !std::is_move_constructible_v<T> &&
                                           !std::is_copy_assignable_v<T> && !std::is_move_assignable_v<T>;
-static_assert(stays<dibs::Tree> && stays<dibs::Frame> && stays<dibs::Surface<502>> && stays<dibs::Tracker<502>>);
+static_assert(stays<dibs::Sender> && stays<dibs::Tree> && stays<dibs::Frame> && stays<dibs::Surface<502>> && stays<dibs::Tracker<502>>);
 
 std::vector<std::uint8_t> read(const char *path) {
     std::ifstream file(path, std::ios::binary);
@@ -68,6 +68,14 @@ int main(int argc, char **argv) {
     MUST(reader.init(surface));
     EXPECT(DIBS_CODE_TAKEN, dibs::Reader().init(surface));
 
+    {
+        dibs::Sender sender;
+        EXPECT(DIBS_CODE_SENDER_TARGET, sender.init(tree, "udp:"));
+        MUST(sender.init(tree, "udp:127.0.0.1:9"));
+        std::array<float, 3> few{};
+        EXPECT(DIBS_CODE_SENDER_FRAME, sender.send(few));
+        MUST(sender.poll());
+    }
     for (std::size_t at = 0; at < packets.size(); at++) {
         MUST(dibs_receiver_byte(receiver, packets[at], 0, nullptr));
         MUST(receiver.advance(10'000));

@@ -1,0 +1,299 @@
+//! The imaging side, on a computer: a moving surface goes to a controller over a serial line or a socket.
+
+use core::ffi::{c_char, c_void};
+use std::string::{String, ToString};
+use std::time::Duration;
+use std::vec::Vec;
+
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::wire::{Content, Event};
+use dibs_stream::transport::{Line, Target};
+use dibs_stream::{SendError, Sender, Sent, Settings, SurfaceOrder};
+
+use crate::border::{Handle, Input, Kind, Output, Place, Storage, text};
+use crate::code::dibs_code;
+use crate::frame::rows;
+use crate::receiver::DIBS_EVENTS;
+use crate::tree::dibs_tree;
+
+/// Bytes of a sender's storage.
+pub const DIBS_SENDER_SIZE: usize = 1_024;
+
+/// The age of a frame whose time of capture is not known: it counts as captured when it is sent, unless it equals the
+/// last one in every bit.
+pub const DIBS_AGE_UNKNOWN: u32 = u32::MAX;
+
+/// Bytes of a packet, at most.
+const MTU: usize = 1_024;
+
+/// Sends the frames of a moving surface to a controller, and takes the statuses that come back.
+///
+/// In the library for a computer alone. Its calls wait for the line, and are no work for a control loop. A thread reads the
+/// line. `dibs_sender_close` ends both: a sender has more than its storage.
+pub struct dibs_sender {
+    sender: Sender<Line, MTU>,
+    /// Positions of the frame in work, used again.
+    positions: Vec<Vec3>,
+    /// The last error's sentence.
+    error: String,
+}
+
+impl Kind for dibs_sender {
+    const MARK: u32 = 0x6462_7318;
+    const SIZE: usize = DIBS_SENDER_SIZE;
+}
+
+/// How a surface is sent. `dibs_sender_settings_of` makes one.
+#[derive(Clone, Copy, bytemuck::AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_sender_settings {
+    /// Other than 0 for 6 bytes a vertex instead of 12, in a box that is fitted to each frame.
+    pub quantised: u32,
+    /// Sends only the vertices that moved by more than this (mm); below 0 every frame whole.
+    pub partial: f32,
+    /// With partial frames, the most frames from one whole frame to the next.
+    pub whole_every: u32,
+    /// Time between two heartbeats, in ms; 0 sends none.
+    pub heartbeat: u32,
+    /// Number of this run, later than that of every previous run. By default the time in tenths of a second.
+    pub session: u32,
+}
+
+impl TryFrom<dibs_sender_settings> for Settings {
+    type Error = dibs_code;
+
+    fn try_from(settings: dibs_sender_settings) -> Result<Self, dibs_code> {
+        if !settings.partial.is_finite() {
+            return Err(dibs_code::Argument);
+        }
+        let heartbeat = Duration::from_millis(settings.heartbeat.into());
+        Ok(Self {
+            quantised: settings.quantised != 0,
+            partial: (settings.partial >= 0.0).then_some(settings.partial),
+            whole_every: settings.whole_every,
+            heartbeat: (settings.heartbeat > 0).then_some(heartbeat),
+            session: settings.session,
+            ..Self::default()
+        })
+    }
+}
+
+/// A frame that was sent.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_sent {
+    /// Its number.
+    pub epoch: u32,
+    /// 0 for a whole frame.
+    pub is_partial: u32,
+    /// Rows in it.
+    pub rows: u32,
+    /// Packets that it took.
+    pub packets: u32,
+    /// Bytes of the packets, without a serial line's framing.
+    pub bytes: u32,
+    /// Largest distance (mm) of a vertex from its position at the receiver.
+    pub error: f32,
+}
+
+impl From<Sent> for dibs_sent {
+    fn from(sent: Sent) -> Self {
+        Self {
+            epoch: sent.epoch,
+            is_partial: u32::from(sent.content != Content::Whole),
+            rows: sent.rows as u32,
+            packets: sent.packets as u32,
+            bytes: sent.bytes as u32,
+            error: sent.error,
+        }
+    }
+}
+
+impl dibs_sender {
+    /// Keeps an error's sentence.
+    fn keep(&mut self, error: &SendError) -> dibs_code {
+        use core::fmt::Write;
+        self.error.clear();
+        // A string takes all that is written to it.
+        let _ = write!(self.error, "{error}");
+        match error {
+            SendError::Line(_) => dibs_code::SenderLine,
+            SendError::Superseded { .. } => dibs_code::SenderSuperseded,
+            SendError::OtherSurface { .. } => dibs_code::SenderOtherSurface,
+            _ => dibs_code::SenderFrame,
+        }
+    }
+}
+
+/// The settings by default: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_settings_of() -> dibs_sender_settings {
+    let usual = Settings::default();
+    dibs_sender_settings {
+        quantised: usual.quantised.into(),
+        partial: -1.0,
+        whole_every: usual.whole_every,
+        heartbeat: usual.heartbeat.map_or(0, |time| time.as_millis() as u32),
+        session: usual.session,
+    }
+}
+
+/// Connects to a controller, and makes the sender of a surface.
+///
+/// @param storage   `DIBS_SENDER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+/// @param size      Bytes of the storage.
+/// @param tree      The surface's tree: the controller's, or one built from the same mesh in the same way. Not used after
+///                  the call.
+/// @param target    `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`, ended by a zero.
+/// @param settings  How to send; or null for `dibs_sender_settings_of`.
+/// @param sender    Receives the sender's address.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_TARGET` for a target that is none, or that cannot be opened; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_init(
+    storage: *mut c_void,
+    size: usize,
+    tree: *mut dibs_tree,
+    target: *const c_char,
+    settings: *const dibs_sender_settings,
+    sender: *mut *mut dibs_sender,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, sender, || {
+            let (tree, target) = (tree.share()?, text(target)?);
+            let settings = match settings.get_if_any()? {
+                Some(settings) => settings.try_into()?,
+                None => Settings::default(),
+            };
+            let target: Target = target.parse().map_err(|_| dibs_code::SenderTarget)?;
+            let line = target.open().map_err(|_| dibs_code::SenderTarget)?;
+            let sender = Sender::new(line, SurfaceOrder::of(&tree.tree), settings);
+            Ok(dibs_sender { sender, positions: Vec::new(), error: String::new() })
+        })
+    })
+}
+
+/// Sends a frame, with heartbeats in between when due. From the second whole frame on nothing is allocated.
+///
+/// @param sender     The sender.
+/// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order; or of
+///                   each node that carries the surface.
+/// @param count      Their number.
+/// @param age        Time (ms) since the surface was so; or `DIBS_AGE_UNKNOWN`.
+/// @param sent       Receives what was sent; or null.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are no frame of the surface: nothing was sent;
+///         `DIBS_CODE_SENDER_LINE` where the connection broke: close the sender, and make another;
+///         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the whole
+///         sentence.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_send(
+    sender: *mut dibs_sender,
+    positions: *const f32,
+    count: u32,
+    age: u32,
+    sent: *mut dibs_sent,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (sent, mut sender, rows) =
+            (sent.check_if_any()?, sender.open()?, rows(positions, count)?);
+        let dibs_sender { sender: own, positions, .. } = &mut *sender;
+        positions.clear();
+        positions.extend(rows.iter().copied().map(Vec3::from_array));
+        let outcome = match age {
+            DIBS_AGE_UNKNOWN => own.send(positions),
+            age => own.send_captured(positions, Duration::from_millis(age.into())),
+        };
+        let outcome = outcome.map_err(|error| sender.keep(&error))?;
+        Place::set_if_any(sent, outcome.into());
+        Ok(())
+    })
+}
+
+/// Sends a heartbeat if one is due, and takes the statuses that have come. Does not wait. Call it a few times between two
+/// heartbeats: without it the controller takes the link for lost, and no transit time is measured.
+///
+/// @return As `dibs_sender_send`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_poll(sender: *mut dibs_sender) -> dibs_code {
+    dibs_code::of(|| {
+        let mut sender = sender.open()?;
+        let polled = sender.sender.poll();
+        polled.map_err(|error| sender.keep(&error))
+    })
+}
+
+/// The last error of a sender, as a sentence.
+///
+/// @param sender    The sender.
+/// @param text      Receives the sentence, ended by a zero; empty before the first error.
+/// @param capacity  Bytes that there is room for.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_error(
+    sender: *mut dibs_sender,
+    text: *mut u8,
+    capacity: usize,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (out, sender) = (text.places(capacity)?, sender.open()?);
+        let mut sentence = sender.error.to_string();
+        sentence.push('\0');
+        out.fill(sentence.as_bytes()).map(|_| ())
+    })
+}
+
+/// Facts about a sender.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct dibs_sender_facts {
+    /// Frames sent since the start.
+    pub frames: u32,
+    /// Statuses that came back.
+    pub statuses: u32,
+    /// Frames that the receiver has not acknowledged.
+    pub in_flight: u32,
+    /// 0 until the receiver has published a frame of this sender; then `acknowledged` is 0, too.
+    pub is_acknowledged: u32,
+    /// The last of them.
+    pub acknowledged: u32,
+}
+
+/// Reads the facts about a sender.
+///
+/// @param sender    The sender.
+/// @param facts     Receives the facts.
+/// @param counters  Room for `DIBS_EVENTS` numbers: the receiver's count of each event, in the order of
+///                  `dibs_event_name`, as its statuses report it; or null.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_get_facts(
+    sender: *mut dibs_sender,
+    facts: *mut dibs_sender_facts,
+    counters: *mut u32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (facts, sender) = (facts.check()?, sender.open()?);
+        if !counters.is_null() {
+            let all = sender.sender.counters();
+            counters.places(DIBS_EVENTS)?.fill(&Event::ALL.map(|event| all.of(event)))?;
+        }
+        let (totals, acknowledged) = (sender.sender.totals(), sender.sender.acknowledged());
+        facts.set(dibs_sender_facts {
+            frames: totals.frames as u32,
+            statuses: totals.statuses as u32,
+            in_flight: sender.sender.in_flight(),
+            is_acknowledged: acknowledged.is_some().into(),
+            acknowledged: acknowledged.unwrap_or(0),
+        });
+        Ok(())
+    })
+}
+
+/// Ends the connection. The storage has no sender from then on.
+///
+/// @return `DIBS_CODE_OK`, or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_close(sender: *mut dibs_sender) -> dibs_code {
+    dibs_code::of(|| {
+        drop(sender.take()?);
+        Ok(())
+    })
+}
