@@ -204,6 +204,11 @@
 #define DIBS_SCRUB_SIZE 128
 
 /**
+ * The header's version: a million times the major one, a thousand times the minor one, and the patch.
+ */
+#define DIBS_VERSION 1000
+
+/**
  * Bytes of a writer's storage.
  */
 #define DIBS_WRITER_SIZE 256
@@ -264,6 +269,10 @@ enum dibs_code
    * The caller's buffer is too small for the result.
    */
   DIBS_CODE_CAPACITY = 11,
+  /**
+   * The library is of another version than the header.
+   */
+  DIBS_CODE_VERSION = 12,
   /**
    * The tree has fewer bytes than its header states.
    */
@@ -3067,6 +3076,15 @@ dibs_code dibs_scrub_step(dibs_scrub *scrub,
  */
 dibs_code dibs_tree_origin(dibs_tree *tree,
                            dibs_point *origin);
+
+/**
+ * Checks that a program was compiled with this library's header: sizes of objects may differ between versions. A
+ * program that is linked with a shared library does so before it makes an object.
+ *
+ * @param version  `DIBS_VERSION`.
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_VERSION`.
+ */
+dibs_code dibs_check_version(uint32_t version);
 
 /**
  * Makes the writer of a surface, once.

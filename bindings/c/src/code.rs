@@ -30,6 +30,8 @@ pub enum dibs_code {
     Argument = 10,
     /// The caller's buffer is too small for the result.
     Capacity = 11,
+    /// The library is of another version than the header.
+    Version = 12,
     /// The tree has fewer bytes than its header states.
     TreeLength = 100,
     /// The bytes are no tree.
@@ -202,6 +204,7 @@ impl dibs_code {
         Self::OtherTree,
         Self::Argument,
         Self::Capacity,
+        Self::Version,
         Self::TreeLength,
         Self::TreeMagic,
         Self::TreeVersion,
@@ -294,6 +297,7 @@ impl dibs_code {
             Self::OtherTree => c"the objects are not of one tree",
             Self::Argument => c"an argument is not one of the values allowed",
             Self::Capacity => c"the buffer is too small for the result",
+            Self::Version => c"the library is of another version than the header",
             Self::TreeLength => c"the tree's bytes are cut short",
             Self::TreeMagic => c"the bytes are no tree",
             Self::TreeVersion => c"the tree is of another format version",

@@ -38,4 +38,5 @@ mod surface;
 mod tool;
 mod tracker;
 mod tree;
+mod version;
 mod writer;

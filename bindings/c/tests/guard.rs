@@ -22,7 +22,7 @@ use dibs_nostd::{
 };
 use xtask::workspace;
 
-use crate::programs::{include, library, run, tool, tree_and_stream};
+use crate::programs::{include, installed, library, run, tool, tree_and_stream};
 
 /// Vertices of the generated heart of 1,000 triangles.
 const VERTICES: usize = 502;
@@ -390,13 +390,13 @@ fn side(side: Side) -> u32 {
     }
 }
 
-/// Builds `examples/c/host` with the library.
+/// Builds `examples/c/host` with the installed library.
 fn example(folder: &Path) -> PathBuf {
     let build = folder.join("build");
     let mut configure = tool("cmake", "cmake");
     configure.arg("-S").arg(workspace::root().join("examples/c/host")).arg("-B").arg(&build);
     configure.arg("-DCMAKE_C_FLAGS=-g -fsanitize=address,undefined -fno-sanitize-recover=all");
-    configure.arg(format!("-DDIBS_LIBRARY={}", library().display()));
+    configure.arg(format!("-DCMAKE_PREFIX_PATH={}", installed(folder).display()));
     run(&mut configure);
     run(Command::new("cmake").arg("--build").arg(&build));
     build.join("dibs-host")

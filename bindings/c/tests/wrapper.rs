@@ -1,9 +1,9 @@
-//! `include/dibs.hpp` compiles as C++20 without exceptions, and its queries answer.
+//! `include/dibs.hpp`, installed, compiles as C++20 without exceptions, and its queries answer.
 
 use std::path::Path;
 use std::process::Command;
 
-use crate::programs::{include, library, run, tool, tree_and_stream};
+use crate::programs::{installed, run, tool, tree_and_stream};
 
 #[test]
 fn the_wrapper_answers_without_exceptions() {
@@ -12,9 +12,12 @@ fn the_wrapper_answers_without_exceptions() {
     let mut compiler = tool("g++", "g++");
     compiler.args(["-std=c++20", "-fno-exceptions", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]);
     compiler.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g"]);
-    compiler.arg("-I").arg(include());
     compiler.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/wrapper.cpp"));
-    run(compiler.arg(library()).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
+    let mut flags = tool("pkg-config", "pkg-config");
+    flags.env("PKG_CONFIG_PATH", installed(folder.path()).join("lib/pkgconfig"));
+    let flags =
+        run(flags.args(["--cflags", "--libs", concat!("dibs = ", env!("CARGO_PKG_VERSION"))]));
+    run(compiler.args(flags.split_whitespace()).arg("-o").arg(&program));
 
     let said = run(Command::new(program).args(tree_and_stream(folder.path())));
     assert!(said.contains(" mm, ") && said.contains(" rows"), "{said}");

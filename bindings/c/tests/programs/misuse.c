@@ -302,6 +302,8 @@ int main(int argc, char **argv) {
     if (argc != 3) {
         return 2;
     }
+    EXPECT(OK, dibs_check_version(DIBS_VERSION));
+    EXPECT(VERSION, dibs_check_version(DIBS_VERSION + 1));
     unsigned char *bytes = read_file(argv[1], &length);
     storage(bytes, length);
     bytes[length / 2] ^= 1;

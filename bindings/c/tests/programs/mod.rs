@@ -23,6 +23,17 @@ pub fn library() -> PathBuf {
     workspace::target().join(folder).join("libdibs_c.a")
 }
 
+/// A folder into which the library is installed.
+pub fn installed(folder: &Path) -> PathBuf {
+    let (build, prefix) = (folder.join("library"), folder.join("prefix"));
+    let mut configure = tool("cmake", "cmake");
+    configure.arg("-S").arg(env!("CARGO_MANIFEST_DIR")).arg("-B").arg(&build);
+    configure.arg("-DCMAKE_INSTALL_LIBDIR=lib");
+    run(configure.arg(format!("-DDIBS_LIBRARY={}", library().display())));
+    run(Command::new("cmake").arg("--install").arg(&build).arg("--prefix").arg(&prefix));
+    prefix
+}
+
 /// The header's folder.
 pub fn include() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("include")
