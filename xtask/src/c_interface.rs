@@ -53,7 +53,9 @@ fn functions(header: &str) -> Vec<&str> {
 fn link(library: &PathBuf, functions: &[&str]) -> Result<Option<String>> {
     let mut linker = Command::new(toolchain::linker()?);
     linker.args(["-flavor", "gnu", "--gc-sections", "--entry", "0"]);
-    linker.args(functions.iter().map(|function| format!("--require-defined={function}")));
+    // The second is an error where the library has no such function.
+    linker.args(functions.iter().map(|function| format!("--undefined={function}")));
+    linker.args(functions.iter().map(|function| format!("--defsym=has_{function}={function}")));
     linker.arg(library).arg("-o").arg(workspace::target().join("dibs-c-linked"));
     let output = linker.output().context("cannot start the linker")?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
