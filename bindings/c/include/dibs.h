@@ -498,7 +498,7 @@ enum dibs_code
    */
   DIBS_CODE_PACKET_EARLIER = 418,
   /**
-   * The surface was 65,535 ms old or older when it was sent.
+   * The surface was 65,535 ms old or older when it was sent, or captured in the future.
    */
   DIBS_CODE_PACKET_TOO_OLD = 419,
   /**

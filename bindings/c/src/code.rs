@@ -144,7 +144,7 @@ pub enum dibs_code {
     PacketRefused = 417,
     /// The surface was captured before the published one.
     PacketEarlier = 418,
-    /// The surface was 65,535 ms old or older when it was sent.
+    /// The surface was 65,535 ms old or older when it was sent, or captured in the future.
     PacketTooOld = 419,
     /// A hello came too soon after another to be answered at once.
     PacketThrottled = 420,

@@ -41,7 +41,7 @@ pub(super) struct Parts<'a> {
 /// How weights are stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
-    /// What stands for zero.
+    /// The number that is stored for a weight of 0.
     zero: u32,
     /// The unit, as a part of the whole.
     pub unit: f32,
@@ -194,7 +194,7 @@ fn check(parts: &Parts<'_>) -> Result<f32, NodesError> {
         }
         largest = largest.max(sum);
     }
-    // Exact, and more than the rounding of what it is multiplied with.
+    // The sum itself is exact: the factor covers the rounding of the products with it.
     let above = if largest > WHOLE { 1.0 + 1.0 / 65_536.0 } else { 1.0 };
     Ok(largest as f32 * (above / WHOLE as f32))
 }

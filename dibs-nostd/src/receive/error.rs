@@ -43,7 +43,8 @@ pub enum ReceiveError {
         /// By so long.
         by: Millis,
     },
-    /// The surface was 65,535 ms old or older when it was sent: how old, the packet cannot say.
+    /// The surface was 65,535 ms old or older when it was sent: how old, the packet cannot say. So is one of this process
+    /// that was captured in the future.
     TooOld,
     /// Rows or a commit of a frame whose begin never came, or that was abandoned.
     Unexpected {
@@ -193,7 +194,10 @@ impl fmt::Display for ReceiveError {
             Self::Earlier { by } => {
                 write!(f, "the surface was captured {by} before the published one")
             }
-            Self::TooOld => write!(f, "the surface was 65,535 ms old or older when it was sent"),
+            Self::TooOld => write!(
+                f,
+                "the surface was 65,535 ms old or older when it was sent, or captured in the future"
+            ),
             Self::Unexpected { epoch } => write!(f, "frame {epoch} is not being received"),
             Self::Refused { epoch, cause } => {
                 write!(f, "frame {epoch} was refused before: {cause}")

@@ -64,8 +64,13 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     #[cold]
     pub(crate) fn refuse_frame(&mut self, rejection: ReceiveError, now: Millis) -> ReceiveError {
         self.collector.set_now(now);
-        let name = FrameName::of(&self.collector.next_id());
-        self.collector.refuse::<M>(name, true, &rejection);
+        let id = self.collector.next_id();
+        self.refuse_local(&id, rejection)
+    }
+
+    #[cold]
+    fn refuse_local(&mut self, id: &FrameId, rejection: ReceiveError) -> ReceiveError {
+        self.collector.refuse::<M>(FrameName::of(id), true, &rejection);
         rejection
     }
 
@@ -91,7 +96,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             freshness: Freshness { age_ms, echo: Some(now.0) },
         };
         let outcome = self.local_rows(id, begin, check, store);
-        let outcome = outcome.map_err(|rejection| self.refuse_frame(rejection, now));
+        let outcome = outcome.map_err(|rejection| self.refuse_local(&id, rejection));
         if outcome.is_ok() {
             self.collector.note_local();
         }
