@@ -3,7 +3,7 @@
 use dibs_build::{Builder, Volume, generate};
 use dibs_nostd::filter::{Filter, Motion, Reason};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{GuardLimits, Surface};
+use dibs_nostd::guard::{GuardLimits, Rows, Surface, Vertices};
 use dibs_nostd::nodes::{Nodes, NodesError};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness};
 use dibs_nostd::{
@@ -138,45 +138,78 @@ fn a_start_names_the_wrong_kind_of_rows() {
     assert_eq!(start(embedded.blob()), None);
 }
 
-/// Frames of vertices are no frames of nodes: they have another number of rows; and where it is the same, the elements are
-/// not what they were.
+/// Frames of vertices are no frames of nodes, nor the reverse: they have another number of rows; and where it is the same,
+/// elements and triangles are not what they were. Each is counted by its cause, and the next good frame is published.
 #[test]
-fn frames_of_vertices_are_refused() {
+fn frames_of_the_other_kind_are_refused_and_counted() {
     let mut rng = Rng::with_seed(3);
     let heart = generate::heart(320).expect("a valid size").mesh;
+    let plain = Builder::new().stretch(3.0).build(&heart).expect("a valid mesh");
+    let vertices = plain.to_rows(&heart.positions);
     for cells in [[5, 2, 8], [3, 4, 5]] {
         let volume = Volume::lattice(&heart, cells).expect("a lattice");
-        let built = Builder::new().stretch(3.0).nodes(&volume).build(&heart).expect("held");
-        let rows = built.to_rows(&heart.positions);
+        let embedded = Builder::new().stretch(3.0).nodes(&volume).build(&heart).expect("held");
+        let rows = embedded.to_rows(&heart.positions);
+        let nodes: Vec<Vec3> = volume.nodes().iter().map(|node| node.as_vec3()).collect();
         for scale in (0..40).map(|_| 0.1 + 2.0 * rng.f32()) {
-            let frame: Vec<Vec3> = rows.iter().map(|&at| at * scale).collect();
-            let outcome = match volume.nodes().len() {
-                162 => refusal::<162>(built.blob(), &frame),
-                120 => refusal::<120>(built.blob(), &frame),
+            let scaled =
+                |rows: &[Vec3]| -> Vec<Vec3> { rows.iter().map(|&at| at * scale).collect() };
+            let ([on_nodes, on_vertices], is_counted) = match nodes.len() {
+                162 => (
+                    [
+                        refusal::<162, Nodes<'static>>(embedded.blob(), &scaled(&rows), &nodes),
+                        refusal::<162, Vertices>(plain.blob(), &scaled(&nodes), &vertices),
+                    ],
+                    false,
+                ),
+                120 => (
+                    [
+                        refusal::<120, Nodes<'static>>(embedded.blob(), &scaled(&rows), &nodes),
+                        refusal::<162, Vertices>(plain.blob(), &scaled(&nodes), &vertices),
+                    ],
+                    true,
+                ),
                 other => unreachable!("{other} nodes"),
             };
-            let expected = if cells[0] == 5 { "stretch" } else { "rows" };
-            assert_eq!(outcome, expected);
+            if is_counted {
+                assert_eq!(on_nodes, ReceiveError::RowCount { rows: 162 });
+                assert_eq!(on_vertices, ReceiveError::RowCount { rows: 120 });
+            } else {
+                assert!(matches!(on_nodes, ReceiveError::Stretch(_)), "{on_nodes:?}");
+                assert!(matches!(on_vertices, ReceiveError::Stretch(_)), "{on_vertices:?}");
+            }
         }
     }
 }
 
-fn refusal<const N: usize>(blob: &[u8], frame: &[Vec3]) -> &'static str {
-    let surface: &Surface<N, Nodes<'static>> = Box::leak(Box::new(Surface::new()));
+/// The refusal of a frame, which is counted, and after which a good one is published.
+fn refusal<const N: usize, R: Rows>(blob: &[u8], frame: &[Vec3], good: &[Vec3]) -> ReceiveError {
+    let surface: &Surface<N, R> = Box::leak(Box::new(Surface::new()));
     let limits = GuardLimits::new(20.0, Millis(100));
     let (mut bus, _) = surface.start::<u16, 64, 96>(TreeBytes::new(blob), limits).expect("valid");
     let mesh_id = Tree::<u16>::from_bytes(blob).expect("valid").mesh_id();
-    for packet in packets(mesh_id, 1_000, frame) {
-        if bus.packet(&packet, Millis(1_000)).is_err() {
-            assert_eq!(bus.surface().map(|frame| frame.epoch()), None);
-            return "rows";
+    let mut refused = None;
+    for (now, rows) in [(1_000, frame), (1_001, good)] {
+        let packets = packets(mesh_id, now, rows);
+        let sent =
+            packets.iter().try_for_each(|packet| bus.packet(packet, Millis(now)).map(|_| ()));
+        let outcome = sent.and_then(|()| {
+            loop {
+                match bus.work(100) {
+                    Ok(Advance::Pending) => (),
+                    other => return other,
+                }
+            }
+        });
+        match outcome {
+            Ok(advance) => assert_eq!(advance, Advance::Published { epoch: 1_001 }),
+            Err(error) => {
+                let counters = bus.counters();
+                assert_eq!((counters.of(error.event()), counters.rejected()), (1, 1), "{error:?}");
+                refused = Some(error);
+            }
         }
     }
-    loop {
-        match bus.work(100) {
-            Ok(Advance::Pending) => (),
-            Err(ReceiveError::Stretch(_)) => return "stretch",
-            other => panic!("{other:?}"),
-        }
-    }
+    assert_eq!(bus.surface().map(|frame| frame.epoch()), Some(Some(1_001)));
+    refused.expect("another kind")
 }
