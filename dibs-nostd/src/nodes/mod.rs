@@ -224,7 +224,7 @@ impl<'a> Nodes<'a> {
     /// [`Tracker`](crate::Tracker).
     #[must_use]
     pub const fn odometer(&self) -> Odometer {
-        Odometer::of_rows(self.motion, self.count() as usize)
+        Odometer::of_rows(self.motion, self.count() as usize, self.vertex_count() as usize)
     }
 
     fn check_rows<V: VertexTable + ?Sized>(&self, table: &V) -> Result<(), StretchError> {

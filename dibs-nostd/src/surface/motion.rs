@@ -6,6 +6,8 @@
 //!
 //! One file, because reading, unit and odometer keep their fields private.
 
+mod hold;
+
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use glam::Vec3;
@@ -319,7 +321,10 @@ impl<V: VertexTable + ?Sized> MovingSurface for MovingTable<'_, V> {
 pub struct Odometer {
     unit: Unit,
     tree: u32,
+    /// Rows of a frame.
     vertices: usize,
+    /// Vertices of the surface.
+    surface: usize,
     motion: Option<MotionReading>,
     /// Digest of the frame measured last.
     digest: u64,
@@ -333,16 +338,17 @@ impl Odometer {
             unit: Unit::of(tree),
             tree: tree.checksum(),
             vertices: tree.vertex_count() as usize,
+            surface: tree.vertex_count() as usize,
             motion: None,
             digest: 0,
         }
     }
 
-    /// An odometer for tables of other rows than the tree's vertices, which move at least as far as those.
+    /// An odometer for tables of other rows than the surface's vertices, which move at least as far as those.
     #[cfg(feature = "nodes")]
-    pub(crate) const fn of_rows(unit: MotionUnit, rows: usize) -> Self {
+    pub(crate) const fn of_rows(unit: MotionUnit, vertices: usize, surface: usize) -> Self {
         let MotionUnit { unit, tree } = unit;
-        Self { unit, tree, vertices: rows, motion: None, digest: 0 }
+        Self { unit, tree, vertices, surface, motion: None, digest: 0 }
     }
 
     /// Starts anew with a frame.

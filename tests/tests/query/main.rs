@@ -10,6 +10,7 @@ mod few_places;
 mod filter;
 mod flat;
 mod hand;
+mod held;
 mod interval;
 mod kernels;
 mod paper_search;

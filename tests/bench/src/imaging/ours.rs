@@ -89,7 +89,8 @@ pub fn measured<I: Index>(
     stretch
 }
 
-/// A tracker: the motion is measured once a frame, and the stretch too unless the tree's limit is assumed.
+/// A tracker: the motion is measured once a frame where the surface moves on, or where that costs less than a query, and the
+/// stretch too unless the tree's limit is assumed.
 pub struct Tracking<'t, I> {
     tracker: Box<Tracker<'t, I, MAX_STACK, OPENED>>,
     odometer: Odometer,
@@ -116,19 +117,30 @@ impl<I: Index> Controller for Tracking<'_, I> {
     fn run(&mut self, ticks: &[Tick], times: &mut Times) {
         let Self { tracker, odometer, frames, surface } = self;
         times.update(|| frames.measure());
-        let step = times.update(|| odometer.step(&frames.before, &frames.after));
-        for tick in ticks {
-            let mut is_fallback = false;
-            times.query(|| {
-                let tracked = match surface {
-                    Surface::Held => track(tracker, &step.after(), &tick.tool),
-                    Surface::Continuous => track(tracker, &step.at(tick.share), &tick.tool),
-                };
-                is_fallback = tracked.fallback.is_some();
-                found(&tracked.closest)
-            });
-            times.fallbacks += u32::from(is_fallback);
+        let (before, after) = (&frames.before, &frames.after);
+        match surface {
+            Surface::Held => {
+                let held = times.update(|| odometer.hold(before, after));
+                each(ticks, times, |tick| track(tracker, &held, &tick.tool));
+            }
+            Surface::Continuous => {
+                let step = times.update(|| odometer.step(before, after));
+                each(ticks, times, |tick| track(tracker, &step.at(tick.share), &tick.tool));
+            }
         }
+    }
+}
+
+/// Times each tick's answer.
+fn each(ticks: &[Tick], times: &mut Times, mut track: impl FnMut(&Tick) -> TrackerAnswer) {
+    for tick in ticks {
+        let mut is_fallback = false;
+        times.query(|| {
+            let tracked = track(tick);
+            is_fallback = tracked.fallback.is_some();
+            found(&tracked.closest)
+        });
+        times.fallbacks += u32::from(is_fallback);
     }
 }
 
