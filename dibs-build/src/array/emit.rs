@@ -39,7 +39,7 @@ pub struct Summary {
     pub index_bits: u32,
     /// The stretch limit: the largest, where triangles have their own.
     pub stretch: f32,
-    /// The least stretch limit of any triangle.
+    /// The least stretch limit of any triangle, or tetrahedron.
     pub least_stretch_limit: f32,
     /// Triangles that the controller's stretch check refuses even at rest, because they are too small for its
     /// arithmetic. With any, no frame is ever published.
@@ -271,6 +271,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
     let unmeasurable = || (0..tree.triangle_count()).filter(|&row| !is_measurable(tree, row));
     let number = |vertex| tree.vertex_number(vertex).map_or(Some(vertex), |number| Some(number.0));
     let roots = tree.roots();
+    let volume = Nodes::of(tree).ok();
     let in_mesh = |row| row_of(tree.corners(TriangleRow(row))?, number);
     Summary {
         triangles: tree.triangle_count(),
@@ -279,9 +280,12 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
         stack: tree.stack(),
         index_bits: 8 * I::BYTES as u32,
         stretch: tree.stretch(),
-        least_stretch_limit: (0..tree.triangle_count())
-            .filter_map(|row| tree.stretch_limit(TriangleRow(row)))
-            .fold(tree.stretch(), f32::min),
+        least_stretch_limit: match &volume {
+            Some(nodes) => crate::nodes::least_stretch_limit(nodes),
+            None => (0..tree.triangle_count())
+                .filter_map(|row| tree.stretch_limit(TriangleRow(row)))
+                .fold(tree.stretch(), f32::min),
+        },
         unmeasurable: unmeasurable().count() as u32,
         first_unmeasurable: unmeasurable().next().and_then(in_mesh),
         surface_paths: tree.paths() == PathKind::Surface,
@@ -312,7 +316,7 @@ pub fn summarise<I: Index>(tree: &Tree<'_, I>, length: usize) -> Summary {
             flash_bytes: modes.flash_bytes(),
             flash_bytes_per_vertex: modes.flash_bytes() as f64 / f64::from(vertices),
         }),
-        volume: Nodes::of(tree).ok().map(|nodes| VolumeSummary {
+        volume: volume.map(|nodes| VolumeSummary {
             nodes: nodes.count(),
             tetrahedra: nodes.element_count(),
             amplification: nodes.amplification(),

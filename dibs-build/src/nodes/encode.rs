@@ -1,7 +1,7 @@
 //! The nodes of a tree as bytes: section 11 of `dibs-nostd`'s `docs/format.md`.
 
-use dibs_nostd::nodes::{HEADER_BYTES, LEAST_VOLUME, MARGIN, SIGNED_ZERO};
-use glam::{DMat3, DVec3};
+use dibs_nostd::nodes::{HEADER_BYTES, LEAST_VOLUME, MARGIN, Nodes, SIGNED_ZERO};
+use glam::{DMat3, DVec3, Vec3};
 
 use super::VolumeError;
 use super::binding::Embedding;
@@ -51,6 +51,22 @@ pub(crate) fn least_limit(corners: [DVec3; 4]) -> Option<f64> {
     let (_, _, openness) = path(corners);
     let least = (1.0 + 3.0 * MARGIN / openness).sqrt() * (1.0 + 1.0 / 65_536.0);
     (openness >= FLAT).then_some(least)
+}
+
+/// The least limit of any tetrahedron of a built volume: the tree's, where all have that.
+pub(crate) fn least_stretch_limit(nodes: &Nodes<'_>) -> f32 {
+    let limit = |element| {
+        let corners = nodes.element(element)?.map(|node| nodes.rest_position(node));
+        let [a, b, c, d] = corners.map(|corner| corner.map(Vec3::as_dvec3));
+        // As the controller compares it, less what was taken off for rounding.
+        let scale = 1.0 + MARGIN / openness(edges([a?, b?, c?, d?]));
+        Some(f64::from(nodes.element_limit(element)?) * scale.sqrt())
+    };
+    let tree = nodes.stretch_limit();
+    let least = (0..nodes.element_count()).filter_map(limit).fold(f64::INFINITY, f64::min);
+    // Six digits, of which none is that of a sum in f32.
+    let least = ((least * 1e5).round() / 1e5) as f32;
+    if least < tree * (1.0 - 1e-5) { least } else { tree }
 }
 
 /// A tetrahedron at rest.

@@ -107,6 +107,13 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
     assert_eq!(stated(&tree["tree"]["stretch"]), stated(&learned["uniform_limit"]));
     let error = fails(folder, &format!("{line} lattice:2,2,2"));
     assert!(error.contains("heart.limits: is of mesh"), "{error}");
+    let told = succeeds(folder, "inspect learned.dibs");
+    let [least, most] =
+        ["least_stretch_limit", "stretch"].map(|name| stated(&tree["tree"][name]) as f32);
+    assert!(told.contains(&format!("limits {least} to {most} of tetrahedra")), "{told}");
+    assert!(least < most - 0.02, "{least} {most}");
+    let uniform = json(folder, "inspect heart.dibs --json");
+    assert_eq!(uniform["least_stretch_limit"], uniform["stretch"]);
 
     // A volume that vertices stick out of.
     let smaller: Vec<DVec3> = volume.nodes().iter().map(|at| *at * 0.97).collect();

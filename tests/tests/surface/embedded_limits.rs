@@ -116,6 +116,18 @@ fn no_element_goes_beyond_its_own_limit() {
         let tree = built.tree::<u16>().expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
         let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+        // What the tree says of them, below the builder's by the check's rounding.
+        let sorted = |mut limits: Vec<f32>| {
+            limits.sort_by(f32::total_cmp);
+            limits
+        };
+        let told = (0..nodes.element_count()).filter_map(|element| nodes.element_limit(element));
+        let (told, given) = (sorted(told.collect()), sorted(limits.clone()));
+        assert!(
+            told.iter().zip(&given).all(|(told, given)| (0.999..1.00001).contains(&(told / given)))
+        );
+        let least = built.summary().least_stretch_limit;
+        assert!((least - given[0]).abs() < 2e-5, "{least} {}", given[0]);
         for _ in 0..sample(1_200) {
             let mut next = rest.clone();
             let by = Vec3::from([(); 3].map(|()| rng.f32() - 0.5)) * 30.0 * rng.f32();
