@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use anyhow::{Context, Result};
-use dibs_build::generate;
+use anyhow::{Context, Result, bail};
+use dibs_build::{TreeScript, Volume, generate};
 
 fn main() -> Result<()> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
@@ -18,14 +18,18 @@ fn main() -> Result<()> {
 }
 
 /// The tree in flash: of the generated heart, or of the mesh file in `DIBS_MESH`; for a stretch of 1.5, that in
-/// `DIBS_STRETCH`, or the limits of the file in `DIBS_LIMITS`.
+/// `DIBS_STRETCH`, or the limits of the file in `DIBS_LIMITS`. With `DIBS_NODES`, the cells of a lattice as in `9,8,7`, its
+/// nodes carry the surface.
 fn surface() -> Result<()> {
-    for variable in ["DIBS_MESH", "DIBS_STRETCH", "DIBS_LIMITS"] {
+    for variable in ["DIBS_MESH", "DIBS_STRETCH", "DIBS_LIMITS", "DIBS_NODES"] {
         println!("cargo::rerun-if-env-changed={variable}");
     }
-    let tree = match env::var_os("DIBS_MESH") {
-        Some(path) => dibs_build::tree(&path),
-        None => dibs_build::tree(generate::heart(10_272)?.mesh),
+    let path = env::var_os("DIBS_MESH").map(PathBuf::from);
+    let tree = match (path, env::var("DIBS_NODES")) {
+        (None, Err(_)) => dibs_build::tree(generate::heart(10_272)?.mesh),
+        (Some(path), Err(_)) => dibs_build::tree(path),
+        (None, Ok(_)) => bail!("DIBS_NODES takes a mesh, in DIBS_MESH"),
+        (Some(path), Ok(cells)) => carried(path, &cells)?,
     };
     let tree = match (env::var_os("DIBS_LIMITS"), env::var("DIBS_STRETCH")) {
         (Some(file), _) => tree.limits(file),
@@ -36,6 +40,15 @@ fn surface() -> Result<()> {
     };
     tree.emit("surface");
     Ok(())
+}
+
+/// The tree of a mesh that a lattice's nodes carry.
+fn carried(path: PathBuf, cells: &str) -> Result<TreeScript> {
+    let cells = cells.split(',').map(str::parse).collect::<Result<Vec<u32>, _>>();
+    let cells = cells.ok().and_then(|cells| cells.try_into().ok());
+    let cells = cells.context("DIBS_NODES holds three numbers of cells, as in 9,8,7")?;
+    let volume = Volume::lattice(&dibs_build::read(&path)?.mesh, cells)?;
+    Ok(dibs_build::tree(path).with(|tree| tree.nodes(&volume).with_rest_shape(false)))
 }
 
 /// The linker scripts of the binaries `board` and `cycles`: `memory.x` at the top of the repository is the board.

@@ -14,6 +14,8 @@ pub struct Surface {
     pub mesh: Option<PathBuf>,
     /// The limits on stretch.
     pub limits: Limits,
+    /// The cells of the lattice whose nodes carry it, if any do.
+    pub nodes: Option<[u32; 3]>,
 }
 
 /// How far a surface may be stretched.
@@ -29,7 +31,7 @@ pub const HEART_STRETCH: f32 = 1.5;
 
 impl Default for Surface {
     fn default() -> Self {
-        Self { mesh: None, limits: Limits::Stretch(HEART_STRETCH) }
+        Self { mesh: None, limits: Limits::Stretch(HEART_STRETCH), nodes: None }
     }
 }
 
@@ -55,6 +57,10 @@ impl Surface {
         match &self.mesh {
             Some(mesh) => cargo.env("DIBS_MESH", mesh),
             None => cargo.env_remove("DIBS_MESH"),
+        };
+        match self.nodes {
+            Some([x, y, z]) => cargo.env("DIBS_NODES", format!("{x},{y},{z}")),
+            None => cargo.env_remove("DIBS_NODES"),
         };
         cargo.env_remove("DIBS_STRETCH").env_remove("DIBS_LIMITS");
         match &self.limits {

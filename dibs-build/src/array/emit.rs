@@ -7,7 +7,7 @@ use dibs_nostd::format::{PathKind, Unit};
 use dibs_nostd::glam::{DVec3, Vec3};
 use dibs_nostd::modes::Modes;
 use dibs_nostd::nodes::Nodes;
-use dibs_nostd::{FormatError, Index, Tree, TriangleRow};
+use dibs_nostd::{FormatError, Index, Tree, TriangleRow, VertexTable};
 
 use crate::error::BuildError;
 use crate::write_atomically;
@@ -52,7 +52,8 @@ pub struct Summary {
     pub roots: u32,
     /// Radius of the largest root's sphere at rest, in the mesh's unit.
     pub root_radius: f32,
-    /// The corners of the box around the vertices at rest, least and largest; `None` without the rest shape.
+    /// The corners of the box around the vertices at rest, least and largest; `None` without the rest shape, or nodes that
+    /// carry it.
     pub bounding_box: Option<[[f32; 3]; 2]>,
     /// Mean length of the triangles' sides at rest.
     pub mean_edge: Option<f64>,
@@ -338,8 +339,14 @@ fn labels<I: Index>(tree: &Tree<'_, I>) -> usize {
 
 fn bounding_box<I: Index>(tree: &Tree<'_, I>) -> Option<[[f32; 3]; 2]> {
     let mut bounds = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+    let nodes = Nodes::of(tree).ok();
+    let at_rest = |nodes: Nodes<'_>| {
+        (0..nodes.count()).filter_map(|node| nodes.rest_position(node)).collect()
+    };
+    let at_rest: Vec<Vec3> = nodes.map_or_else(Vec::new, at_rest);
     for row in 0..tree.vertex_count() {
-        let position = tree.rest_position(row)?;
+        let embedded = || nodes?.surface(at_rest.as_slice()).position(row);
+        let position = tree.rest_position(row).or_else(embedded)?;
         bounds = [bounds[0].min(position), bounds[1].max(position)];
     }
     Some(bounds.map(|bound| bound.to_array()))

@@ -1,7 +1,6 @@
 //! The Rust module of a tree: the types of `dibs-nostd` with the sizes that this tree needs.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Index, Tree};
 
 use super::{BuiltTree, ModesSummary, Summary};
 use crate::error::BuildError;
@@ -19,11 +18,7 @@ pub(super) fn source(built: &BuiltTree, name: &str, blob: &str) -> Result<String
         None if summary.surface_paths => "surface",
         None => "edge",
     };
-    let extent = match index_bits {
-        16 => built.tree().map(|tree| extent::<u16>(&tree)),
-        _ => built.tree().map(|tree| extent::<u32>(&tree)),
-    };
-    let extent = extent?.map_or_else(String::new, extent_source);
+    let extent = summary.bounding_box.map_or_else(String::new, extent_source);
     let origin = origin_source(summary.origin);
     let embedded = summary.volume.map_or_else(String::new, |volume| embedded_source(volume.nodes));
     let guard = guard_source(summary.volume.is_some());
@@ -147,16 +142,8 @@ const KEYWORDS: &[&str] = &[
     "unsafe", "unsized", "use", "virtual", "where", "while",
 ];
 
-/// Least and largest corner of the rest shape's bounding box; `None` where the tree has no rest shape.
-fn extent<I: Index>(tree: &Tree<'_, I>) -> Option<(Vec3, Vec3)> {
-    let mut rest = (0..tree.vertex_count()).map(|row| tree.rest_position(row));
-    rest.try_fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), position| {
-        let position = position?;
-        Some((low.min(position), high.max(position)))
-    })
-}
-
-fn extent_source((low, high): (Vec3, Vec3)) -> String {
+fn extent_source(bounds: [[f32; 3]; 2]) -> String {
+    let [low, high] = bounds.map(Vec3::from);
     let [x, y, z] = ((low + high) / 2.0).to_array();
     let reach = (high - low).max_element() / 2.0;
     format!(

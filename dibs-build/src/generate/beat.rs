@@ -26,11 +26,23 @@ const MID_SYSTOLE: Control =
 const END_SYSTOLE: Control =
     Control { contraction: 0.29, right_contraction: 0.11, shortening: 0.12, twist: 0.24 };
 
-/// One cycle from the shape at end diastole, which is frame 0.
+/// The motion of the generated [`heart`](super::heart()) at any points, say at the nodes of a volume that carries it: one
+/// cycle from their places (mm) at end diastole, which are frame 0.
 ///
-/// The three control positions of a vertex are joined by a parabola, along which it moves with the
+/// The three control positions of a point are joined by a parabola, along which it moves with the
 /// phase `(1 - cos(2 pi t)) / 2`: sinusoidally, from end diastole to end systole and back.
-pub(super) fn beat(rest: &[Vec3]) -> Motion {
+///
+/// ```
+/// use dibs_build::{Volume, generate};
+/// let heart = generate::heart(320)?;
+/// assert_eq!(generate::beat(&heart.mesh.positions), heart.motion);
+/// let lattice = Volume::lattice(&heart.mesh, [4, 4, 4])?;
+/// let nodes: Vec<_> = lattice.nodes().iter().map(|node| node.as_vec3()).collect();
+/// assert_eq!(generate::beat(&nodes).frames[12].len(), 125);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[must_use]
+pub fn beat(rest: &[Vec3]) -> Motion {
     let controls: Vec<[DVec3; 3]> = rest
         .iter()
         .map(|&point| {

@@ -4,10 +4,9 @@ use std::ops::RangeInclusive;
 
 use glam::DVec3;
 
-use super::beat::beat;
 use super::contour::contour;
 use super::remesh::{Surface, area_vector, remesh};
-use super::{GenerateError, MovingMesh, check};
+use super::{GenerateError, MovingMesh, beat, check};
 use crate::Mesh;
 
 const TRIANGLES: RangeInclusive<u32> = 320..=1_000_000;

@@ -19,6 +19,7 @@ use std::ops::RangeInclusive;
 
 use crate::{Mesh, Motion};
 
+pub use beat::beat;
 pub use brain::brain;
 pub use heart::heart;
 

@@ -33,7 +33,7 @@ pub const WORDS: &[Row] = &[
     ("margin", "MARGIN", "what limits leave above the recorded stretch", "stretch"),
     ("picture", "PICTURE", "the drawing of the stretch", "stretch"),
     ("construction", "CONSTRUCTION", "how the tree is built", "build stretch"),
-    ("nodes", "VOLUME", "the volume whose nodes move the surface", "build stretch"),
+    ("nodes", "VOLUME", "the volume whose nodes move the surface", "build stretch demo"),
     ("bind-within", "MM", "distance from which vertices outside are bound", "build"),
     ("labels", "LABELS", "the file of a label for each triangle", "build"),
     ("labels-from-groups", "", "labels from the mesh's file", "build"),

@@ -152,12 +152,15 @@ pub struct Run {
     pub c: bool,
     /// A hand that pushes, instead of the script.
     pub hand: bool,
+    /// A heart that nodes carry.
+    pub nodes: bool,
 }
 
 /// The report of a demo.
-pub fn report_of(Run { seconds, faults, c, hand }: Run) -> Result<Value> {
+pub fn report_of(Run { seconds, faults, c, hand, nodes }: Run) -> Result<Value> {
     let name = match (faults, c) {
         (false, false) if hand => "demo-hand",
+        (false, false) if nodes => "demo-nodes",
         (false, false) => "demo",
         (true, false) => "demo-faults",
         (false, true) => "demo-c",
@@ -169,6 +172,7 @@ pub fn report_of(Run { seconds, faults, c, hand }: Run) -> Result<Value> {
         faults,
         c,
         script: !hand,
+        nodes: nodes.then(|| demo::scene::cells(demo::LATTICE)).transpose()?,
         seed: 1,
         board_only: true,
         output: Some(output.clone()),

@@ -11,6 +11,7 @@ mod demo;
 mod demo_c;
 mod demo_faults;
 mod demo_hand;
+mod demo_nodes;
 mod examples;
 mod filter;
 mod filter_board;
@@ -60,6 +61,7 @@ pub const CHECKS: &[Check] = &[
     stack::CHECK,
     demo::CHECK,
     demo_hand::CHECK,
+    demo_nodes::CHECK,
     demo_faults::CHECK,
     flood::CHECK,
     demo_c::CHECK,
@@ -85,7 +87,8 @@ pub const CHECKS: &[Check] = &[
 
 /// Names of the checks that `cargo xtask test` runs with `--whole` only: each builds one more program, or takes half a
 /// minute besides checks of the same parts, or runs the tests once more under an instrument.
-pub const ON_REQUEST: [&str; 8] = [
+pub const ON_REQUEST: [&str; 9] = [
+    demo_nodes::CHECK.name,
     filter_board::CHECK.name,
     nodes::CHECK.name,
     flood::CHECK.name,

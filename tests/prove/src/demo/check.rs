@@ -10,14 +10,15 @@ use glam::Vec3;
 
 use super::scene::Scene;
 use super::sender::Link;
-use super::surface::positions;
+use super::surface::rows;
 
 /// The result of checking one answer.
 #[derive(Clone, Copy, Debug)]
 pub struct Checked {
     /// The tick.
     pub tick: u32,
-    /// Error of the answer in units of [`accuracy_of`] it: at most 1 is right.
+    /// Error of the answer in units of [`accuracy_of`] it, and of the rounding of vertices that nodes carry: at most 1 is
+    /// right.
     pub error: f64,
     /// The true separation from the surface of the answer, in mm: the lower end, where it is not certain.
     pub separation: f64,
@@ -46,7 +47,8 @@ fn without(accuracy: f32, position_error: f32) -> f64 {
 /// Checks one answer: its separation, its interval, and its point. The error is the largest of the
 /// three.
 pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
-    let positions = positions(link, tick)?;
+    let rows = rows(link, tick)?;
+    let positions = scene.vertices(&rows);
     let tool = Instrument::capsule(
         Vec3::from(tick.tool_start),
         Vec3::from(tick.tool_end),
@@ -54,7 +56,7 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
     );
     let truth = exhaustive(&positions, &scene.triangles, &tool).context("no triangles")?;
 
-    let accuracy = accuracy_of(tick);
+    let accuracy = accuracy_of(tick) + scene.rounding(&rows)?;
     let (low, high) =
         sides::signed_separation(&positions, &scene.triangles, &tool, &truth, accuracy);
     let separation = (low - f64::from(tick.separation)).max(0.0);

@@ -15,7 +15,7 @@ use super::report::force;
 use super::scene::Scene;
 use super::sender::Link;
 use super::steps::tool;
-use super::surface::positions;
+use super::surface::rows;
 
 /// Most contacts that are kept.
 const MOST: usize = 16;
@@ -56,12 +56,17 @@ impl Touches {
     /// Of a run.
     pub fn of(scene: &Scene, link: &Link, ticks: &[Tick]) -> Result<Self> {
         match scene.tree.index_bits() {
-            16 => Self::on(&scene.tree.tree::<u16>()?, link, ticks),
-            _ => Self::on(&scene.tree.tree::<u32>()?, link, ticks),
+            16 => Self::on(&scene.tree.tree::<u16>()?, scene, link, ticks),
+            _ => Self::on(&scene.tree.tree::<u32>()?, scene, link, ticks),
         }
     }
 
-    fn on<I: Index>(tree: &Tree<'_, I>, link: &Link, ticks: &[Tick]) -> Result<Self> {
+    fn on<I: Index>(
+        tree: &Tree<'_, I>,
+        scene: &Scene,
+        link: &Link,
+        ticks: &[Tick],
+    ) -> Result<Self> {
         let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
         let proxy = Proxy::new(spring, MARGIN)?;
         let mut query = Query::<I, MAX_STACK>::new(tree)?;
@@ -73,11 +78,12 @@ impl Touches {
             if !is_acting(before) || !is_acting(tick) {
                 continue;
             }
-            let rows = positions(link, tick)?;
+            let rows = rows(link, tick)?;
+            let rows = scene.vertices(&rows);
             let (was, now) = (tool(before)?, tool(tick)?);
             let off = tick.margin + tick.position_error;
             let margin = MARGIN + off + tick.accuracy;
-            query.contacts(rows.as_slice(), &now, margin, &Options::new(), &mut list)?;
+            query.contacts(&*rows, &now, margin, &Options::new(), &mut list)?;
             let velocity = (now.start() - was.start()) * TICK_RATE as f32;
             let axis = (now.end() - now.start(), was.end() - was.start());
             let angular = axis.1.cross(axis.0) / axis.0.length_squared() * TICK_RATE as f32;

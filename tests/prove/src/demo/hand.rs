@@ -345,6 +345,7 @@ fn accuracy(tick: &Tick) -> f64 {
 fn apart(scene: &Scene, sent: &Sent, tick: &Tick) -> f64 {
     let (start, end) = (Vec3::from(tick.tool_start), Vec3::from(tick.tool_end));
     let tool = Instrument::capsule(start, end, tick.tool_radius);
-    let Some(truth) = exhaustive(&sent.rows, &scene.triangles, &tool) else { return f64::NAN };
-    sides::signed_separation(&sent.rows, &scene.triangles, &tool, &truth, accuracy(tick)).0
+    let positions = scene.vertices(&sent.rows);
+    let Some(truth) = exhaustive(&positions, &scene.triangles, &tool) else { return f64::NAN };
+    sides::signed_separation(&positions, &scene.triangles, &tool, &truth, accuracy(tick)).0
 }

@@ -31,10 +31,13 @@ use faults::Plan;
 use machine::Machine;
 use report::Report;
 use robot::Robot;
-use scene::Scene;
+use scene::{Cells, Scene};
 use session::Harm;
 use xtask::steps::Outcome;
 use xtask::workspace;
+
+/// The lattice of 720 nodes.
+pub const LATTICE: &str = "lattice:9,8,7";
 
 /// Streams a beating heart to the firmware while a simulated hand pushes its instrument against it, by force and by
 /// commands, and does not get in. Every answer is checked against exhaustive search.
@@ -54,6 +57,11 @@ pub struct Options {
     /// learned from its motion, with a tenth to spare.
     #[arg(long, allow_negative_numbers = true)]
     pub stretch: Option<f32>,
+    /// The nodes of a lattice, `lattice:NX,NY,NZ`, carry the surface, a generated heart of 50,000 triangles, and are what the
+    /// frames hold; 9 x 8 x 7 cells if none are given.
+    #[arg(long, value_name = "VOLUME", num_args = 0..=1, default_missing_value = LATTICE, value_parser = scene::cells)]
+    #[arg(conflicts_with_all = ["mesh", "c"])]
+    pub nodes: Option<Cells>,
     /// A script moves the instrument instead of the hand, around the surface and through it: nothing stops it, so every
     /// force is seen. With `--c` and `--faults` it does, too.
     #[arg(long, alias = "path")]

@@ -70,6 +70,8 @@ pub struct Report {
     /// Every change of the fail-safe machine's state.
     transitions: Vec<Transition>,
     instructions_mean: Option<f64>,
+    /// Of answers whose axis is outside, so that no depth was searched.
+    instructions_outside_mean: Option<f64>,
     instructions_max: Option<u64>,
     node_tests_mean: f64,
     triangle_tests_mean: f64,
@@ -85,6 +87,8 @@ pub struct Report {
     /// Longest time from a tick's due moment to its end, in microseconds.
     tick_max_us: Option<f64>,
     flash_bytes: Option<u64>,
+    /// Flash of the tree alone.
+    tree_bytes_per_triangle: f64,
     /// Variables and the deepest stack.
     ram_bytes: Option<u64>,
     stack_bytes: Option<u32>,
@@ -121,10 +125,13 @@ impl Report {
             outcome.ticks.iter().filter(is_so).count()
         };
         let waiting = because(Unavailable::NoSurface);
-        let mean = |value: fn(&Tick) -> u32| {
-            let sum: f64 = answered.iter().map(|tick| f64::from(value(tick))).sum();
-            if answered.is_empty() { 0.0 } else { sum / answered.len() as f64 }
+        let mean_of = |ticks: &[&Tick], value: fn(&Tick) -> u32| {
+            let sum: f64 = ticks.iter().map(|tick| f64::from(value(tick))).sum();
+            sum / ticks.len().max(1) as f64
         };
+        let mean = |value| mean_of(&answered, value);
+        let is_outside = |tick: &&&Tick| tick.separation > -tick.tool_radius;
+        let outside: Vec<&Tick> = answered.iter().filter(is_outside).copied().collect();
         let least = |value: fn(&Tick) -> f32| {
             answered.iter().map(|tick| value(tick)).fold(f32::INFINITY, f32::min)
         };
@@ -165,6 +172,8 @@ impl Report {
             ticks_safe: count(State::Safe) - waiting,
             transitions: Transition::all(&outcome.ticks),
             instructions_mean: on_board.then(|| mean(|tick| tick.query_counts) * scale as f64),
+            instructions_outside_mean: on_board
+                .then(|| mean_of(&outside, |tick| tick.query_counts) * scale as f64),
             instructions_max: on_board.then_some(u64::from(counts_max) * scale),
             node_tests_mean: mean(|tick| tick.node_tests),
             triangle_tests_mean: mean(|tick| tick.triangle_tests),
@@ -179,6 +188,7 @@ impl Report {
             latency_max_us: on_board.then(|| microseconds(summary.latency_counts)),
             tick_max_us: on_board.then(|| microseconds(summary.tick_counts)),
             flash_bytes: footprint.map(|f| f.flash),
+            tree_bytes_per_triangle: scene.tree.blob().len() as f64 / scene.triangles.len() as f64,
             ram_bytes: footprint.map(|f| f.ram + u64::from(summary.stack_bytes)),
             stack_bytes: on_board.then_some(summary.stack_bytes),
             masked_max_us: on_board.then(|| microseconds(summary.masked_counts + 1)),
@@ -354,8 +364,13 @@ impl Report {
         if self.fallbacks_full > 0 {
             row("", format!("{} of them: too few places for the mesh", self.fallbacks_full));
         }
-        if let (Some(mean), Some(max)) = (self.instructions_mean, self.instructions_max) {
-            row("instructions a query", format!("{mean:.0} mean, {max} max"));
+        if let (Some(mean), Some(outside), Some(max)) =
+            (self.instructions_mean, self.instructions_outside_mean, self.instructions_max)
+        {
+            row(
+                "instructions a query",
+                format!("{mean:.0} mean, {outside:.0} with the axis outside, {max} max"),
+            );
             row(
                 "",
                 format!(
@@ -378,6 +393,7 @@ impl Report {
             (self.flash_bytes, self.ram_bytes, self.stack_bytes)
         {
             row("memory", format!("{flash} bytes flash, {ram} RAM, {stack} of them stack"));
+            row("", format!("tree of {:.2} bytes a triangle", self.tree_bytes_per_triangle));
         }
         if let (Some(masked), Some(bus), Some(rounds)) =
             (self.masked_max_us, self.bus_masked_max_us, self.scrub_rounds)

@@ -1,9 +1,15 @@
 //! The surface, its motion and its tree, as in the firmware.
 
+use std::borrow::Cow;
+
 use anyhow::{Context, Result, ensure};
-use dibs_build::{Builder, BuiltTree, Motion, MotionStretch, Paths, Unit, generate, write_limits};
-use dibs_nostd::Tool;
-use glam::Vec3;
+use dibs_build::{
+    Builder, BuiltTree, Format, Mesh, Motion, MotionStretch, Paths, Unit, Volume, generate,
+    write_limits,
+};
+use dibs_nostd::nodes::{Nodes, WHOLE};
+use dibs_nostd::{Index, Tool, Tree, VertexTable};
+use glam::{DVec3, Vec3};
 use xtask::firmware::{HEART_STRETCH, Limits, Surface};
 use xtask::workspace;
 
@@ -11,10 +17,24 @@ use super::Options;
 
 /// Triangles of the generated heart: those of the paper's.
 const HEART_TRIANGLES: u32 = 10_272;
+/// Triangles of the heart that nodes carry.
+const CARRIED_TRIANGLES: u32 = 50_000;
 /// Frames a second where a motion's file does not say it.
 const RATE: f32 = 25.0;
 /// Margin of the limits that are learned from a motion.
 const MARGIN: f32 = 0.1;
+
+/// The cells of a lattice along each axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Cells(pub [u32; 3]);
+
+/// Reads `lattice:NX,NY,NZ`.
+pub fn cells(text: &str) -> Result<Cells> {
+    let numbers = text.strip_prefix("lattice:").unwrap_or_default().split(',');
+    let numbers: Option<Vec<u32>> = numbers.map(|number| number.trim().parse().ok()).collect();
+    let cells = numbers.and_then(|numbers| numbers.try_into().ok());
+    cells.map(Cells).context("expected lattice:NX,NY,NZ, the cells along each axis")
+}
 
 /// The moving surface, and the firmware's tree of it.
 pub struct Scene {
@@ -24,8 +44,10 @@ pub struct Scene {
     pub surface: Surface,
     /// The tree; the firmware builds the same one, byte for byte.
     pub tree: BuiltTree,
-    /// The motion, in the mesh's order of vertices.
+    /// The motion, in the mesh's order of vertices, or in that of the nodes.
     pub motion: Motion,
+    /// Of each row of the tree's vertices, the nodes that carry it and their weights; none where rows are vertices.
+    carriers: Vec<[(u32, f64); 4]>,
     /// Frames a second at which the motion was recorded.
     pub rate: f32,
     /// The mesh's triangles by rows of the vertex table, not taken from the tree.
@@ -35,6 +57,9 @@ pub struct Scene {
 impl Scene {
     /// Reads or generates everything.
     pub fn load(options: &Options) -> Result<Self> {
+        if let Some(Cells(cells)) = options.nodes {
+            return Self::carried(options, cells);
+        }
         let (mesh, motion) = match (&options.mesh, &options.motion) {
             (Some(mesh), Some(motion)) => {
                 let mesh = dibs_build::read(mesh)?.mesh;
@@ -78,20 +103,76 @@ impl Scene {
             }
         };
         let tree = builder.build(&mesh)?;
-        let mut row = vec![0; mesh.positions.len()];
-        for (place, &vertex) in (0..).zip(tree.vertex_order()) {
-            row[vertex as usize] = place;
-        }
         let path = options.mesh.as_deref().map(std::path::absolute).transpose()?;
         let given = options.mesh.as_ref().map(|path| path.display().to_string());
         Ok(Self {
             name: given.unwrap_or_else(|| "generated heart".to_owned()),
-            surface: Surface { mesh: path, limits },
+            surface: Surface { mesh: path, limits, nodes: None },
             rate,
-            triangles: mesh.triangles.iter().map(|t| t.map(|v| row[v as usize])).collect(),
+            triangles: by_rows(&mesh, &tree),
+            tree,
+            motion,
+            carriers: Vec::new(),
+        })
+    }
+
+    /// A heart that the nodes of a lattice carry.
+    fn carried(options: &Options, cells: [u32; 3]) -> Result<Self> {
+        let mesh = generate::heart(CARRIED_TRIANGLES)?.mesh;
+        let volume = Volume::lattice(&mesh, cells)?;
+        let nodes: Vec<Vec3> = volume.nodes().iter().map(|node| node.as_vec3()).collect();
+        let motion = generate::beat(&nodes);
+        let stretch = options.stretch.unwrap_or(HEART_STRETCH);
+        let builder = Builder::new().stretch(stretch).with_rest_shape(false);
+        let tree = builder.nodes(&volume).build(&mesh)?;
+        // The firmware's build script makes the same tree of this file. An older one is left, so that nothing is built anew.
+        let path =
+            workspace::target().join(format!("demo-heart-{:08x}.ply", tree.summary().mesh_id));
+        if !path.exists() {
+            mesh.write(&path, Format::Ply)?;
+        }
+        Ok(Self {
+            name: format!("generated heart that {} nodes carry", nodes.len()),
+            surface: Surface {
+                mesh: Some(path),
+                limits: Limits::Stretch(stretch),
+                nodes: Some(cells),
+            },
+            rate: motion.rate,
+            triangles: by_rows(&mesh, &tree),
+            carriers: match tree.index_bits() {
+                16 => carriers(&tree.tree::<u16>()?)?,
+                _ => carriers(&tree.tree::<u32>()?)?,
+            },
             tree,
             motion,
         })
+    }
+
+    /// The surface's vertices at a frame's rows, in f64 and rounded once.
+    pub fn vertices<'r>(&self, rows: &'r [Vec3]) -> Cow<'r, [Vec3]> {
+        if self.carriers.is_empty() {
+            return Cow::Borrowed(rows);
+        }
+        let vertex = |carriers: &[(u32, f64); 4]| {
+            let part = |&(node, weight): &(u32, f64)| rows[node as usize].as_dvec3() * weight;
+            carriers.iter().map(part).sum::<DVec3>().as_vec3()
+        };
+        Cow::Owned(self.carriers.iter().map(vertex).collect())
+    }
+
+    /// How far (mm) a vertex that the controller computes may be from that of [`vertices`](Self::vertices), by what it
+    /// states.
+    pub fn rounding(&self, rows: &[Vec3]) -> Result<f64> {
+        fn of<I: Index>(scene: &Scene, rows: &[Vec3]) -> Result<f64> {
+            let nodes = Nodes::of(&scene.tree.tree::<I>()?)?;
+            Ok(nodes.surface(rows).position_error().into())
+        }
+        match self.tree.index_bits() {
+            _ if self.carriers.is_empty() => Ok(0.0),
+            16 => of::<u16>(self, rows),
+            _ => of::<u32>(self, rows),
+        }
     }
 
     /// One line for the user.
@@ -109,4 +190,21 @@ impl Scene {
             self.motion.frames.len(),
         )
     }
+}
+
+/// The mesh's triangles by rows of the tree's vertices.
+fn by_rows(mesh: &Mesh, tree: &BuiltTree) -> Vec<[u32; 3]> {
+    let mut row = vec![0; mesh.positions.len()];
+    for (place, &vertex) in (0..).zip(tree.vertex_order()) {
+        row[vertex as usize] = place;
+    }
+    mesh.triangles.iter().map(|corners| corners.map(|vertex| row[vertex as usize])).collect()
+}
+
+/// The nodes and weights of each row.
+fn carriers<I: Index>(tree: &Tree<'_, I>) -> Result<Vec<[(u32, f64); 4]>> {
+    let nodes = Nodes::of(tree)?;
+    let part = |(node, weight): (u32, i32)| (node, f64::from(weight) / f64::from(WHOLE));
+    let of = |row| Some(nodes.weights(row)?.map(part));
+    (0..tree.vertex_count()).map(of).collect::<Option<_>>().context("a row without weights")
 }

@@ -43,14 +43,14 @@ pub struct Link {
 /// A frame that was sent.
 #[derive(Clone)]
 pub struct Sent {
-    /// The vertices, exactly as the controller decodes them.
+    /// The vertices, or nodes, exactly as the controller decodes them.
     pub rows: Arc<Vec<Vec3>>,
     /// The controller's tick at which the heart was so.
     pub captured: u32,
 }
 
 impl Link {
-    /// The vertices of a frame.
+    /// The rows of a frame.
     pub fn frame(&self, epoch: u32) -> Option<Arc<Vec<Vec3>>> {
         self.lock().get(&epoch).map(|sent| Arc::clone(&sent.rows))
     }

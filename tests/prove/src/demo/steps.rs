@@ -38,19 +38,25 @@ impl Steps {
     /// Of a run.
     pub fn of(scene: &Scene, link: &Link, ticks: &[Tick]) -> Result<Self> {
         match scene.tree.index_bits() {
-            16 => Self::on(&scene.tree.tree::<u16>()?, link, ticks),
-            _ => Self::on(&scene.tree.tree::<u32>()?, link, ticks),
+            16 => Self::on(&scene.tree.tree::<u16>()?, scene, link, ticks),
+            _ => Self::on(&scene.tree.tree::<u32>()?, scene, link, ticks),
         }
     }
 
-    fn on<I: Index>(tree: &Tree<'_, I>, link: &Link, ticks: &[Tick]) -> Result<Self> {
+    fn on<I: Index>(
+        tree: &Tree<'_, I>,
+        scene: &Scene,
+        link: &Link,
+        ticks: &[Tick],
+    ) -> Result<Self> {
         let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
         let wall = ForbiddenRegion::new(spring, MARGIN)?;
         let mut query = Query::<I, MAX_STACK>::new(tree)?;
         let mut held = |before: &Tick, tick: &Tick| -> Result<(f32, bool)> {
             let rows = link.frame(tick.epoch).context("a frame that was never sent")?;
+            let rows = scene.vertices(&rows);
             let (was, tool) = (tool(before)?, tool(tick)?);
-            let found = query.closest(rows.as_slice(), &tool, &Options::new())?;
+            let found = query.closest(&*rows, &tool, &Options::new())?;
             let (start, end) = (tool.start() - was.start(), tool.end() - was.end());
             let velocity = start.lerp(end, found.axis_parameter) * TICK_RATE as f32;
             let margin = tick.margin + tick.position_error;

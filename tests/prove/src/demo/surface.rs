@@ -1,4 +1,4 @@
-//! The surface that a tick was asked on, on its way from one frame to the next.
+//! The rows of the surface that a tick was asked on, on its way from one frame to the next.
 
 use anyhow::{Context, Result};
 use controller::telemetry::Tick;
@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use super::sender::Link;
 
-/// The vertices' positions at a tick, with the sums of `dibs_nostd::SurfaceBlend`.
-pub fn positions(link: &Link, tick: &Tick) -> Result<Vec<Vec3>> {
+/// The rows of the vertex table, or the nodes, at a tick, with the sums of `dibs_nostd::SurfaceBlend`.
+pub fn rows(link: &Link, tick: &Tick) -> Result<Vec<Vec3>> {
     let frame = |epoch| {
         link.frame(epoch)
             .with_context(|| format!("tick {} used frame {epoch}, never sent", tick.tick))
