@@ -4,7 +4,7 @@ use super::{MotionReading, MovingTable, Odometer};
 use crate::VertexTable;
 
 /// Tests of a whole query for each root of the surface's vertices: 5,000 to 500,000 triangles take four to six
-/// (docs/evidence/benchmarks.md).
+/// (the repository's `docs/evidence/benchmarks.md`).
 const TESTS: usize = 5;
 
 /// Rows measured in the time of a test.
