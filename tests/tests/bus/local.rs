@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
+use std::time::Instant;
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::failsafe::State;
@@ -222,6 +223,11 @@ fn a_solver_s_thread_feeds_the_control_loop() {
                     thread::yield_now();
                 }
                 frames.fetch_add(1, Ordering::AcqRel);
+                // On a busy computer the solver would else be done before the control loop has begun.
+                let (seen, start) = (clock.load(Ordering::Acquire) + 2, Instant::now());
+                while clock.load(Ordering::Acquire) < seen && start.elapsed().as_secs() < 5 {
+                    thread::yield_now();
+                }
             }
         });
         let tool = Sphere::new(Vec3::new(78.0, 0.0, 10.0), 2.0).expect("valid");
