@@ -1,4 +1,4 @@
-//! The loop of bus and guard in C: the same bits as in Rust, its misuses, and the README's loop.
+//! The loop of bus and guard in C: the same bits as in Rust, and its misuses.
 
 use std::fmt::Write;
 use std::fs;
@@ -483,20 +483,4 @@ fn misuse_of_the_loop_is_a_code() {
     let files = tree_and_stream(folder.path());
     let said = run(Command::new(compile("misuse_loop", folder.path())).args(files));
     assert!(said.contains(" checks, 0 failures"), "{said}");
-}
-
-/// The README's programs compile, one after the other, without a warning.
-#[test]
-fn the_readme_compiles() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
-    let readme = fs::read_to_string(readme).expect("the README");
-    let blocks = readme.split("```c\n").skip(1).filter_map(|block| block.split("```").next());
-    let blocks: Vec<_> = blocks.collect();
-    assert!(blocks.len() >= 3, "{} programs", blocks.len());
-    let source = folder.path().join("readme.c");
-    fs::write(&source, blocks.concat()).expect("writable");
-    let mut gcc = tool("gcc", "gcc");
-    gcc.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-I"]).arg(include());
-    run(gcc.arg(source));
 }

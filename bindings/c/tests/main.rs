@@ -9,6 +9,7 @@ mod layers;
 mod misuse;
 mod nodes;
 mod programs;
+mod readme;
 mod script;
 mod sender;
 mod wrapper;

@@ -3,6 +3,7 @@
 mod interrupt;
 mod key;
 mod live;
+mod memory;
 mod parse;
 mod player;
 mod report;
@@ -19,9 +20,11 @@ use dibs_stream::transport::Target;
 use dibs_stream::{Sender, Settings, SurfaceOrder};
 use interrupt::Interrupt;
 use live::Live;
+use memory::Memory;
 use parse::{Format, Parser};
 use player::Player;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 #[derive(clap::Args)]
 #[command(mut_arg("motion", |motion| motion.required_unless_present_any(["from", "unnamed_motion"]).conflicts_with("from")))]
@@ -36,6 +39,11 @@ Examples:
   dibs stream heart.dibs --motion heart.pc2 --to udp:192.168.1.20:5000@5001 --key heart.key --receiver 3
   solver | dibs stream heart.dibs --from - --to udp:192.168.1.20:5000
   solver | dibs stream heart.dibs --from - --format json --unit m --to udp:192.168.1.20:5000
+  dibs stream heart.dibs --from shm:heart --to udp:192.168.1.20:5000
+
+Frames of --from shm:NAME are raw in memory of that name, /dev/shm/NAME, after 16 bytes: a sequence number (u64), the number of
+positions (u32), 0 (u32). The number is 0 at first; the program that writes adds 1 before a frame and 1 after it, with
+release order, and removes the memory at the end.
 
 Frames of --from are positions of the mesh's vertices in its own order, or of a tree's nodes. `raw` is x, y and z of each
 as little-endian f32, and nothing else. `json` is a frame a line, [[X, Y, Z], ...] or {\"positions\": [[X, Y, Z], ...],
@@ -51,9 +59,9 @@ pub struct Args {
     tree: PathBuf,
     #[command(flatten)]
     motion: MotionFile,
-    /// Frames as they come, from standard input (-), instead of a recorded motion
-    #[arg(long, value_name = "SOURCE", value_parser = ["-"], conflicts_with_all = ["weights", "repeat"])]
-    from: Option<String>,
+    /// Frames as they come, instead of a recorded motion: from standard input (-), or from shared memory (shm:NAME)
+    #[arg(long, value_name = "SOURCE", conflicts_with_all = ["weights", "repeat"])]
+    from: Option<LiveSource>,
     /// What the frames of --from are
     #[arg(long, value_enum, default_value_t = Format::Raw, conflicts_with_all = ["motion", "unnamed_motion"])]
     format: Format,
@@ -113,18 +121,34 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let source = match args.motion.given() {
         Some(motion) => recorded(args, motion, &order, origin)?,
-        None => {
-            let rate = args.motion_rate.given()?;
-            let parser =
-                Parser::new(args.format, args.lengths.unit(), origin, &order, std::io::stdin());
-            let frames = Frames::Live(Live::start(parser, rate.is_some()));
-            Source { name: parse::NAME.to_owned(), frames, rate }
-        }
+        None => live(args, args.motion_rate.given()?, &order, origin)?,
     };
     if args.mtu == "64" {
         connect::<64>(args, key, order, &source)
     } else {
         connect::<1024>(args, key, order, &source)
+    }
+}
+
+/// Where frames come from as they are made.
+#[derive(Clone)]
+enum LiveSource {
+    Input,
+    /// Shared memory by its name.
+    Memory(String),
+}
+
+impl FromStr for LiveSource {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.strip_prefix("shm:") {
+            Some(name) if !name.is_empty() && !name.contains('/') => {
+                Ok(Self::Memory(name.to_owned()))
+            }
+            None if text == "-" => Ok(Self::Input),
+            _ => Err("give - for standard input, or shm:NAME for shared memory".to_owned()),
+        }
     }
 }
 
@@ -144,6 +168,27 @@ enum Frames {
         weights: Option<Vec<Vec<f32>>>,
     },
     Live(Live),
+}
+
+/// Starts to read frames as they come.
+fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> Result<Source> {
+    let (unit, keeps_all) = (args.lengths.unit(), rate.is_some());
+    let (name, live) = match &args.from {
+        Some(LiveSource::Memory(memory)) => {
+            if args.format != Format::Raw {
+                bail!("--format: frames in shared memory are raw");
+            }
+            let (name, input) = (format!("shm:{memory}"), Memory::open(memory, order.positions())?);
+            let parser = Parser::new(name.clone(), Format::Raw, unit, origin, order, input);
+            (name, Live::start(parser, keeps_all))
+        }
+        _ => {
+            let (name, input) = ("standard input".to_owned(), std::io::stdin());
+            let parser = Parser::new(name.clone(), args.format, unit, origin, order, input);
+            (name, Live::start(parser, keeps_all))
+        }
+    };
+    Ok(Source { name, frames: Frames::Live(live), rate })
 }
 
 /// Reads a recorded motion, all of whose frames can be sent.

@@ -8,11 +8,8 @@ use serde::Deserialize;
 use std::io::{BufRead, BufReader, Read};
 use std::time::Duration;
 
-/// The stream's name in errors.
-pub const NAME: &str = "standard input";
-
 /// Bytes of a raw position.
-const RAW: usize = 12;
+pub const RAW: usize = 12;
 
 /// Most bytes of a position in JSON: three numbers of all their digits, and white space.
 const MOST_JSON: usize = 256;
@@ -28,6 +25,8 @@ pub enum Format {
 
 /// Reads one frame after the other.
 pub struct Parser<R> {
+    /// The stream's name in errors.
+    name: String,
     input: BufReader<R>,
     format: Format,
     unit: Option<Unit>,
@@ -60,6 +59,7 @@ struct Object {
 
 impl<R: Read> Parser<R> {
     pub fn new(
+        name: String,
         format: Format,
         unit: Option<Unit>,
         origin: DVec3,
@@ -67,20 +67,20 @@ impl<R: Read> Parser<R> {
         input: R,
     ) -> Self {
         let input = BufReader::with_capacity(1 << 18, input);
-        Self { input, format, unit, origin, order: order.clone(), number: 0 }
+        Self { name, input, format, unit, origin, order: order.clone(), number: 0 }
     }
 
     /// The next frame; `None` at the end.
     pub fn next(&mut self) -> Result<Option<Parsed>> {
-        let number = self.number;
+        let (number, name) = (self.number, self.name.clone());
         let read = match self.format {
             Format::Raw => self.raw(),
             Format::Json => self.json(),
         };
-        let in_frame = |error| anyhow!("{NAME}, frame {number}: {error}");
+        let in_frame = |error| anyhow!("{name}, frame {number}: {error}");
         let Some((positions, age)) = read.map_err(in_frame)? else {
             if number == 0 {
-                bail!("{NAME}: no frame came; does the program before the pipe run?");
+                bail!("{name}: no frame came; does the program that makes them run?");
             }
             return Ok(None);
         };
@@ -89,10 +89,10 @@ impl<R: Read> Parser<R> {
         let positions = Motion::frame_around(&positions, number, self.unit, self.origin);
         let positions = positions.map_err(|error| match error {
             ReadErrorKind::NonFinite { vertex, value } => anyhow!(
-                "{NAME}: {vertex} has the coordinate {value}, which is not a finite number: leave such frames out, and \
-                 check that --format is what the program before the pipe writes"
+                "{name}: {vertex} has the coordinate {value}, which is not a finite number: leave such frames out, and \
+                 check that --format is what the program writes"
             ),
-            error => anyhow!("{NAME}: {error}"),
+            error => anyhow!("{name}: {error}"),
         })?;
         self.order.to_rows(&positions).map_err(|error| in_frame(error.into()))?;
         Ok(Some(Parsed { positions, age }))

@@ -4,6 +4,8 @@
 //! One file, because all tests receive by the same helpers.
 
 mod live;
+#[cfg(target_os = "linux")]
+mod memory;
 mod receiver;
 
 use std::io::Read;
