@@ -176,7 +176,7 @@ impl FrameCheck {
         Ok(rows)
     }
 
-    /// The same in memory that is used again: what it held is gone.
+    /// As [`to_rows`](Self::to_rows), into a vector of the caller's, which is cleared first.
     ///
     /// # Errors
     /// As [`to_rows`](Self::to_rows).

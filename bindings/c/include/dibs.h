@@ -3,7 +3,8 @@
  * dibs: the closest point between a tool and a deforming mesh, on a microcontroller.
  *
  * Objects are made by an `_init` function in storage of the caller's: of the size that a constant states or more, aligned
- * to `DIBS_ALIGNMENT`, without an initial value, and kept, unmoved, for as long as the object is used. Nothing is allocated.
+ * to `DIBS_ALIGNMENT`, without an initial value, and kept, unmoved, for as long as the object is used. Nothing is
+ * allocated, but by `dibs_sender`.
  *
  * Calls return a `dibs_code`: `DIBS_CODE_OK`, an error of the call's own, or a misuse, which is one of the codes below 100.
  * After an error nothing is written to the places for results, unless a function says otherwise.
@@ -974,8 +975,9 @@ typedef struct dibs_scrub dibs_scrub;
 /**
  * Sends the frames of a moving surface to a controller, and takes the statuses that come back.
  *
- * In the library for a computer alone. Its calls wait for the line, and are no work for a control loop. A thread reads the
- * line. `dibs_sender_close` ends both: a sender has more than its storage.
+ * In the library for a computer alone. Its calls wait for the line, and are no work for a control loop. Unlike the other
+ * objects it allocates when it starts, and has a thread, which reads the line: `dibs_sender_close` ends both. Another
+ * `dibs_sender_init` in the storage without it leaves them until the program ends.
  */
 typedef struct dibs_sender dibs_sender;
 
@@ -1858,7 +1860,8 @@ typedef struct {
    */
   uint32_t heartbeat;
   /**
-   * Number of this run, later than that of every previous run. By default the time in tenths of a second.
+   * Number of this run: the receiver ignores a run whose number is below that of one before. By default the time in
+   * tenths of a second.
    */
   uint32_t session;
 } dibs_sender_settings;
@@ -2830,14 +2833,14 @@ dibs_code dibs_sender_init(void *storage,
                            dibs_sender **sender);
 
 /**
- * Sends a frame, with heartbeats in between when due. From the second whole frame on nothing is allocated.
+ * Sends a frame, with heartbeats in between when due. From the third whole frame on over UDP, this thread allocates nothing.
  *
  * @param sender     The sender.
  * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order; or of
  *                   each node that carries the surface.
  * @param count      Their number.
  * @param age        Time (ms) since the surface was so; or `DIBS_AGE_UNKNOWN`.
- * @param sent       Receives what was sent; or null.
+ * @param sent       Receives the frame's number and size; or null.
  * @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are no frame of the surface: nothing was sent;
  *         `DIBS_CODE_SENDER_LINE` where the connection broke: close the sender, and make another;
  *         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the whole

@@ -28,8 +28,9 @@ const MTU: usize = 1_024;
 
 /// Sends the frames of a moving surface to a controller, and takes the statuses that come back.
 ///
-/// In the library for a computer alone. Its calls wait for the line, and are no work for a control loop. A thread reads the
-/// line. `dibs_sender_close` ends both: a sender has more than its storage.
+/// In the library for a computer alone. Its calls wait for the line, and are no work for a control loop. Unlike the other
+/// objects it allocates when it starts, and has a thread, which reads the line: `dibs_sender_close` ends both. Another
+/// `dibs_sender_init` in the storage without it leaves them until the program ends.
 pub struct dibs_sender {
     sender: Sender<Line, MTU>,
     /// Positions of the frame in work, used again.
@@ -55,7 +56,8 @@ pub struct dibs_sender_settings {
     pub whole_every: u32,
     /// Time between two heartbeats, in ms; 0 sends none.
     pub heartbeat: u32,
-    /// Number of this run, later than that of every previous run. By default the time in tenths of a second.
+    /// Number of this run: the receiver ignores a run whose number is below that of one before. By default the time in
+    /// tenths of a second.
     pub session: u32,
 }
 
@@ -172,14 +174,14 @@ pub extern "C" fn dibs_sender_init(
     })
 }
 
-/// Sends a frame, with heartbeats in between when due. From the second whole frame on nothing is allocated.
+/// Sends a frame, with heartbeats in between when due. From the third whole frame on over UDP, this thread allocates nothing.
 ///
 /// @param sender     The sender.
 /// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order; or of
 ///                   each node that carries the surface.
 /// @param count      Their number.
 /// @param age        Time (ms) since the surface was so; or `DIBS_AGE_UNKNOWN`.
-/// @param sent       Receives what was sent; or null.
+/// @param sent       Receives the frame's number and size; or null.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are no frame of the surface: nothing was sent;
 ///         `DIBS_CODE_SENDER_LINE` where the connection broke: close the sender, and make another;
 ///         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the whole

@@ -11,7 +11,7 @@ use fastrand::Rng;
 use crate::programs::{include, library, run, tool};
 
 /// Every frame arrives in the order of the tree's rows from a mesh whose file has another order and a vertex of no
-/// triangle; nothing is allocated for one; and what cannot be sent is refused with a sentence.
+/// triangle; the sending thread allocates nothing from the third frame on; and what cannot be sent is refused with a sentence.
 #[test]
 fn frames_go_from_c_to_a_bus() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -58,13 +58,13 @@ pub(crate) fn least_stretch_limit(nodes: &Nodes<'_>) -> f32 {
     let limit = |element| {
         let corners = nodes.element(element)?.map(|node| nodes.rest_position(node));
         let [a, b, c, d] = corners.map(|corner| corner.map(Vec3::as_dvec3));
-        // As the controller compares it, less what was taken off for rounding.
+        // The core's limit is lower by the margin for its rounding: undone, to show the limit that the builder was given.
         let scale = 1.0 + MARGIN / openness(edges([a?, b?, c?, d?]));
         Some(f64::from(nodes.element_limit(element)?) * scale.sqrt())
     };
     let tree = nodes.stretch_limit();
     let least = (0..nodes.element_count()).filter_map(limit).fold(f64::INFINITY, f64::min);
-    // Six digits, of which none is that of a sum in f32.
+    // Rounded to what f32 is certain of: the two computations differ in the last digits.
     let least = ((least * 1e5).round() / 1e5) as f32;
     if least < tree * (1.0 - 1e-5) { least } else { tree }
 }

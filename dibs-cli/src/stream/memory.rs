@@ -1,7 +1,7 @@
 //! Frames in memory that another program shares.
 //!
 //! The memory is little-endian: a sequence number (u64), the number of positions (u32), 0 (u32), and x, y and z of each
-//! position (f32). The number is 0 before the first frame, odd while one is written, and even once it is whole.
+//! position (f32). The number is 0 while there is no frame, odd while one is written, and even once it is whole.
 
 use super::parse::RAW;
 use anyhow::{Context, Result, bail};
@@ -89,6 +89,10 @@ impl Memory {
     fn wait(&mut self) -> io::Result<bool> {
         loop {
             let before = self.now()?;
+            if before == 0 {
+                // A writer that starts over in the same memory counts from here.
+                self.sequence = 0;
+            }
             if before != self.sequence && before.is_multiple_of(2) {
                 let mut bytes = std::mem::take(&mut self.bytes);
                 let read = self.read_at(&mut bytes, HEADER);

@@ -42,8 +42,8 @@ Examples:
   dibs stream heart.dibs --from shm:heart --to udp:192.168.1.20:5000
 
 Frames of --from shm:NAME are raw in memory of that name, /dev/shm/NAME, after 16 bytes: a sequence number (u64), the number of
-positions (u32), 0 (u32). The number is 0 at first; the program that writes adds 1 before a frame and 1 after it, with
-release order, and removes the memory at the end.
+positions (u32), 0 (u32). The number is 0 while there is no frame; the program that writes adds 1 before a frame and 1 after
+it, with release order, and removes the memory at the end.
 
 Frames of --from are positions of the mesh's vertices in its own order, or of a tree's nodes. `raw` is x, y and z of each
 as little-endian f32, and nothing else. `json` is a frame a line, [[X, Y, Z], ...] or {\"positions\": [[X, Y, Z], ...],

@@ -145,14 +145,15 @@ impl<'a> Nodes<'a> {
         self.mesh_id
     }
 
-    /// The tree's stretch limit: that of its elements, or the largest where [each has its own](Self::element_limit).
+    /// The tree's stretch limit: the largest that an [element](Self::element_limit) has.
     #[must_use]
     pub const fn stretch_limit(&self) -> f32 {
         self.limit
     }
 
-    /// The stretch beyond which frames are refused for an element; `None` outside the table. It is below the builder's limit
-    /// by what the check may round: a few parts in a million, and up to 1.6 % for a flat element.
+    /// The stretch beyond which frames are refused for an element; `None` for a number that is no element's. Below the limit
+    /// that the builder was given, so that the check's rounding admits nothing beyond it: by a few parts in a million, and by
+    /// up to 1.6 % for a flat element.
     ///
     /// Cost: one element's check and a root.
     #[must_use]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::net::{TcpListener, UdpSocket};
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::Child;
 use std::thread;
 use std::time::Duration;
 
@@ -13,23 +13,14 @@ use dibs_build::glam::Vec3;
 use dibs_nostd::wire::{Body, NoMac, Packet};
 
 use super::receiver::{Bytes, receive};
-use super::{FRAMES, N, assert_all, heart, program, totals};
+use super::{FRAMES, N, assert_all, heart, program, raw, spawn, totals};
 
 fn live(folder: &Path, line: &str) -> Child {
-    program(folder, &format!("stream heart.dibs --from - --json {line}"))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
+    spawn(folder, &format!("--from - {line}"))
 }
 
 fn motion(folder: &Path) -> Vec<Vec<Vec3>> {
     Motion::read_pc2(folder.join("heart.pc2")).unwrap().frames
-}
-
-fn raw(frame: &[Vec3]) -> Vec<u8> {
-    frame.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect()
 }
 
 /// Lengths in metres: f64 numbers, which f32 ones are as millimetres.

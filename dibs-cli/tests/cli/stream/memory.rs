@@ -3,8 +3,7 @@
 use std::fs::{self, File};
 use std::net::TcpListener;
 use std::os::unix::fs::FileExt;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
+use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
 
@@ -13,7 +12,7 @@ use dibs_build::glam::Vec3;
 use dibs_nostd::wire::NoMac;
 
 use super::receiver::{Bytes, receive};
-use super::{N, assert_all, heart, program, totals};
+use super::{N, assert_all, heart, raw, spawn, totals};
 
 /// Shared memory that is removed with this.
 struct Memory {
@@ -37,14 +36,17 @@ impl Memory {
     }
 
     fn step(&mut self) {
-        self.sequence += 1;
+        self.count_from(self.sequence + 1);
+    }
+
+    fn count_from(&mut self, sequence: u64) {
+        self.sequence = sequence;
         self.file.write_all_at(&self.sequence.to_le_bytes(), 0).unwrap();
     }
 
     /// Writes a frame in two halves, with time between them for a reader that does not wait.
     fn write(&mut self, frame: &[Vec3]) {
-        let bytes: Vec<u8> =
-            frame.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect();
+        let bytes = raw(frame);
         let (first, second) = bytes.split_at(bytes.len() / 2);
         self.step();
         self.file.write_all_at(first, 16).unwrap();
@@ -60,15 +62,8 @@ impl Drop for Memory {
     }
 }
 
-fn live(folder: &Path, line: &str) -> Child {
-    program(folder, &format!("stream heart.dibs --json {line}"))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
-}
-
-/// Every frame arrives, to the bit, and none that was half written; the stream ends where the memory is removed.
+/// Every frame arrives, to the bit, and none that was half written, from a writer that starts over in between, too; the
+/// stream ends where the memory is removed.
 #[test]
 fn whole_frames_of_shared_memory_arrive() {
     let folder = heart();
@@ -78,11 +73,17 @@ fn whole_frames_of_shared_memory_arrive() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let to = listener.local_addr().unwrap();
     let line = format!("--from shm:{} --motion-rate 1000 --to tcp:{to}", memory.name());
-    let child = live(folder, &line);
+    let child = spawn(folder, &line);
     let (socket, _) = listener.accept().unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
     let writer = thread::spawn(move || {
-        for frame in &frames {
+        for (number, frame) in frames.iter().enumerate() {
+            if number == 1 {
+                // Half of another run's frame, and later the same number as that of the frame before.
+                memory.count_from(0);
+                memory.file.write_all_at(&raw(&frames[9])[..3_000], 16).unwrap();
+                thread::sleep(Duration::from_millis(60));
+            }
             memory.write(frame);
             thread::sleep(Duration::from_millis(60));
         }
@@ -108,13 +109,13 @@ fn memory_that_holds_no_frames_is_one_sentence() {
         ("dibs-nobody", 1, "start the program that writes frames there first"),
         ("a/b", 2, "give - for standard input, or shm:NAME"),
     ] {
-        let child = live(folder, &format!("--from shm:{source} --to udp:127.0.0.1:9"));
+        let child = spawn(folder, &format!("--from shm:{source} --to udp:127.0.0.1:9"));
         let output = child.wait_with_output().unwrap();
         let error = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.code() == Some(code) && error.contains(part), "{source}: {error}");
     }
     let child =
-        live(folder, &format!("--from shm:{} --format json --to udp:127.0.0.1:9", few.name()));
+        spawn(folder, &format!("--from shm:{} --format json --to udp:127.0.0.1:9", few.name()));
     let error = String::from_utf8(child.wait_with_output().unwrap().stderr).unwrap();
     assert!(error.contains("frames in shared memory are raw"), "{error}");
 }

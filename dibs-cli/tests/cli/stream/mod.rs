@@ -14,6 +14,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use dibs_build::glam::Vec3;
 use dibs_nostd::wire::{AesCmac, Event, Mac, NoMac, encode_status};
 use dibs_nostd::{Assembler, Frames, Millis, Tree};
 use serde_json::Value;
@@ -45,12 +46,19 @@ fn heart() -> tempfile::TempDir {
     folder
 }
 
+/// `dibs stream` of the heart, whose input and output are the test's.
+fn spawn(folder: &Path, line: &str) -> Child {
+    let mut command = program(folder, &format!("stream heart.dibs --json {line}"));
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
 fn stream(folder: &Path, line: &str) -> Child {
-    program(folder, &format!("stream heart.dibs --motion heart.pc2 --json {line}"))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
+    spawn(folder, &format!("--motion heart.pc2 {line}"))
+}
+
+fn raw(frame: &[Vec3]) -> Vec<u8> {
+    frame.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes).collect()
 }
 
 /// The totals that the program printed.
