@@ -82,8 +82,11 @@ fn closest_from_origin(end: DVec3, corners: [DVec3; 3]) -> ClosestPair {
         (c, &[a - c]),
         (a, &[b - a, c - a]),
     ];
+    let all = [(DVec3::ZERO, None), (end, None), (DVec3::ZERO, Some(end))];
+    // All three faces of a segment of length zero are its one point.
+    let points = if end == DVec3::ZERO { &all[..1] } else { &all[..] };
     for (origin, spans) in faces {
-        for (point, span) in [(DVec3::ZERO, None), (end, None), (DVec3::ZERO, Some(end))] {
+        for &(point, span) in points {
             let mut columns = [DVec3::ZERO; 3];
             columns[..spans.len()].copy_from_slice(spans);
             columns[2] = -span.unwrap_or_default();
@@ -150,10 +153,34 @@ fn point_distance(start: DVec3, end: DVec3, point: DVec3) -> f64 {
     (offset - span * along).length()
 }
 
+/// The least distance from the segment from `start` to `end` to any of the triangles; infinite for none.
+///
+/// A triangle is skipped only if its first corner is farther away than the nearest so far by more than the triangle's extent
+/// from that corner.
+pub fn least_distance(
+    start: DVec3,
+    end: DVec3,
+    triangles: impl IntoIterator<Item = [DVec3; 3]>,
+) -> f64 {
+    let mut least = f64::INFINITY;
+    for corners in triangles {
+        if !is_beyond(least, point_distance(start, end, corners[0]), corners) {
+            least = least.min(closest_pair(start, end, corners).distance);
+        }
+    }
+    least
+}
+
+/// Whether no point of a triangle is as near as `least`, by the distance of its first corner.
+fn is_beyond(least: f64, first: f64, [a, b, c]: [DVec3; 3]) -> bool {
+    let reach = a.distance(b).max(a.distance(c));
+    // The margin covers the rounding of this line.
+    first - reach > least + 1e-9 * (first + reach)
+}
+
 /// The closest pair of a tool and a surface, over all its triangles; `None` for no triangles.
 ///
-/// Exhaustive in effect: a triangle is skipped only if its first corner is farther away than the best pair by more than
-/// the triangle's extent from that corner.
+/// Exhaustive in effect: triangles are skipped as by [`least_distance`].
 ///
 /// # Panics
 /// If a triangle names a vertex that does not exist.
@@ -171,13 +198,11 @@ pub fn exhaustive(
     let mut nearest = first.iter().copied().fold(f64::INFINITY, f64::min);
     let mut best: Option<OraclePair> = None;
     for (number, triangle) in triangles.iter().enumerate() {
-        let [a, b, c] = corners(triangle);
-        let reach = a.distance(b).max(a.distance(c));
-        // The margin covers the rounding of this line.
-        if first[number] - reach > nearest + 1e-9 * (first[number] + reach) {
+        let corners = corners(triangle);
+        if is_beyond(nearest, first[number], corners) {
             continue;
         }
-        let pair = closest_pair(start, end, [a, b, c]);
+        let pair = closest_pair(start, end, corners);
         nearest = nearest.min(pair.distance);
         if best.is_none_or(|b| pair.distance < b.axis_distance) {
             best = Some(OraclePair {

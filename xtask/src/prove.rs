@@ -26,7 +26,9 @@ fn command(package: &str) -> Command {
 /// The program, built together with everything else.
 pub fn with_workspace() -> Result<Command> {
     workspace::build()?;
-    Ok(Command::new(workspace::target().join("release/prove")))
+    let mut prove = Command::new(workspace::target().join("release/prove"));
+    prove.envs([workspace::IS_BUILT]);
+    Ok(prove)
 }
 
 /// Runs a task of the program.

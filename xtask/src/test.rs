@@ -22,7 +22,7 @@ pub struct Options {
     /// Seconds of the controller's time in the demo.
     #[arg(long, default_value_t = 5)]
     pub demo_seconds: u32,
-    /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the viewer's query in
+    /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the viewer's and its query in
     /// WebAssembly, the paper's experiments in small, a filter, an embedded organ, modal ticks and a flood on the board,
     /// other processors, the sanitizers, the fuzzers, and all cases of tests that else try a quarter.
     #[arg(long)]
@@ -69,7 +69,8 @@ pub fn test(options: &Options) -> Result<()> {
     if is_due(Job::Host) {
         // This also runs the examples in the documentation.
         let tests = ["test", "--release", "--no-fail-fast"];
-        let variables: &[_] = if is_whole { &[("DIBS_WHOLE", "1")] } else { &[] };
+        let variables = [workspace::IS_BUILT, ("DIBS_WHOLE", "1")];
+        let variables = if is_whole { &variables[..] } else { &variables[..1] };
         steps.cargo("tests", &[&tests, bench_too(is_whole)].concat(), variables);
         steps.run("files of other programs", other_programs);
     }

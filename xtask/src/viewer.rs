@@ -56,7 +56,7 @@ pub fn viewer(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// The session compiles for WebAssembly: CI's sample of the viewer, whose tests on this computer are among the others.
+/// The session compiles for WebAssembly: CI's sample of the viewer, whose tests are on request.
 pub fn compiles() -> Result<Outcome> {
     if let Err(error) = add_target() {
         return Ok(Outcome::Skipped(format!("{error:#}")));

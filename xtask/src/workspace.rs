@@ -26,6 +26,17 @@ fn root_above(start: &Path) -> Option<&Path> {
     start.ancestors().find(|folder| holds(folder, "xtask") && holds(folder, "dibs-nostd"))
 }
 
+/// The variable that tells tests and checks that [`build`] has run: they take what it made, in release.
+const BUILT: &str = "DIBS_BUILT";
+
+/// For the processes that run after [`build`].
+pub const IS_BUILT: (&str, &str) = (BUILT, "1");
+
+/// Whether [`build`] has run.
+pub fn is_built() -> bool {
+    env::var_os(BUILT).is_some()
+}
+
 /// Builds every program and library, as the tests do: alone, each would compile its dependencies anew, with fewer
 /// features.
 ///

@@ -11,7 +11,7 @@ use glam::{DQuat, DVec3, Vec3};
 
 use super::{Asked, Course, Listener, Scene, Settings};
 use crate::deform::unit;
-use crate::oracle::closest_pair;
+use crate::oracle::least_distance;
 
 /// Times of a tick at which the truth is computed.
 const INSTANTS: u32 = 5;
@@ -141,24 +141,8 @@ impl Truth<'_> {
         let mut least = f64::INFINITY;
         for (axis, radius) in axes.iter().zip(self.radii) {
             let [start, end] = axis.map(place);
-            for triangle in &self.scene.triangles {
-                let [a, b, c] = triangle.map(|v| rows[v as usize]);
-                // A triangle whose ball is farther cannot be nearest.
-                let middle = (a + b + c) / 3.0;
-                let reach = middle.distance(a).max(middle.distance(b)).max(middle.distance(c));
-                let span = end - start;
-                let length = span.length_squared();
-                let along = if length > 0.0 {
-                    ((middle - start).dot(span) / length).clamp(0.0, 1.0)
-                } else {
-                    0.0
-                };
-                let far = (start + span * along).distance(middle) - reach - f64::from(radius);
-                if far < least {
-                    let apart = closest_pair(start, end, [a, b, c]).distance - f64::from(radius);
-                    least = least.min(apart);
-                }
-            }
+            let triangles = self.scene.triangles.iter().map(|t| t.map(|v| rows[v as usize]));
+            least = least.min(least_distance(start, end, triangles) - f64::from(radius));
         }
         least
     }

@@ -8,7 +8,7 @@ use dibs_nostd::{
     Capsule, Contact, Contacts, NoSide, Odometer, Options, Query, Side, Tracker, TriangleRow,
 };
 use dibs_tests::deform::unit;
-use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};
+use dibs_tests::oracle::{Instrument, exhaustive, least_distance};
 use dibs_tests::sides::winding_number;
 use dibs_tests::surfaces::{self, ball, cuboid};
 use fastrand::Rng;
@@ -117,10 +117,9 @@ fn a_part_keeps_its_margin_beside_a_tool_at_the_surface() {
         let tree = built.tree::<u16>().expect("16-bit indices");
         let of_part = (0..).zip(surfaces::triangles(&tree)).filter_map(|(row, corners)| {
             let corners = corners.map(|row| rows[row as usize].as_dvec3());
-            let distance = || closest_pair(from, to, corners).distance;
-            (tree.label(TriangleRow(row)) == Some(PART)).then(distance)
+            (tree.label(TriangleRow(row)) == Some(PART)).then_some(corners)
         });
-        let truth = of_part.fold(f64::INFINITY, f64::min) - f64::from(RADIUS);
+        let truth = least_distance(from, to, of_part) - f64::from(RADIUS);
         if truth > f64::from(MARGIN) - 1e-2 {
             return;
         }

@@ -5,7 +5,7 @@ use dibs_nostd::constraint::VelocityRow;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Contacts, Options, Query, Side, measure_stretch};
 use dibs_tests::deform::unit;
-use dibs_tests::oracle::closest_pair;
+use dibs_tests::oracle::{closest_pair, least_distance};
 use dibs_tests::sample;
 use dibs_tests::side_poses::bent;
 use dibs_tests::sides::winding_number;
@@ -130,8 +130,7 @@ fn share(at: usize, of: usize) -> f64 {
 }
 
 fn distance(point: DVec3, corners: &[[DVec3; 3]]) -> f64 {
-    let distances = corners.iter().map(|&corners| closest_pair(point, point, corners).distance);
-    distances.fold(f64::INFINITY, f64::min)
+    least_distance(point, point, corners.iter().copied())
 }
 
 /// The largest value within `reach` of a parameter, and where: the best of a grid, then by thirds.

@@ -9,7 +9,7 @@ use dibs_nostd::{
     Tracker, measure_stretch,
 };
 use dibs_tests::deform::unit;
-use dibs_tests::oracle::{Instrument, closest_pair};
+use dibs_tests::oracle::{Instrument, least_distance};
 use dibs_tests::surfaces;
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
@@ -60,11 +60,8 @@ impl Way<'_> {
         let at =
             |row: u32| between(self.frames[0][row as usize], self.frames[1][row as usize], share);
         let rows: Vec<DVec3> = (0..self.frames[0].len() as u32).map(at).collect();
-        let distances = self
-            .triangles
-            .iter()
-            .map(|corners| closest_pair(start, end, corners.map(|v| rows[v as usize])).distance);
-        distances.fold(f64::INFINITY, f64::min) - f64::from(RADIUS)
+        let triangles = self.triangles.iter().map(|corners| corners.map(|v| rows[v as usize]));
+        least_distance(start, end, triangles) - f64::from(RADIUS)
     }
 
     fn sweep(

@@ -11,7 +11,7 @@ use dibs_nostd::{
     TriangleRow,
 };
 use dibs_tests::deform::unit;
-use dibs_tests::oracle::closest_pair;
+use dibs_tests::oracle::{closest_pair, least_distance};
 use dibs_tests::surfaces::{self, ball};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
@@ -406,13 +406,11 @@ fn a_label_keeps_its_margin_beside_a_nearer_part() {
                 continue;
             }
             tracker.contacts(&surface, &tool, WIDE, &options, &mut own).expect("an answer");
-            let distance = |(row, corners): (usize, &[u32; 3])| {
-                let is_part = tree.label(TriangleRow(row as u32)) == Some(ARTERY);
-                let corners = corners.map(|row| rows[row as usize].as_dvec3());
-                let distance = || closest_pair(at.as_dvec3(), at.as_dvec3(), corners).distance;
-                if is_part { distance() } else { f64::INFINITY }
-            };
-            let least = triangles.iter().enumerate().map(distance).fold(f64::INFINITY, f64::min);
+            let of_part = (0..).zip(&triangles).filter_map(|(row, corners)| {
+                let is_part = tree.label(TriangleRow(row)) == Some(ARTERY);
+                is_part.then(|| corners.map(|row| rows[row as usize].as_dvec3()))
+            });
+            let least = least_distance(at.as_dvec3(), at.as_dvec3(), of_part);
             let least = (least - f64::from(RADIUS)) as f32;
             checked += 1;
             for found in [&list, &own] {

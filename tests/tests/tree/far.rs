@@ -7,7 +7,7 @@ use dibs_build::{
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Options, Query, Sphere};
 use dibs_tests::deform::unit;
-use dibs_tests::oracle::closest_pair;
+use dibs_tests::oracle::least_distance;
 use dibs_tests::surfaces::ball;
 use fastrand::Rng;
 use tempfile::TempDir;
@@ -55,11 +55,8 @@ fn worst_answer(import: &Import, exact: &[DVec3]) -> (f64, f64) {
         let tool = Sphere::new(local, 0.5).unwrap();
         let options = Options::cold().unsigned();
         let found = query.closest(rows.as_slice(), &tool, &options).unwrap();
-        let distance = |t: &[u32; 3]| {
-            let corners = t.map(|v| exact[v as usize]);
-            closest_pair(centre, centre, corners).distance
-        };
-        let truth = import.mesh.triangles.iter().map(distance).fold(f64::INFINITY, f64::min);
+        let triangles = import.mesh.triangles.iter().map(|t| t.map(|v| exact[v as usize]));
+        let truth = least_distance(centre, centre, triangles);
         let error = (f64::from(found.separation) - (truth - 0.5)).abs();
         worst = worst.max(error / f64::from(found.accuracy));
         accuracy = accuracy.max(found.accuracy.into());

@@ -235,6 +235,9 @@ impl Build {
 
     /// Builds the program.
     fn program(self) -> Result<PathBuf> {
+        if matches!(self, Self::Release) && workspace::is_built() {
+            return Ok(workspace::target().join("release/answer"));
+        }
         let target = match self {
             Self::Native => workspace::target().join("native"),
             Self::Debug | Self::Release => workspace::target(),
