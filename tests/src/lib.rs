@@ -39,7 +39,13 @@ pub mod wanderer;
 /// A sample of the cases of a slow test: a quarter. All of them where `DIBS_WHOLE` is set, as by `cargo xtask test --whole`.
 #[must_use]
 pub fn sample(whole: usize) -> usize {
-    if std::env::var_os("DIBS_WHOLE").is_some() { whole } else { whole.div_ceil(4) }
+    if is_whole() { whole } else { whole.div_ceil(4) }
+}
+
+/// Whether the slow tests try all their cases.
+#[must_use]
+pub fn is_whole() -> bool {
+    std::env::var_os("DIBS_WHOLE").is_some()
 }
 
 /// The README's code: it compiles, and its control loop runs.

@@ -4,6 +4,7 @@ use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Contact, Contacts, Options, Query, Side, Sphere, Tool, TriangleRow};
 use dibs_tests::deform::unit;
+use dibs_tests::sample;
 use dibs_tests::surfaces::sheet;
 use fastrand::Rng;
 use glam::Vec3;
@@ -12,7 +13,7 @@ use glam::Vec3;
 const ALIKE: f32 = 0.14;
 
 /// Poses a mesh and a number of places.
-const POSES: u32 = 12_000;
+const POSES: usize = 12_000;
 
 /// The vertices next to each, by rows.
 fn neighbours(corners: impl Iterator<Item = [u32; 3]>, vertices: usize) -> Vec<Vec<u32>> {
@@ -35,7 +36,7 @@ fn missing<const NEAR: usize>(mesh: &Mesh, seed: u64) -> Vec<String> {
     let mut query = Query::<u16, MAX_STACK>::new(&tree).unwrap();
     let (mut all, mut few) = (Contacts::<128, 4096>::new(), Contacts::<128, NEAR>::new());
     let (mut rng, mut bounds, mut missing) = (Rng::with_seed(seed), 0, Vec::new());
-    for pose in 0..POSES {
+    for pose in 0..sample(POSES) {
         let at = rows[rng.usize(..rows.len())] + unit(&mut rng) * 12.0 * rng.f32();
         let along = unit(&mut rng) * [0.0, 20.0, 60.0][rng.usize(..3)];
         let tool = Capsule::new(at, at + along, 1.0).unwrap();
