@@ -20,6 +20,10 @@ use crate::surface::VertexTable;
 use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
 use crate::tree::{Index, Tree, TriangleRow, format};
 
+/// Whether the processor has vector registers and loads unaligned words. Elsewhere four triangles at a time would take more
+/// instructions, not fewer.
+const WIDE: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
+
 /// Checks the triangles of `rows` up to the first with a corner at row `ready` or beyond. Raises `worst` where one is
 /// stretched more, and adds to `size` the square of an edge of each. Returns the next row to check.
 pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
@@ -30,21 +34,11 @@ pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     worst: &mut Worst,
     size: &mut f32,
 ) -> Result<u32, StretchError> {
-    match (tree.paths(), I::BYTES) {
-        (PathKind::Surface, 2) => {
-            run::<I, V, SingularValue, 6>(tree, surface, rows, ready, worst, size)
-        }
-        (PathKind::Surface, _) => {
-            run::<I, V, SingularValue, 12>(tree, surface, rows, ready, worst, size)
-        }
-        (PathKind::EdgePath, 2) => {
-            run::<I, V, LongestEdge, 6>(tree, surface, rows, ready, worst, size)
-        }
-        (PathKind::EdgePath, _) => {
-            run::<I, V, LongestEdge, 12>(tree, surface, rows, ready, worst, size)
-        }
+    match tree.paths() {
+        PathKind::Surface => run::<I, V, SingularValue>(tree, surface, rows, ready, worst, size),
+        PathKind::EdgePath => run::<I, V, LongestEdge>(tree, surface, rows, ready, worst, size),
         // Its elements are measured.
-        (PathKind::Volume, _) => Err(StretchError::NoMetric),
+        PathKind::Volume => Err(StretchError::NoMetric),
     }
 }
 
@@ -75,8 +69,8 @@ pub(super) fn look<I: Index, V: VertexTable + ?Sized>(
     true
 }
 
-/// [`scan`] for one measure and `CORNERS` bytes a triangle: [`measure`], then the reason if it stopped early.
-fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
+/// [`scan`] for one measure: [`measure`], then the reason if it stopped early.
+fn run<I: Index, V: VertexTable + ?Sized, M: Measure>(
     tree: &Tree<'_, I>,
     surface: &V,
     rows: Range<u32>,
@@ -84,13 +78,13 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     worst: &mut Worst,
     size: &mut f32,
 ) -> Result<u32, StretchError> {
-    let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
+    let triangles = I::corners(tree.sections().triangles);
     let bytes = tree.sections().metric;
-    // Aligned words take fewer instructions than bytes.
+    // Aligned words take fewer instructions than bytes, where the processor does not load unaligned ones as well.
     let row = match bytemuck::try_cast_slice::<u8, u32>(bytes) {
-        Ok(words) => {
+        Ok(words) if !WIDE => {
             let (metrics, _) = words.as_chunks();
-            run_on::<I, V, M, [u32; 3], CORNERS>(
+            run_on::<I, V, M, [u32; 3]>(
                 tree,
                 surface,
                 metrics,
@@ -101,9 +95,9 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
                 size,
             )
         }
-        Err(_) => {
+        _ => {
             let (metrics, _) = bytes.as_chunks();
-            run_on::<I, V, M, [u8; METRIC_BYTES], CORNERS>(
+            run_on::<I, V, M, [u8; METRIC_BYTES]>(
                 tree,
                 surface,
                 metrics,
@@ -130,11 +124,11 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure, const CORNERS: usize>(
     clippy::too_many_arguments,
     reason = "arguments stay in registers, fields of a struct do not"
 )]
-fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const CORNERS: usize>(
+fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits>(
     tree: &Tree<'_, I>,
     surface: &V,
     metrics: &[R],
-    triangles: &[[u8; CORNERS]],
+    triangles: &[I::Corners],
     rows: Range<u32>,
     ready: u32,
     worst: &mut Worst,
@@ -144,26 +138,17 @@ fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const CO
     let (metrics, triangles) = (metrics.get(range.clone())?, triangles.get(range)?);
     let limit = squared_limit(tree.stretch());
     let (first, largest, sum) = (rows.start, *worst, *size);
-    // Elsewhere it would take more instructions, not fewer.
-    if cfg!(any(target_arch = "x86_64", target_arch = "aarch64"))
-        && tree.sections().limits.is_empty()
-        && ready as usize >= surface.len()
-    {
+    if WIDE && tree.sections().limits.is_empty() && ready as usize >= surface.len() {
         let row;
-        (row, *worst, *size) = wide::measure::<I, V, M, R, CORNERS>(
-            surface, metrics, triangles, limit, first, largest, sum,
-        );
+        (row, *worst, *size) =
+            wide::measure::<I, V, M, R>(surface, metrics, triangles, limit, first, largest, sum);
         return Some(row);
     }
     let row;
     (row, *worst, *size) = if tree.sections().limits.is_empty() {
-        measure::<I, V, M, R, CORNERS, true>(
-            surface, metrics, triangles, ready, limit, first, largest, sum,
-        )
+        measure::<I, V, M, R, true>(surface, metrics, triangles, ready, limit, first, largest, sum)
     } else {
-        measure::<I, V, M, R, CORNERS, false>(
-            surface, metrics, triangles, ready, limit, first, largest, sum,
-        )
+        measure::<I, V, M, R, false>(surface, metrics, triangles, ready, limit, first, largest, sum)
     };
     Some(row)
 }
@@ -210,17 +195,10 @@ struct Before {
     clippy::too_many_arguments,
     reason = "arguments stay in registers, fields of a struct do not"
 )]
-fn measure<
-    I: Index,
-    V: VertexTable + ?Sized,
-    M: Measure,
-    R: MetricBits,
-    const CORNERS: usize,
-    const UNIFORM: bool,
->(
+fn measure<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const UNIFORM: bool>(
     surface: &V,
     metrics: &[R],
-    triangles: &[[u8; CORNERS]],
+    triangles: &[I::Corners],
     ready: u32,
     limit: f32,
     first: u32,
@@ -235,25 +213,24 @@ fn measure<
     let (Some(metric), Some(corners)) = (metrics.first(), triangles.first()) else {
         return (row, worst, size);
     };
-    let Some(mut before) = table.before::<I, CORNERS>(metric, corners, worst.squared) else {
+    let Some(mut before) = table.before::<I>(metric, corners, worst.squared) else {
         return (row, worst, size);
     };
     // Two at a time, which saves moves of the state between them.
     let (pairs, last_metric) = metrics.as_chunks::<2>();
     let (pairs_of_corners, last_corners) = triangles.as_chunks::<2>();
     for ([m0, m1], [t0, t1]) in pairs.iter().zip(pairs_of_corners) {
-        let next = table.next::<I, M, CORNERS, UNIFORM>(before, m0, t0, row, &mut worst);
+        let next = table.next::<I, M, UNIFORM>(before, m0, t0, row, &mut worst);
         let Some(next) = next else { return (row, worst, size) };
         size += next.square;
-        let next =
-            table.next::<I, M, CORNERS, UNIFORM>(next, m1, t1, row.wrapping_add(1), &mut worst);
+        let next = table.next::<I, M, UNIFORM>(next, m1, t1, row.wrapping_add(1), &mut worst);
         let Some(next) = next else { return (row.wrapping_add(1), worst, size) };
         size += next.square;
         before = next;
         row = row.wrapping_add(2);
     }
     for (metric, corners) in last_metric.iter().zip(last_corners) {
-        let next = table.next::<I, M, CORNERS, UNIFORM>(before, metric, corners, row, &mut worst);
+        let next = table.next::<I, M, UNIFORM>(before, metric, corners, row, &mut worst);
         let Some(next) = next else { break };
         size += next.square;
         before = next;
@@ -272,15 +249,14 @@ struct Table<'a, V: ?Sized> {
 impl<V: VertexTable + ?Sized> Table<'_, V> {
     /// The state before the first triangle of a run, from that triangle's first two corners.
     #[inline(always)]
-    fn before<I: Index, const CORNERS: usize>(
+    fn before<I: Index>(
         &self,
         metric: &impl MetricBits,
-        corners: &[u8; CORNERS],
+        corners: &I::Corners,
         largest: f32,
     ) -> Option<Before> {
         let metric = Metric::new(metric.bits().map(f32::from_bits));
-        let (a, b) =
-            (self.corner::<I, CORNERS>(corners, 0)?, self.corner::<I, CORNERS>(corners, 1)?);
+        let (a, b) = (self.corner::<I>(corners, 0)?, self.corner::<I>(corners, 1)?);
         let [centre, other, _] = metric.centre_first([a, b, b]);
         let edge = if metric.join == Join::Flip { centre - other } else { other - centre };
         let [rest, ..] = metric.squares;
@@ -292,19 +268,18 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
 
     /// Measures one triangle.
     #[inline(always)]
-    fn next<I: Index, M: Measure, const CORNERS: usize, const UNIFORM: bool>(
+    fn next<I: Index, M: Measure, const UNIFORM: bool>(
         &self,
         before: Before,
         metric: &impl MetricBits,
-        corners: &[u8; CORNERS],
+        corners: &I::Corners,
         row: u32,
         worst: &mut Worst,
     ) -> Option<Before> {
-        match self.pass::<I, M, CORNERS, UNIFORM>(before, metric, corners, worst.squared) {
+        match self.pass::<I, M, UNIFORM>(before, metric, corners, worst.squared) {
             Some(next) => Some(next),
             None => {
-                let (next, raised) =
-                    self.look_closer::<I, M, CORNERS>(metric, corners, row, *worst)?;
+                let (next, raised) = self.look_closer::<I, M>(metric, corners, row, *worst)?;
                 *worst = raised;
                 Some(next)
             }
@@ -314,11 +289,11 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     /// Checks that a triangle is certainly not stretched beyond `sqrt(largest)`. Rare cases fall through to
     /// `look_closer`.
     #[inline(always)]
-    fn pass<I: Index, M: Measure, const CORNERS: usize, const UNIFORM: bool>(
+    fn pass<I: Index, M: Measure, const UNIFORM: bool>(
         &self,
         before: Before,
         metric: &impl MetricBits,
-        corners: &[u8; CORNERS],
+        corners: &I::Corners,
         largest: f32,
     ) -> Option<Before> {
         let Before { mut centre, third, edge: mut first, mut left, .. } = before;
@@ -327,7 +302,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         // The marks of `Join`, the commonest first: written out, since a match would make an enum of them.
         if mark as i32 >= 0 {
             if mark & 1 == 0 {
-                let [a, b] = self.first_two::<I, CORNERS>(corners)?;
+                let [a, b] = self.first_two::<I>(corners)?;
                 (centre, first) = (a, b - a);
                 left = largest * f32::from_bits(mark) - first.length_squared();
                 if !(left > 0.0) {
@@ -347,7 +322,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
                 return None;
             }
         }
-        let third = self.corner::<I, CORNERS>(corners, 2)?;
+        let third = self.corner::<I>(corners, 2)?;
         let edge = third - centre;
         let square = edge.length_squared();
         let left_second = largest * rest_second - square;
@@ -359,17 +334,17 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     /// Raises `worst` if a triangle is stretched more; `None` beyond the limit.
     #[cold]
     #[inline(never)]
-    fn look_closer<I: Index, M: Measure, const CORNERS: usize>(
+    fn look_closer<I: Index, M: Measure>(
         &self,
         metric: &impl MetricBits,
-        corners: &[u8; CORNERS],
+        corners: &I::Corners,
         row: u32,
         mut worst: Worst,
     ) -> Option<(Before, Worst)> {
         let metric = Metric::new(metric.bits().map(f32::from_bits));
-        let a = self.corner::<I, CORNERS>(corners, 0)?;
-        let b = self.corner::<I, CORNERS>(corners, 1)?;
-        let third = self.corner::<I, CORNERS>(corners, 2)?;
+        let a = self.corner::<I>(corners, 0)?;
+        let b = self.corner::<I>(corners, 1)?;
+        let third = self.corner::<I>(corners, 2)?;
         let [centre, other, _] = metric.centre_first([a, b, third]);
         let now = Edges { first: other - centre, second: third - centre };
         let squared = squared_stretch::<M>(&metric.squares, now, self.limit);
@@ -389,12 +364,9 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
 
     /// Positions of a triangle's first two corners; `None` unless both rows are below `ready`.
     #[inline(always)]
-    fn first_two<I: Index, const CORNERS: usize>(
-        &self,
-        corners: &[u8; CORNERS],
-    ) -> Option<[Vec3; 2]> {
-        let a = format::vertex_number::<I>(corners, 0)?;
-        let b = format::vertex_number::<I>(corners, 1)?;
+    fn first_two<I: Index>(&self, corners: &I::Corners) -> Option<[Vec3; 2]> {
+        let a = format::vertex_number::<I>(corners.as_ref(), 0)?;
+        let b = format::vertex_number::<I>(corners.as_ref(), 1)?;
         // `&`, not `&&`: one branch for both.
         if (a < self.ready) & (b < self.ready) {
             Some([self.surface.position(a)?, self.surface.position(b)?])
@@ -405,12 +377,8 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
 
     /// Position of a triangle's corner; `None` unless its row is below `ready`.
     #[inline(always)]
-    fn corner<I: Index, const CORNERS: usize>(
-        &self,
-        corners: &[u8; CORNERS],
-        number: u32,
-    ) -> Option<Vec3> {
-        let row = format::vertex_number::<I>(corners, number)?;
+    fn corner<I: Index>(&self, corners: &I::Corners, number: u32) -> Option<Vec3> {
+        let row = format::vertex_number::<I>(corners.as_ref(), number)?;
         if row < self.ready { self.surface.position(row) } else { None }
     }
 }

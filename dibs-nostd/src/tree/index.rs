@@ -1,9 +1,31 @@
 //! The two widths of vertex indices: one code, chosen by a type parameter.
 
 mod sealed {
-    pub trait Sealed {}
-    impl Sealed for u16 {}
-    impl Sealed for u32 {}
+    pub trait Sealed: Sized {
+        /// The bytes of a triangle's three indices.
+        type Corners: AsRef<[u8]>;
+
+        /// The triangles of a section.
+        fn corners(section: &[u8]) -> &[Self::Corners];
+    }
+
+    impl Sealed for u16 {
+        type Corners = [u8; 6];
+
+        #[inline(always)]
+        fn corners(section: &[u8]) -> &[Self::Corners] {
+            section.as_chunks().0
+        }
+    }
+
+    impl Sealed for u32 {
+        type Corners = [u8; 12];
+
+        #[inline(always)]
+        fn corners(section: &[u8]) -> &[Self::Corners] {
+            section.as_chunks().0
+        }
+    }
 }
 
 /// Width of the vertex indices and radius codes of a tree: `u16` for up to 65,536 vertices, `u32`

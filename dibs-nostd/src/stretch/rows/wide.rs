@@ -34,13 +34,10 @@ struct Four {
 impl Last {
     /// The edge before the first triangle of a run: see [`Table::before`].
     #[inline(always)]
-    fn before<I: Index, const CORNERS: usize>(
-        metric: &impl MetricBits,
-        corners: &[u8; CORNERS],
-    ) -> Option<Self> {
+    fn before<I: Index>(metric: &impl MetricBits, corners: &I::Corners) -> Option<Self> {
         let metric = Metric::new(metric.bits().map(f32::from_bits));
-        let a = format::vertex_number::<I>(corners, 0)?;
-        let b = format::vertex_number::<I>(corners, 1)?;
+        let a = format::vertex_number::<I>(corners.as_ref(), 0)?;
+        let b = format::vertex_number::<I>(corners.as_ref(), 1)?;
         let [centre, other, _] = metric.centre_first([a, b, b]);
         let [rest, ..] = metric.squares;
         Some(match metric.join {
@@ -51,18 +48,18 @@ impl Last {
 
     /// The next four triangles, and the edge after them.
     #[inline(always)]
-    fn next<I: Index, const CORNERS: usize>(
+    fn next<I: Index>(
         mut self,
         metrics: &[impl MetricBits; 4],
-        triangles: &[[u8; CORNERS]; 4],
+        triangles: &[I::Corners; 4],
     ) -> Option<(Four, Self)> {
         let mut four = Four::default();
         for lane in 0..4 {
             let corners = &triangles[lane];
             let [mark, between, second] = metrics[lane].bits();
-            let a = format::vertex_number::<I>(corners, 0)?;
-            let b = format::vertex_number::<I>(corners, 1)?;
-            let c = format::vertex_number::<I>(corners, 2)?;
+            let a = format::vertex_number::<I>(corners.as_ref(), 0)?;
+            let b = format::vertex_number::<I>(corners.as_ref(), 1)?;
+            let c = format::vertex_number::<I>(corners.as_ref(), 2)?;
             // The marks of `Join`, without branches: their order cannot be predicted.
             let is_fan = mark >> 31 != 0;
             let is_start = !is_fan && mark & 1 == 0;
@@ -103,10 +100,10 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     /// Checks four triangles at a time, up to the first four that do not all pass. Returns how many fours passed.
     // By itself, so that its state stays in registers.
     #[inline(never)]
-    fn fours<I: Index, M: Measure, R: MetricBits, const CORNERS: usize>(
+    fn fours<I: Index, M: Measure, R: MetricBits>(
         &self,
         metrics: &[R],
-        triangles: &[[u8; CORNERS]],
+        triangles: &[I::Corners],
         largest: f32,
         last: &mut Last,
         sum: &mut f32,
@@ -114,7 +111,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let ((metrics, _), (triangles, _)) = (metrics.as_chunks::<4>(), triangles.as_chunks::<4>());
         let (mut edge, mut total, mut passed) = (*last, *sum, 0);
         for (metrics, triangles) in metrics.iter().zip(triangles) {
-            let Some((four, next)) = edge.next::<I, CORNERS>(metrics, triangles) else { break };
+            let Some((four, next)) = edge.next::<I>(metrics, triangles) else { break };
             let Some(squares) = self.pass_four::<M>(&four, largest) else { break };
             for square in squares {
                 total += square;
@@ -139,16 +136,10 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
 
 /// [`measure`](super::measure) on a whole frame, of a tree that is `UNIFORM`.
 #[inline(never)]
-pub(super) fn measure<
-    I: Index,
-    V: VertexTable + ?Sized,
-    M: Measure,
-    R: MetricBits,
-    const CORNERS: usize,
->(
+pub(super) fn measure<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits>(
     surface: &V,
     mut metrics: &[R],
-    mut triangles: &[[u8; CORNERS]],
+    mut triangles: &[I::Corners],
     limit: f32,
     first: u32,
     mut worst: Worst,
@@ -157,20 +148,15 @@ pub(super) fn measure<
     let table = Table { surface, ready: surface.len() as u32, limit };
     let mut row = first;
     let start = metrics.first().zip(triangles.first()).and_then(|(metric, corners)| {
-        let before = table.before::<I, CORNERS>(metric, corners, worst.squared)?;
-        Some((before, Last::before::<I, CORNERS>(metric, corners)?))
+        let before = table.before::<I>(metric, corners, worst.squared)?;
+        Some((before, Last::before::<I>(metric, corners)?))
     });
     let Some((before, mut last)) = start else { return (row, worst, size) };
     // The state before `row` where the row-by-row check was last; elsewhere it follows from `last`.
     let mut before = Some(before);
     while !metrics.is_empty() {
-        let passed = table.fours::<I, M, R, CORNERS>(
-            metrics,
-            triangles,
-            worst.squared,
-            &mut last,
-            &mut size,
-        );
+        let passed =
+            table.fours::<I, M, R>(metrics, triangles, worst.squared, &mut last, &mut size);
         if passed > 0 {
             before = None;
             let rows = passed.saturating_mul(4);
@@ -180,7 +166,7 @@ pub(super) fn measure<
         }
         let Some(mut state) = before.or_else(|| table.after(last, worst.squared)) else { break };
         for (metric, corners) in metrics.iter().zip(triangles).take(4) {
-            let next = table.next::<I, M, CORNERS, true>(state, metric, corners, row, &mut worst);
+            let next = table.next::<I, M, true>(state, metric, corners, row, &mut worst);
             let Some(next) = next else { return (row, worst, size) };
             size += next.square;
             state = next;
@@ -191,7 +177,7 @@ pub(super) fn measure<
         else {
             break;
         };
-        let Some((_, next)) = last.next::<I, CORNERS>(four, corners) else { break };
+        let Some((_, next)) = last.next::<I>(four, corners) else { break };
         (last, before) = (next, Some(state));
         (metrics, triangles) = (rest, others);
     }
@@ -243,8 +229,8 @@ mod tests {
                 let worst = Worst { squared, triangle: start };
                 let end = range.end as u32;
                 let row = match width {
-                    IndexWidth::Bits32 => same::<u32, 12>(built.blob(), &moved, range, worst),
-                    _ => same::<u16, 6>(built.blob(), &moved, range, worst),
+                    IndexWidth::Bits32 => same::<u32>(built.blob(), &moved, range, worst),
+                    _ => same::<u16>(built.blob(), &moved, range, worst),
                 };
                 stopped += u32::from(row < end);
             }
@@ -253,7 +239,7 @@ mod tests {
     }
 
     /// Measures a run in both ways, and returns the row where both ended.
-    fn same<I: Index, const CORNERS: usize>(
+    fn same<I: Index>(
         blob: &[u8],
         surface: &[Vec3],
         range: core::ops::Range<usize>,
@@ -261,28 +247,27 @@ mod tests {
     ) -> u32 {
         let tree = Tree::<I>::from_bytes(blob).expect("valid");
         match tree.paths() {
-            PathKind::Surface => same_by::<I, SingularValue, CORNERS>(&tree, surface, range, worst),
-            PathKind::EdgePath => same_by::<I, LongestEdge, CORNERS>(&tree, surface, range, worst),
+            PathKind::Surface => same_by::<I, SingularValue>(&tree, surface, range, worst),
+            PathKind::EdgePath => same_by::<I, LongestEdge>(&tree, surface, range, worst),
             PathKind::Volume => unreachable!("has no metric"),
         }
     }
 
-    fn same_by<I: Index, M: Measure, const CORNERS: usize>(
+    fn same_by<I: Index, M: Measure>(
         tree: &Tree<'_, I>,
         surface: &[Vec3],
         range: core::ops::Range<usize>,
         worst: Worst,
     ) -> u32 {
         let (metrics, _) = tree.sections().metric.as_chunks::<{ rows::METRIC_BYTES }>();
-        let (triangles, _) = tree.sections().triangles.as_chunks::<CORNERS>();
+        let triangles = I::corners(tree.sections().triangles);
         let (metrics, triangles) = (&metrics[range.clone()], &triangles[range.clone()]);
         let (first, limit) = (range.start as u32, squared_limit(tree.stretch()));
         let size = 1.0;
-        let wide = measure::<I, [Vec3], M, _, CORNERS>(
-            surface, metrics, triangles, limit, first, worst, size,
-        );
+        let wide =
+            measure::<I, [Vec3], M, _>(surface, metrics, triangles, limit, first, worst, size);
         let ready = surface.len() as u32;
-        let narrow = rows::measure::<I, [Vec3], M, _, CORNERS, true>(
+        let narrow = rows::measure::<I, [Vec3], M, _, true>(
             surface, metrics, triangles, ready, limit, first, worst, size,
         );
         let bits = |(row, worst, sum): (u32, Worst, f32)| {
