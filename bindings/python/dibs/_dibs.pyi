@@ -121,6 +121,7 @@ class Sender:
         self,
         tree: Tree,
         to: Optional[str],
+        in_unit: Optional[str],
         mtu: int,
         choices: tuple[bool, Optional[float], int, Optional[float], Optional[int]],
         tags: Optional[tuple[bytes, int, Optional[int]]],

@@ -42,7 +42,8 @@ class Sender:
 
     `to` is `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`; without it `packets` collects what would
     be sent. `quantised` takes 6 bytes a vertex instead of 12. `partial` sends only vertices that moved by more than that
-    many millimetres. `heartbeat` are seconds between two heartbeats, or `None`. `mtu` is 1024, or 64 for CAN-FD.
+    many millimetres. `heartbeat` are seconds between two heartbeats, or `None`. `mtu` is 1024, or 64 for CAN-FD. `unit` ("mm",
+    "cm", "m", "in", "um") is that of the positions, by default millimetres as the tree's.
 
     `key`, 16 bytes, puts a tag on every packet, for the receiver with the id `receiver`. Frames can then be sent once the
     receiver has reported its challenge: `wait`. For one without a way back give its `challenge`.
@@ -53,6 +54,7 @@ class Sender:
         tree: Tree,
         to: Optional[str] = None,
         *,
+        unit: Optional[str] = None,
         quantised: bool = True,
         partial: Optional[float] = None,
         whole_every: int = 250,
@@ -69,7 +71,7 @@ class Sender:
                 raise ValueError(f"partial: a tolerance is a length of at least 0, not {partial}")
         choices = (quantised, partial, whole_every, heartbeat, session)
         self._tree = tree
-        self._native = _dibs.Sender(tree._native, to, mtu, choices, _tags(key, receiver, challenge))
+        self._native = _dibs.Sender(tree._native, to, unit, mtu, choices, _tags(key, receiver, challenge))
 
     def send(self, positions: npt.ArrayLike, *, age: Optional[float] = None) -> Sent:
         """Sends a frame: positions of the mesh's vertices, captured `age` seconds ago.

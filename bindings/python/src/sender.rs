@@ -4,6 +4,7 @@ use std::io;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use dibs_build::Unit;
 use dibs_build::glam::DVec3;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{AesCmac, Content, Counters, Event, Mac};
@@ -12,6 +13,7 @@ use dibs_stream::{self, SendError, Sent, Settings, SurfaceOrder, Totals};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
+use crate::mesh::unit;
 use crate::tree::{Tree, of_any_width};
 use crate::{bytes, error, invalid};
 
@@ -89,6 +91,7 @@ impl<const MTU: usize, M: Mac + Send> AnySender for dibs_stream::Sender<Outlet, 
 pub struct Sender {
     sender: Mutex<Box<dyn AnySender>>,
     origin: DVec3,
+    unit: Unit,
 }
 
 /// `quantised`, `partial`, `whole_every`, `heartbeat` (s), `session`.
@@ -104,10 +107,12 @@ impl Sender {
         py: Python<'_>,
         tree: &Tree,
         to: Option<&str>,
+        in_unit: Option<&str>,
         mtu: usize,
         choices: Choices,
         tags: Option<Tags>,
     ) -> PyResult<Self> {
+        let unit = in_unit.map(unit).transpose()?.unwrap_or_default();
         let order = of_any_width!(tree.0.view(), tree => SurfaceOrder::of(tree));
         let (quantised, partial, whole_every, heartbeat, session) = choices;
         let usual = Settings::default();
@@ -131,7 +136,7 @@ impl Sender {
             1024 => sender_of::<1024>(outlet, order, settings, tags),
             _ => return Err(invalid(format!("mtu is {mtu}; give 64 (CAN-FD) or 1024"))),
         };
-        Ok(Self { sender: Mutex::new(sender), origin: tree.0.origin })
+        Ok(Self { sender: Mutex::new(sender), origin: tree.0.origin, unit })
     }
 
     /// Returns the frame's number, kind, rows, packets, bytes and error.
@@ -143,7 +148,8 @@ impl Sender {
     ) -> PyResult<(u32, &'static str, usize, usize, usize, f32)> {
         let age = age.map(seconds).transpose()?;
         let sent = py.detach(|| {
-            let local = |position: DVec3| (position - self.origin).as_vec3();
+            let millimetres = self.unit.millimetres();
+            let local = |position: DVec3| (position * millimetres - self.origin).as_vec3();
             let positions: Vec<Vec3> = bytes::points(positions).into_iter().map(local).collect();
             self.lock().send(&positions, age)
         });

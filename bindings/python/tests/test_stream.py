@@ -72,6 +72,18 @@ class Streams(unittest.TestCase):
         self.assertIn((5_000).to_bytes(2, "little"), begins[1])
         self.assertNotEqual(*begins)
 
+    def test_positions_in_another_unit_are_the_same_frame(self):
+        choices = {"heartbeat": None, "session": 7}
+        here, there = dibs.Sender(TREE, **choices), dibs.Sender(TREE, unit="m", **choices)
+        metres = BEAT.frames[4].astype(np.float64) / 1_000
+        here.send(BEAT.frames[4], age=0)
+        there.send(metres, age=0)
+        self.assertEqual(here.packets(), there.packets())
+        with self.assertRaisesRegex(ValueError, "times as long as at rest: it is in another unit"):
+            here.send(metres)
+        with self.assertRaisesRegex(ValueError, "unit is 'ft'"):
+            dibs.Sender(TREE, unit="ft")
+
     def test_far_from_the_origin_the_same_frame_is_sent(self):
         far = np.array([4e6, 0, 0])
         mesh = dibs.Mesh(BEAT.frames[0] + far, dibs.generate("heart", 1_000)[0].triangles)
