@@ -34,6 +34,9 @@ enum Task {
     /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     #[command(disable_help_flag = true)]
     Profile(Passed),
+    /// Proves the most instructions of a query from the linked program, and writes docs/evidence/bound.md.
+    #[command(disable_help_flag = true)]
+    Bound(Passed),
     Viewer(viewer::Options),
     Fuzz(nightly::FuzzOptions),
     /// Changes operators of the core one by one, and lists the changes that no test notices.
@@ -55,6 +58,7 @@ fn main() -> ExitCode {
         Task::Bench(passed) => prove::bench(&passed),
         Task::Guarantees(passed) => prove::run("guarantees", &passed),
         Task::Profile(passed) => prove::run("profile", &passed),
+        Task::Bound(passed) => prove::run("bound", &passed),
         Task::Viewer(options) => viewer::viewer(&options),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
         Task::Mutants(passed) => prove::run("mutants", &passed),

@@ -3,6 +3,7 @@
 #![allow(missing_docs, reason = "a library of one program")]
 
 pub mod binary;
+pub mod bound;
 pub mod checks;
 pub mod data;
 pub mod demo;

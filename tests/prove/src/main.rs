@@ -1,4 +1,4 @@
-//! Measures and proves: `cargo xtask demo | guarantees | profile | mutants | processors` run this, and `test` its checks.
+//! Measures and proves: `cargo xtask demo | guarantees | profile | bound | mutants | processors` run this, and `test` its checks.
 //! docs/proofs.md lists the file for each promise.
 
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use dibs_prove::harness::{self, Effort};
-use dibs_prove::{demo, mutants, processors, profile};
+use dibs_prove::{bound, demo, mutants, processors, profile};
 use xtask::steps::{Outcome, Steps};
 
 /// `cargo xtask` passes its arguments on to this.
@@ -23,6 +23,7 @@ enum Task {
     Guarantees(harness::Options),
     /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     Profile,
+    Bound(bound::report::Options),
     Mutants(mutants::Options),
     /// Checks the core crate for every row of docs/processors.md.
     Processors,
@@ -52,6 +53,7 @@ fn main() -> ExitCode {
         Task::Demo(options) => demo::run(&options),
         Task::Guarantees(options) => harness::guarantees(&options),
         Task::Profile => profile::run(),
+        Task::Bound(options) => bound::report::run(&options),
         Task::Mutants(options) => mutants::mutants(&options),
         Task::Processors => processors::check().map(|outcome| {
             if let Outcome::Skipped(reason) = outcome {

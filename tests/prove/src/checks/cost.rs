@@ -299,7 +299,7 @@ fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result
 }
 
 /// Surfaces that the constants are not fitted to: other sizes, shapes and leaves, and real anatomy if present.
-fn unseen() -> Result<Vec<Subject>> {
+pub fn unseen() -> Result<Vec<Subject>> {
     let mut subjects = vec![
         Subject::new("a generated heart of 2,562 triangles", generate::heart(2_562)?.mesh, 8),
         Subject::new("a generated brain of 3,000", generate::brain(3_000)?, 6),

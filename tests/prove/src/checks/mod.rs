@@ -4,6 +4,7 @@ mod anytime;
 pub mod bits;
 mod board_faults;
 pub mod boards;
+mod bound;
 mod bounded;
 mod corruption;
 pub mod cost;
@@ -51,6 +52,7 @@ pub const CHECKS: &[Check] = &[
     filter_board::CHECK,
     cost::BOARD,
     cost::HOST,
+    bound::CHECK,
     path::CHECK,
     tracked::CHECK,
     ticks::CHECK,

@@ -139,13 +139,28 @@ pub fn padded(bytes: &[u8]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// The number of executions of each instruction between these addresses while a script is answered: QEMU executes one
-/// at a time, and logs it.
+/// The number of executions of each instruction between these addresses while a script is answered.
 pub fn executions(
     program: &Path,
     script: &Script,
     ranges: &[Range<u64>],
 ) -> Result<BTreeMap<u64, u64>> {
+    let mut counts = BTreeMap::new();
+    traced(program, script, ranges, |address| {
+        *counts.entry(address).or_insert(0) += 1;
+        Ok(())
+    })?;
+    Ok(counts)
+}
+
+/// Answers on the emulated board, and visits the address of each executed instruction between some addresses: QEMU
+/// executes one at a time, and logs it.
+pub fn traced(
+    program: &Path,
+    script: &Script,
+    ranges: &[Range<u64>],
+    mut visit: impl FnMut(u64) -> Result<()>,
+) -> Result<Answers> {
     let folder = tempfile::tempdir()?;
     fs::write(folder.path().join("script.bin"), script.bytes())?;
     let filter: Vec<String> = ranges
@@ -159,19 +174,34 @@ pub fn executions(
     } else {
         qemu.arg("-singlestep");
     }
-    qemu.args(["-d", "exec,nochain", "-dfilter", &filter.join(","), "-D", "log"]);
-    run(qemu.current_dir(folder.path()).stdin(Stdio::null()))?;
-    let mut counts = BTreeMap::new();
-    for line in BufReader::new(fs::File::open(folder.path().join("log"))?).lines() {
-        // `Trace 0: HOST [flags/ADDRESS/...] name`
-        let line = line?;
-        let address = line.split('/').nth(1).and_then(|a| u64::from_str_radix(a, 16).ok());
-        if let Some(address) = address {
-            *counts.entry(address).or_insert(0) += 1;
-        }
+    // The log is long, and goes through a pipe.
+    qemu.args(["-d", "exec,nochain", "-dfilter", &filter.join(",")]);
+    qemu.current_dir(folder.path()).stdin(Stdio::null()).stderr(Stdio::piped());
+    let mut emulator = qemu.spawn().context("cannot start the emulator")?;
+    let log = emulator.stderr.take().context("no log")?;
+    let visited = each_address(BufReader::with_capacity(1 << 16, log), &mut visit);
+    if visited.is_err() {
+        emulator.kill()?;
     }
-    ensure!(!counts.is_empty(), "QEMU logged no instruction");
-    Ok(counts)
+    let status = emulator.wait()?;
+    ensure!(visited? > 0, "QEMU logged no instruction");
+    ensure!(status.success(), "the emulator ended with {status}");
+    Answers::new(words(&folder.path().join("answers.bin"))?, script)
+}
+
+/// Visits the addresses of a log, `Trace 0: HOST [flags/ADDRESS/...] name` each. Returns their number.
+fn each_address(mut log: impl BufRead, visit: &mut impl FnMut(u64) -> Result<()>) -> Result<u64> {
+    let (mut line, mut count) = (Vec::new(), 0);
+    while log.read_until(b'\n', &mut line)? > 0 {
+        let field = line.split(|&byte| byte == b'/').nth(1);
+        let text = field.and_then(|field| std::str::from_utf8(field).ok());
+        if let Some(address) = text.and_then(|text| u64::from_str_radix(text, 16).ok()) {
+            visit(address)?;
+            count += 1;
+        }
+        line.clear();
+    }
+    Ok(count)
 }
 
 /// The first number of `QEMU emulator version 7.2.22 (...)`.

@@ -1,6 +1,7 @@
 //! The program's own tests: it is compiled once, for them and for its user.
 
 mod boards;
+mod bound;
 mod path;
 mod processors;
 mod proofs;

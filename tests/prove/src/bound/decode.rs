@@ -1,0 +1,128 @@
+//! One instruction of ARMv7-M: its size, and where it leads. Encodings are those of the ARMv7-M Architecture Reference
+//! Manual, A5 and A7.
+
+/// Where an instruction leads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Flow {
+    /// To the one after it.
+    Next,
+    /// To another place, always.
+    Jump(u32),
+    /// To another place, or to the one after it.
+    Branch(u32),
+    /// To a function, and back to the one after it.
+    Call(u32),
+    /// To the caller.
+    Return,
+    /// To one of the places in the table after it, whose entries have so many bytes.
+    Table(u32),
+    /// To a fault.
+    Trap,
+    /// To an address in a register or in memory, which cannot be followed.
+    Indirect,
+    /// To the one after it; so many after it depend on a condition.
+    Conditions(u32),
+}
+
+/// An instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instruction {
+    pub bytes: u32,
+    pub flow: Flow,
+}
+
+/// Reads the instruction at an address.
+pub fn decode(at: u32, first: u32, second: u32) -> Instruction {
+    if first >> 11 >= 0b11101 {
+        Instruction { bytes: 4, flow: wide(at, first, second) }
+    } else {
+        Instruction { bytes: 2, flow: narrow(at, first) }
+    }
+}
+
+fn narrow(at: u32, first: u32) -> Flow {
+    let after = at.wrapping_add(4);
+    match first {
+        // B (T2), under a condition (T1), UDF.
+        _ if first >> 11 == 0b11100 => Flow::Jump(after.wrapping_add(signed(first << 1, 12))),
+        _ if first >> 8 == 0xDE => Flow::Trap,
+        // SVC: an exception, not a path of this program.
+        _ if first >> 8 == 0xDF => Flow::Indirect,
+        _ if first >> 12 == 0b1101 => {
+            Flow::Branch(after.wrapping_add(signed((first & 0xFF) << 1, 9)))
+        }
+        // CBZ, CBNZ.
+        _ if first & 0xF500 == 0xB100 => {
+            Flow::Branch(after.wrapping_add((first >> 9 & 1) << 6 | (first >> 3 & 31) << 1))
+        }
+        // IT.
+        _ if first >> 8 == 0xBF && first & 15 != 0 => {
+            Flow::Conditions(4 - (first & 15).trailing_zeros())
+        }
+        // BX to the caller, POP with pc.
+        0x4770 => Flow::Return,
+        _ if first >> 8 == 0xBD => Flow::Return,
+        // BX, BLX, MOV pc, ADD pc.
+        _ if first & 0xFF00 == 0x4700 => Flow::Indirect,
+        _ if first & 0xFF87 == 0x4687 || first & 0xFF87 == 0x4487 => Flow::Indirect,
+        _ => Flow::Next,
+    }
+}
+
+fn wide(at: u32, first: u32, second: u32) -> Flow {
+    match (first >> 11, second >> 14, second >> 12 & 1) {
+        _ if first & 0xFFF0 == 0xF7F0 && second >> 12 == 0b1010 => return Flow::Trap,
+        // BL, B.W (T4), B.W under a condition (T3).
+        (0b11110, 0b11, 1) => return Flow::Call(far(at, first, second)),
+        (0b11110, 0b10, 1) => return Flow::Jump(far(at, first, second)),
+        (0b11110, 0b10, 0) if first >> 7 & 7 != 7 => return Flow::Branch(near(at, first, second)),
+        _ => {}
+    }
+    let is_stack = first & 15 == 13;
+    // TBB, TBH.
+    if first & 0xFFF0 == 0xE8D0 && second & 0xFFE0 == 0xF000 {
+        return if first & 15 == 15 { Flow::Table(1 + (second >> 4 & 1)) } else { Flow::Indirect };
+    }
+    // LDM with pc, LDR pc: from the stack it is a return.
+    let is_load = first & 0xFFD0 == 0xE890 || first & 0xFFD0 == 0xE910;
+    if is_load && second >> 15 == 1 || first & 0xFF70 == 0xF850 && second >> 12 == 15 {
+        return if is_stack { Flow::Return } else { Flow::Indirect };
+    }
+    Flow::Next
+}
+
+/// Target of BL and B.W (T4).
+pub fn far(at: u32, first: u32, second: u32) -> u32 {
+    let sign = first >> 10 & 1;
+    let one = !(second >> 13 ^ sign) & 1;
+    let two = !(second >> 11 ^ sign) & 1;
+    let offset = sign << 24 | one << 23 | two << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
+    at.wrapping_add(4).wrapping_add(signed(offset, 25))
+}
+
+/// Target of B.W under a condition (T3).
+pub fn near(at: u32, first: u32, second: u32) -> u32 {
+    let (sign, one, two) = (first >> 10 & 1, second >> 13 & 1, second >> 11 & 1);
+    let offset = sign << 20 | two << 19 | one << 18 | (first & 0x3F) << 12 | (second & 0x7FF) << 1;
+    at.wrapping_add(4).wrapping_add(signed(offset, 21))
+}
+
+/// The lower `bits` bits as a two's complement number.
+pub fn signed(value: u32, bits: u32) -> u32 {
+    let shift = 32 - bits;
+    ((value << shift).cast_signed() >> shift).cast_unsigned()
+}
+
+/// Target of a branch that the linker put in because it is far, from flash to the TCM: MOVW ip, MOVT ip, BX ip.
+pub fn long_branch(halves: [u32; 5]) -> Option<u32> {
+    let [first, second, third, fourth, last] = halves;
+    let half = |first: u32, second: u32| {
+        (first & 15) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
+    };
+    let loads_ip = first & 0xFBF0 == 0xF240
+        && third & 0xFBF0 == 0xF2C0
+        && second >> 8 & 15 == 12
+        && fourth >> 8 & 15 == 12;
+    let target = half(third, fourth) << 16 | half(first, second);
+    (loads_ip && last == 0x4760).then_some(target & !1)
+}

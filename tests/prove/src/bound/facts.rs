@@ -1,0 +1,255 @@
+//! The flow facts: what the search's code promises about the numbers of executions of its parts, each with its reason. All
+//! else is read from the program.
+//!
+//! A fact is an inequality. Its places are calls, which a compiler does not move or invent, headers of loops, and the branches
+//! of a line, in the innermost loop that has any of the line: parts of it that are the same at each turn are moved out, the
+//! branch on what is not stays. A place that is there no more is an error; that a fact is true of the program as it was compiled is
+//! checked by traces.
+
+use super::lines::Within::{self, Function, Line};
+
+/// A number of executions.
+#[derive(Clone, Copy, Debug)]
+pub enum Count {
+    /// Of the first blocks in these frames, in the innermost loop that has such.
+    Passes(&'static [Within]),
+    /// Of calls, in these frames, of a function whose name has this in it.
+    Calls(&'static [Within], &'static str),
+    /// Of the headers of loops in these frames: one each turn.
+    Heads(&'static [Within]),
+    /// Of entries to these loops.
+    Entries(&'static [Within]),
+    /// Of bytes, by the constant length of each call of a function that copies.
+    Bytes(&'static str),
+}
+
+/// The right side: so many, and so many for each of a query's counts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Most {
+    pub base: i64,
+    /// For each root besides the first.
+    pub roots: i64,
+    /// For each node test that the budget counts.
+    pub nodes: i64,
+    /// For each triangle test.
+    pub triangles: i64,
+}
+
+impl Most {
+    const fn base(base: i64) -> Self {
+        Self { base, roots: 0, nodes: 0, triangles: 0 }
+    }
+
+    /// The right side for a query of so many further roots, node tests and triangle tests.
+    pub const fn of(&self, [roots, nodes, triangles]: [i64; 3]) -> i64 {
+        self.base + self.roots * roots + self.nodes * nodes + self.triangles * triangles
+    }
+
+    pub const fn each(&self) -> [i64; 4] {
+        [self.base, self.roots, self.nodes, self.triangles]
+    }
+}
+
+/// A fact.
+pub struct Fact {
+    pub name: &'static str,
+    pub terms: &'static [(i64, Count)],
+    pub most: Most,
+    pub because: &'static str,
+}
+
+/// A call that is never made: a part of the end of the calling function's name, a part of the callee's, and the reason.
+pub type Never = (&'static str, &'static str, &'static str);
+
+/// The facts of a kind of query.
+pub struct Facts {
+    pub groups: &'static [&'static [Fact]],
+    pub never: &'static [Never],
+}
+
+impl Facts {
+    pub fn rows(&self) -> impl Iterator<Item = &'static Fact> {
+        self.groups.iter().copied().flatten()
+    }
+}
+
+const NO_SIDE: Never = ("query::separation::signed", "", "the query asks for no side");
+const NO_TIES: Never = (
+    "",
+    "Ties::drop_farther",
+    "without a side `tie_squared` is not a number, and no triangle is collected",
+);
+
+/// Of a plain query: unsigned.
+pub const PLAIN: Facts = Facts { groups: &[ROWS], never: &[NO_SIDE, NO_TIES] };
+
+/// The same on a surface that [`MODES`] modes move.
+pub const MODAL: Facts = Facts { groups: &[ROWS, MOVED], never: &[NO_SIDE, NO_TIES] };
+
+/// The same with a wrong one, which a trace must find.
+pub const WITHOUT_EDGES: Facts =
+    Facts { groups: &[ROWS], never: &[NO_SIDE, NO_TIES, ("", "edge::edge_to_segment", "wrong")] };
+
+/// Functions that a program must call from these alone, because the facts about them are of those calls.
+pub const ONLY_FROM: &[(&str, &str)] = &[("mem::memcpy", "__aeabi_memcpy4")];
+
+const NODE: &str = "dibs-nostd/src/query/search/node.rs";
+const LEAF: &str = "dibs-nostd/src/query/search/leaf.rs";
+const ROOTS: &str = "dibs-nostd/src/query/search/roots.rs";
+const PLANE: &str = "dibs-nostd/src/query/plane.rs";
+const SURFACE: &str = "dibs-nostd/src/modes/surface.rs";
+const SEARCH: &str = "dibs-nostd/src/query/search.rs";
+
+const CHILD: Count = Count::Passes(&[Function("run"), Line(NODE, "if squared > far * far {")]);
+const LEAF_PLANE: Count = Count::Calls(&[Function("run"), Function("expand")], "Plane::beyond");
+const VISIT: Count = Count::Calls(&[Function("run"), Function("leaf")], "Plane::beyond");
+const TRIANGLE: Count =
+    Count::Passes(&[Function("run"), Line(LEAF, "if patch_plane.has_beyond(a) &&")]);
+const TURN: Count =
+    Count::Passes(&[Function("run"), Line(LEAF, "if triangle == self.best_triangle {")]);
+const TEST: Count = Count::Calls(&[Function("leaf"), Function("test_triangle")], "closest_to_");
+const WARM: Count = Count::Calls(&[Function("start"), Function("test_triangle")], "closest_to_");
+const POP: Count =
+    Count::Heads(&[Line(SEARCH, "while let Some(Waiting { lower, link }) = self.pop() {")]);
+const PUSH: Count = Count::Passes(&[
+    Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
+    Line(NODE, "*self.stack.get_mut(at)? = subtree;"),
+]);
+const SHIFT: Count = Count::Passes(&[
+    Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
+    Line(NODE, "*self.stack.get_mut(at)? = below;"),
+]);
+const OTHERS: Count = Count::Calls(&[], "Roots::with_others");
+const FOR_EACH_ROOT: Most = Most { base: 0, roots: 1, nodes: 0, triangles: 0 };
+const BLEND: &[Within] = &[Line(SURFACE, "for (&gain, mode) in self.gains")];
+const SCAN: &[Within] = &[Line(PLANE, "for (before, [_, _, corner]) in (1..).zip(triangles)")];
+const EXPANSION: Count =
+    Count::Entries(&[Function("run"), Line(NODE, "let position = self.position(node.pin)?;")]);
+
+const ROWS: &[Fact] = &[
+    Fact {
+        name: "node tests",
+        terms: &[(1, CHILD), (1, LEAF_PLANE), (1, VISIT), (1, TRIANGLE)],
+        most: Most { base: 0, roots: 0, nodes: 1, triangles: 0 },
+        because: "the meter counts a node's children before the first of them, and each plane before its call",
+    },
+    Fact {
+        name: "triangle tests",
+        terms: &[(1, TEST), (1, WARM)],
+        most: Most { base: 0, roots: 0, nodes: 0, triangles: 1 },
+        because: "the meter counts each exact test before its call, the warm one too",
+    },
+    Fact {
+        name: "eight children",
+        terms: &[(1, CHILD), (-8, EXPANSION)],
+        most: Most::base(0),
+        because: "a link has three bits for the number of children, less one",
+    },
+    Fact {
+        name: "moves for each entry",
+        terms: &[(2, SHIFT), (-7, PUSH)],
+        most: Most::base(0),
+        because: "a node's entries are sorted among themselves: k of them take at most k (k - 1) / 2 moves, and k is at most 8",
+    },
+    Fact {
+        name: "waiting entries",
+        terms: &[(1, Count::Heads(&[Function("least_waiting")])), (1, POP), (-1, PUSH)],
+        most: Most { base: 3, roots: 1, nodes: 0, triangles: 0 },
+        because: "what waits was pushed and not popped; the roots are pushed before; each loop has a turn more where it ends",
+    },
+    Fact {
+        name: "turns of a leaf",
+        terms: &[(1, TURN), (-1, TRIANGLE), (-1, VISIT)],
+        most: Most::base(1),
+        because: "only the best triangle is passed over without a count, at most once a visit; out of budget the search ends",
+    },
+    Fact {
+        name: "visits of leaves",
+        terms: &[(1, VISIT), (-1, LEAF_PLANE)],
+        most: Most { base: 1, roots: 1, nodes: 0, triangles: 0 },
+        because: "a leaf waits once its plane did not reject it, except a root, and where the budget cannot cover its visit \
+                  either",
+    },
+    Fact {
+        name: "the first entry",
+        terms: &[(1, Count::Heads(&[Line(SEARCH, "search.push(0, subtree)"), Function("push")]))],
+        most: Most { base: 1, roots: 1, nodes: 0, triangles: 0 },
+        because: "the roots are pushed upon each other, and the first upon the others",
+    },
+    Fact {
+        name: "trees of several roots",
+        terms: &[(1, OTHERS)],
+        most: FOR_EACH_ROOT,
+        because: "the further roots have a call, if there are any",
+    },
+    Fact {
+        name: "turns of the roots",
+        terms: &[(1, Count::Heads(&[Line(ROOTS, "for row in others.filter(")])), (-1, OTHERS)],
+        most: FOR_EACH_ROOT,
+        because: "one for each further root, and one where they end",
+    },
+    Fact {
+        name: "moves of roots",
+        terms: &[(1, Count::Passes(&[Line(ROOTS, "*stack.get_mut(at)? = nearer;")]))],
+        most: Most { base: 0, roots: 31, nodes: 0, triangles: 0 },
+        because: "the k-th moves at most the k - 1 before it, and a tree has at most 63 of them",
+    },
+    Fact {
+        name: "copied words",
+        terms: &[
+            (16, Count::Heads(&[Function("__aeabi_memcpy4")])),
+            (-1, Count::Bytes("__aeabi_memcpy4")),
+        ],
+        most: Most::base(0),
+        because: "each turn copies four words; the lengths are constants at the calls",
+    },
+    Fact {
+        name: "copied bytes",
+        terms: &[
+            (1, Count::Heads(&[Function("copy_forward_bytes")])),
+            (-3, Count::Calls(&[Function("__aeabi_memcpy4")], "memcpy")),
+        ],
+        most: Most::base(0),
+        because: "memcpy4 leaves at most three bytes to memcpy",
+    },
+    Fact {
+        name: "no words left",
+        terms: &[(1, Count::Heads(&[Function("copy_forward_aligned_words")]))],
+        most: Most::base(0),
+        because: "memcpy4 leaves at most three bytes to memcpy",
+    },
+    Fact {
+        name: "no words left to shift",
+        terms: &[(1, Count::Heads(&[Function("copy_forward_misaligned_words")]))],
+        most: Most::base(0),
+        because: "memcpy4 leaves at most three bytes to memcpy",
+    },
+];
+
+/// Modes of a surface that they move.
+pub const MODES: usize = 8;
+
+/// Of a surface that modes move: where a position takes a loop, the compiler keeps others too.
+const MOVED: &[Fact] = &[
+    Fact {
+        name: "modes of a position",
+        terms: &[(1, Count::Heads(BLEND)), (-(MODES as i64 + 1), Count::Entries(BLEND))],
+        most: Most::base(0),
+        because: "one turn for each mode, and one where they end",
+    },
+    Fact {
+        name: "triangles of a plane",
+        terms: &[(1, Count::Heads(SCAN)), (-8, Count::Entries(SCAN))],
+        most: Most::base(0),
+        because: "a leaf has at most eight triangles, of which the first is before the loop; one turn where they end",
+    },
+    Fact {
+        name: "corners that are not finite",
+        terms: &[
+            (1, Count::Heads(&[Function("not_finite")])),
+            (-4, Count::Calls(&[], "not_finite")),
+        ],
+        most: Most::base(0),
+        because: "a triangle has three corners; one turn where they end",
+    },
+];

@@ -1,0 +1,129 @@
+//! Queries on the emulated board, followed instruction by instruction: the graph and the facts against what happens.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+
+use super::analysis::Analysis;
+use super::facts::{PLAIN, WITHOUT_EDGES};
+use super::queries::{Batch, Kind, Proven, Table, to_trace};
+use super::trace::{Follower, Run};
+use super::walk::UNIT;
+use crate::probe::{Answers, traced};
+
+/// What traces have shown.
+#[derive(Default)]
+pub struct Traced {
+    pub queries: usize,
+    pub instructions: u64,
+    /// Facts that some query broke, with the number of such queries.
+    pub broken: Vec<(&'static str, usize)>,
+    /// Facts that hold with equality in some query that executes what they limit: they can be no tighter.
+    pub tight: Vec<&'static str>,
+    /// Blocks that some query executed, of all that the bound is over.
+    pub reached: usize,
+    pub blocks: usize,
+}
+
+/// Follows every instruction of some queries along the graphs of their kinds, and compares them with the facts. A path that is
+/// not in the graph is an error.
+pub fn trace(proven: &[Proven], probe: &Path, batches: &[Batch]) -> Result<Vec<Traced>> {
+    let mut ranges = BTreeMap::new();
+    for Analysis { program, image, .. } in proven.iter().map(|one| &one.analysis) {
+        for &at in program.functions.keys() {
+            ranges.insert(at, u64::from(at)..u64::from(image.symbol(at)?.end));
+        }
+    }
+    let ranges: Vec<_> = ranges.into_values().collect();
+    let mut followed: Vec<Followed<'_>> = proven.iter().map(Followed::new).collect();
+    for batch in batches {
+        let answers = traced(probe, &batch.script, &ranges, |at| {
+            followed.iter_mut().try_for_each(|one| one.follower.step(at as u32))
+        })?;
+        for one in &mut followed {
+            one.compare(batch, &answers)?;
+        }
+    }
+    Ok(followed.into_iter().map(Followed::end).collect())
+}
+
+/// A kind of query as it is followed.
+struct Followed<'a> {
+    proven: &'a Proven,
+    follower: Follower<'a>,
+    found: Traced,
+    /// Of each fact, the number of queries that broke it, and whether one met it with equality.
+    state: Vec<(usize, bool)>,
+}
+
+impl<'a> Followed<'a> {
+    fn new(proven: &'a Proven) -> Self {
+        let Analysis { program, system, .. } = &proven.analysis;
+        let found = Traced { blocks: program.blocks(), ..Traced::default() };
+        let state = vec![(0, false); system.rows.len()];
+        Self { proven, follower: Follower::new(program), found, state }
+    }
+
+    /// Compares the runs of a batch with its answers.
+    fn compare(&mut self, batch: &Batch, answers: &Answers) -> Result<()> {
+        let runs = self.follower.runs();
+        let mut table = Table::Rows;
+        let mut queries = 0;
+        for answer in answers.iter() {
+            table = table.after(answer.record);
+            if !self.proven.kind.is_of(answer.record, table) {
+                continue;
+            }
+            let run = runs.get(queries).context("a query without a run")?;
+            compare(self.proven, run, batch.counts(&answer), &mut self.state)?;
+            self.found.instructions += run.instructions;
+            queries += 1;
+        }
+        self.found.queries += queries;
+        ensure!(queries == runs.len(), "{} runs of {queries} queries", runs.len());
+        Ok(())
+    }
+
+    fn end(mut self) -> Traced {
+        let rows = || self.proven.analysis.system.rows.iter().zip(&self.state);
+        let broken = rows().filter(|(_, (broken, _))| *broken > 0);
+        self.found.broken = broken.map(|(row, (broken, _))| (row.name, *broken)).collect();
+        let tight = rows().filter(|(_, (_, is_tight))| *is_tight);
+        self.found.tight = tight.map(|(row, _)| row.name).collect();
+        self.found.reached = self.follower.reached();
+        self.found
+    }
+}
+
+/// Compares one query with each fact, and with the bound.
+fn compare(
+    proven: &Proven,
+    run: &Run,
+    counts: [i64; 3],
+    state: &mut [(usize, bool)],
+) -> Result<()> {
+    for (row, (broken, is_tight)) in proven.analysis.system.rows.iter().zip(state) {
+        let (left, right) = (run.left(row), row.most.of(counts));
+        *broken += usize::from(left > right);
+        *is_tight |= left == right && run.is_of(row);
+    }
+    let took = run.instructions;
+    ensure!(
+        i128::from(took) * UNIT <= proven.at(counts),
+        "a traced query of {took} instructions is above its bound"
+    );
+    Ok(())
+}
+
+/// Errors that are planted, and whether a trace finds each: a wrong fact, and a path that the graph does not have.
+pub fn planted(kind: &'static Kind, probe: &Path) -> Result<[bool; 2]> {
+    let batches = to_trace(40)?;
+    let batches = batches.get(..1).context("no batch")?;
+    let mut wrong = Proven::new(kind, probe, &PLAIN)?;
+    wrong.analysis.system.halve("turns of a leaf");
+    let traced = trace(&[wrong], probe, batches)?;
+    let is_broken = traced.iter().any(|traced| !traced.broken.is_empty());
+    let shorter = Proven::new(kind, probe, &WITHOUT_EDGES)?;
+    Ok([is_broken, trace(&[shorter], probe, batches).is_err()])
+}

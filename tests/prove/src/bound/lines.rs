@@ -1,0 +1,133 @@
+//! Places in the source, found in the program by its debug information.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use addr2line::Loader;
+use anyhow::{Context, Result, anyhow, ensure};
+
+/// A function that an instruction belongs to, by itself or by inlining.
+pub struct Frame {
+    /// With its generic arguments, without its path.
+    pub name: String,
+    file: String,
+    line: u32,
+}
+
+impl Frame {
+    /// For people.
+    pub fn describe(&self) -> String {
+        let file = self.file.rsplit('/').next().unwrap_or_default();
+        format!("{} {file}:{}", self.bare(), self.line)
+    }
+
+    /// The name without path and generic arguments.
+    pub fn bare(&self) -> &str {
+        let name = self.name.split('<').next().unwrap_or_default();
+        name.rsplit("::").next().unwrap_or_default()
+    }
+}
+
+/// A frame that an instruction must have.
+#[derive(Clone, Copy, Debug)]
+pub enum Within {
+    /// Of a function of this name.
+    Function(&'static str),
+    /// At the one line of a file that has this text: a line that moves stays found, one that changes does not.
+    Line(&'static str, &'static str),
+}
+
+/// The debug information of a program, and the source that it is of.
+pub struct Lines {
+    frames: BTreeMap<u32, Vec<Frame>>,
+    source: PathBuf,
+}
+
+impl Lines {
+    /// Of these instructions. The lines of the facts are those of the files below `source`.
+    pub fn read(program: &Path, source: &Path, places: impl Iterator<Item = u32>) -> Result<Self> {
+        let loader = Loader::new(program).map_err(wrong)?;
+        let mut frames = BTreeMap::new();
+        for at in places {
+            frames.insert(at, all_frames(&loader, at)?);
+        }
+        Ok(Self { frames, source: source.to_owned() })
+    }
+
+    /// The frames of an instruction, the innermost first.
+    pub fn of(&self, at: u32) -> &[Frame] {
+        self.frames.get(&at).map(Vec::as_slice).unwrap_or_default()
+    }
+
+    /// A place, for people.
+    pub fn describe(&self, at: u32) -> String {
+        let frames: Vec<String> = self.of(at).iter().rev().map(Frame::describe).collect();
+        format!("{at:#x}: {}", frames.join(" > "))
+    }
+
+    /// A test whether an instruction has all these frames.
+    pub fn all(&self, wanted: &[Within]) -> Result<impl Fn(u32) -> bool> {
+        let wanted: Vec<_> = wanted.iter().map(|one| self.number(one)).collect::<Result<_>>()?;
+        Ok(move |at: u32| {
+            let frames = self.of(at);
+            wanted.iter().all(|(name, line)| {
+                frames.iter().any(|frame| match line {
+                    Some(line) => frame.line == *line && frame.file.ends_with(name),
+                    None => frame.bare() == *name,
+                })
+            })
+        })
+    }
+
+    fn number(&self, wanted: &Within) -> Result<(&'static str, Option<u32>)> {
+        match *wanted {
+            Within::Function(name) => Ok((name, None)),
+            Within::Line(file, text) => {
+                let path = self.source.join(file);
+                let source = fs::read_to_string(&path)
+                    .with_context(|| format!("cannot read {}", path.display()))?;
+                let mut found = source.lines().zip(1..).filter(|(line, _)| line.contains(text));
+                let (_, line) = found.next().with_context(|| format!("{file} has no `{text}`"))?;
+                ensure!(found.next().is_none(), "{file} has `{text}` twice");
+                Ok((file, Some(line)))
+            }
+        }
+    }
+}
+
+/// The function, among some, whose own name contains a text.
+pub fn function_named(
+    program: &Path,
+    text: &str,
+    mut among: impl Iterator<Item = u32>,
+) -> Result<u32> {
+    let loader = Loader::new(program).map_err(wrong)?;
+    let is_named = |at: &u32| {
+        let frames = all_frames(&loader, *at).unwrap_or_default();
+        frames.last().is_some_and(|frame| frame.name.contains(text))
+    };
+    let found = among.find(is_named).with_context(|| format!("no function is named `{text}`"))?;
+    ensure!(!among.any(|at| is_named(&at)), "two functions are named `{text}`");
+    Ok(found)
+}
+
+fn all_frames(loader: &Loader, at: u32) -> Result<Vec<Frame>> {
+    let mut found = Vec::new();
+    let mut frames = loader.find_frames(u64::from(at)).map_err(wrong)?;
+    while let Some(frame) = frames.next().map_err(wrong)? {
+        let name = match &frame.function {
+            Some(function) => function.demangle().map_err(wrong)?.into_owned(),
+            None => String::new(),
+        };
+        let location = frame.location.as_ref();
+        let file = location.and_then(|place| place.file).unwrap_or_default().to_owned();
+        let line = location.and_then(|place| place.line).unwrap_or_default();
+        found.push(Frame { name, file, line });
+    }
+    Ok(found)
+}
+
+fn wrong(error: impl std::fmt::Display) -> anyhow::Error {
+    anyhow!("debug information: {error}")
+}

@@ -1,0 +1,22 @@
+//! A path bound: the most instructions that a query of a linked program can take.
+//!
+//! The program is read from its ELF file ([`image`], [`decode`]), as a control flow graph ([`graph`]) with its loops ([`loops`]).
+//! Flow facts ([`facts`]) are found in it by the debug information ([`lines`], [`system`]). A linear program prices them
+//! ([`prices`]), and an exact search of the longest walk checks that the prices give a bound ([`walk`]). [`queries`]
+//! are those that have a bound; [`trace`] and [`follow`] compare graph and facts with what an emulated processor executes.
+
+pub mod analysis;
+pub mod decode;
+pub mod facts;
+pub mod follow;
+pub mod graph;
+pub mod image;
+pub mod lines;
+pub mod loops;
+pub mod prices;
+pub mod queries;
+pub mod report;
+pub mod second;
+pub mod system;
+pub mod trace;
+pub mod walk;

@@ -1,0 +1,171 @@
+//! `cargo xtask bound`: docs/evidence/bound.md.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use xtask::toolchain::Cross;
+use xtask::{qemu, workspace};
+
+use super::facts::{MODAL, ONLY_FROM, PLAIN};
+use super::follow::{Traced, planted, trace};
+use super::queries::{Counted, KINDS, Proven, count, to_trace};
+use super::walk::UNIT;
+use crate::harness::run::Run;
+use crate::probe::build_for_board;
+
+/// Proves the bound of plain queries in the probe, compares it with the emulated board, and writes docs/evidence/bound.md.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Queries whose instructions are counted.
+    #[arg(long, default_value_t = 100_000)]
+    queries: usize,
+    /// Queries that are traced, instruction by instruction.
+    #[arg(long, default_value_t = 2_000)]
+    traces: usize,
+}
+
+/// A bound, and what the board says of it.
+pub struct Row {
+    pub proven: Proven,
+    pub counted: Counted,
+    pub traced: Traced,
+    /// Instructions that another decoder reads alike.
+    pub decoded: usize,
+}
+
+/// The result of a whole run.
+pub struct Findings {
+    pub rows: Vec<Row>,
+    /// Errors that were planted, and of them not found.
+    pub planted: usize,
+    pub unnoticed: usize,
+    /// Seconds that the proof itself took.
+    pub seconds: f64,
+}
+
+/// Proves, counts and traces.
+pub fn findings(probe: &Path, queries: usize, traces: usize) -> Result<Findings> {
+    let start = Instant::now();
+    let proven: Vec<Proven> =
+        KINDS.iter().map(|kind| Proven::new(kind, probe, kind.facts)).collect::<Result<_>>()?;
+    let seconds = start.elapsed().as_secs_f64();
+    let counted = count(&proven, probe, queries)?;
+    let traced = trace(&proven, probe, &to_trace(traces)?)?;
+    let mut rows = Vec::new();
+    for ((proven, counted), traced) in proven.into_iter().zip(counted).zip(traced) {
+        let decoded = proven.decoded(probe)?;
+        rows.push(Row { proven, counted, traced, decoded });
+    }
+    let capsule = KINDS.iter().find(|kind| kind.is_capsule).context("no capsule")?;
+    let found = planted(capsule, probe)?;
+    let unnoticed = found.iter().filter(|is_found| !**is_found).count();
+    Ok(Findings { rows, planted: found.len(), unnoticed, seconds })
+}
+
+/// Runs the task.
+pub fn run(options: &Options) -> Result<()> {
+    qemu::find()?;
+    let probe = build_for_board(&Cross::find()?, "probe")?;
+    let findings = findings(&probe, options.queries, options.traces)?;
+    let page = page(&findings, &Run::now(String::new()))?;
+    let file = workspace::root().join("docs/evidence").join("bound.md");
+    fs::write(&file, page).with_context(|| format!("cannot write {}", file.display()))?;
+    println!("{}", file.display());
+    let above: usize = findings.rows.iter().map(|row| row.counted.above).sum();
+    let broken: Vec<_> = findings.rows.iter().flat_map(|row| &row.traced.broken).collect();
+    ensure!(above == 0, "{above} queries are above their bound");
+    ensure!(broken.is_empty(), "facts that queries broke: {broken:?}");
+    ensure!(findings.unnoticed == 0, "{} planted errors were not found", findings.unnoticed);
+    Ok(())
+}
+
+fn page(findings: &Findings, run: &Run) -> Result<String> {
+    let mut text = format!(
+        "# A proven bound on instructions\n\n\
+         Written by `cargo xtask bound`: do not edit. Of the probe linked from commit {}, {}, {}.\n\n\
+         A plain query (`Query::closest`, unsigned, of a table of vertices or of a surface that modes move) that makes `n` node tests and `t` triangle tests in a tree with \
+         `a` roots besides the first takes at most `base + a * root + n * node test + t * triangle test` instructions of a Cortex-M7: no path \
+         through the linked program that keeps the flow facts below is longer. The facts are of \
+         [facts.rs](../../tests/prove/src/bound/facts.rs); the proof is checked in whole numbers \
+         ([walk.rs](../../tests/prove/src/bound/walk.rs)), so neither the solver nor its rounding is trusted. Trusted are the \
+         facts, the reader of the program, and that an instruction counts one, as it does for the emulator. A bound is of \
+         one linked program. Instructions, not cycles.\n\n\
+         | query | base | root | node test | triangle test | times the typical base, node and triangle test | functions | instructions in the graph |\n\
+         |---|---:|---:|---:|---:|---|---:|---:|\n",
+        run.commit, run.compiler, run.emulator
+    );
+    for Row { proven, .. } in &findings.rows {
+        let ratios = proven.ratios().map(|ratios| ratios.map(|one| format!("{one:.2}")).join(", "));
+        let constants = proven.whole().map(|constant| constant.to_string()).join(" | ");
+        writeln!(
+            text,
+            "| {} | {constants} | {} | {} | {} |",
+            proven.kind.name,
+            ratios.unwrap_or_default(),
+            proven.analysis.program.functions.len(),
+            proven.analysis.instructions(),
+        )?;
+    }
+    writeln!(
+        text,
+        "\nThe typical constants are those of `Cost`, a plane above measured queries plus a margin. The bound's worst leaf is one \
+         that two planes scan to the last vertex in vain, which queries seldom do: most of all a sphere's node test pays for it. The proof takes {:.1} s.\n\n\
+         ## Against the emulated board\n\n\
+         | query | counted | above the bound | largest share of the bound | mean share | traced | their instructions | facts \
+         broken | facts met with equality | blocks executed | instructions that a second decoder reads alike |\n\
+         |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+        findings.seconds
+    )?;
+    for Row { proven, counted, traced, decoded } in &findings.rows {
+        writeln!(
+            text,
+            "| {} | {} | {} | {:.0} % | {:.0} % | {} | {} | {} | {} of {} | {} of {} | {decoded} |",
+            proven.kind.name,
+            counted.queries,
+            counted.above,
+            100.0 * counted.share,
+            100.0 * counted.mean_share,
+            traced.queries,
+            traced.instructions,
+            traced.broken.len(),
+            traced.tight.len(),
+            proven.analysis.system.rows.len(),
+            traced.reached,
+            traced.blocks,
+        )?;
+    }
+    writeln!(
+        text,
+        "\nA traced query is followed instruction by instruction: each must be where the graph leads, and each fact is \
+         compared with the numbers of executions. Planted were {} errors, a wrong fact and a path that the graph does not \
+         have; not found: {}.\n\n## Flow facts\n\nThe price of a fact is what one more of its right side adds to the bound, in \
+         instructions, in the order of the queries above.\n\n| fact | price | reason |\n|---|---:|---|",
+        findings.planted, findings.unnoticed
+    )?;
+    for fact in MODAL.rows() {
+        let price = |row: &Row| {
+            let mut rows = row.proven.analysis.system.rows.iter();
+            let place = rows.position(|row| row.name == fact.name)?;
+            Some(format!("{:.2}", row.proven.bound.prices[place] as f64 / UNIT as f64))
+        };
+        let prices: Vec<String> =
+            findings.rows.iter().map(|row| price(row).unwrap_or_else(|| "–".to_owned())).collect();
+        writeln!(text, "| {} | {} | {} |", fact.name, prices.join(", "), fact.because)?;
+    }
+    text += "\nCalls that are never made:\n\n";
+    for (caller, callee, because) in PLAIN.never {
+        let of =
+            |name: &str| if name.is_empty() { "anything".to_owned() } else { format!("`{name}`") };
+        writeln!(text, "- from {} to {}: {because}", of(caller), of(callee))?;
+    }
+    for (callee, caller) in ONLY_FROM {
+        writeln!(
+            text,
+            "- to `{callee}` but from `{caller}`: checked, since its facts are of those calls"
+        )?;
+    }
+    Ok(text)
+}

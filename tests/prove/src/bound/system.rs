@@ -1,0 +1,212 @@
+//! Flow facts as inequalities between numbers of executions.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result, ensure};
+
+use super::facts::{Count, Fact, Most};
+use super::graph::{Function, Program};
+use super::image::Image;
+use super::lines::{Lines, Within};
+use super::loops::{Loop, dominators, loops};
+
+/// A part of the program, whose executions count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    Block(u32, usize),
+    Edge(u32, usize),
+}
+
+/// A fact: the sum of executions, each times its coefficient, is at most so much.
+pub struct Row {
+    pub name: &'static str,
+    pub coefficients: BTreeMap<Part, i64>,
+    pub most: Most,
+}
+
+/// The facts of a program, by the parts that they count.
+#[derive(Default)]
+pub struct System {
+    pub rows: Vec<Row>,
+    of_part: BTreeMap<Part, Vec<(usize, i64)>>,
+}
+
+impl System {
+    /// Finds the places of the facts. A fact that no place matches is an error.
+    pub fn new<'a>(
+        program: &Program,
+        image: &Image,
+        lines: &Lines,
+        facts: impl Iterator<Item = &'a Fact>,
+    ) -> Result<Self> {
+        let finder = Finder::new(program, image, lines)?;
+        let mut system = Self::default();
+        for fact in facts {
+            let mut coefficients = BTreeMap::new();
+            for (times, count) in fact.terms {
+                let found = finder.parts(count).with_context(|| format!("fact `{}`", fact.name))?;
+                for (part, weight) in found {
+                    *coefficients.entry(part).or_default() += times * weight;
+                }
+            }
+            system.add(Row { name: fact.name, coefficients, most: fact.most });
+        }
+        Ok(system)
+    }
+
+    /// Adds a fact.
+    pub fn add(&mut self, row: Row) {
+        let number = self.rows.len();
+        for (&part, &times) in &row.coefficients {
+            self.of_part.entry(part).or_default().push((number, times));
+        }
+        self.rows.push(row);
+    }
+
+    /// Halves what a fact allows for each other execution: a wrong fact, to be found.
+    pub fn halve(&mut self, name: &str) {
+        for row in self.rows.iter_mut().filter(|row| row.name == name) {
+            for times in row.coefficients.values_mut().filter(|times| **times < 0) {
+                *times /= 2;
+            }
+        }
+    }
+
+    /// The facts that count a part, with its coefficient.
+    pub fn of(&self, part: Part) -> &[(usize, i64)] {
+        self.of_part.get(&part).map(Vec::as_slice).unwrap_or_default()
+    }
+}
+
+/// Finds the parts that a fact counts.
+pub struct Finder<'a> {
+    program: &'a Program,
+    image: &'a Image,
+    lines: &'a Lines,
+    loops: BTreeMap<u32, Vec<Loop>>,
+}
+
+impl<'a> Finder<'a> {
+    pub fn new(program: &'a Program, image: &'a Image, lines: &'a Lines) -> Result<Self> {
+        let all = program.functions.iter().map(|(&at, function)| Ok((at, loops(function)?)));
+        Ok(Self { program, image, lines, loops: all.collect::<Result<_>>()? })
+    }
+
+    /// The parts, each with the number that one execution counts.
+    fn parts(&self, count: &Count) -> Result<Vec<(Part, i64)>> {
+        let found = match count {
+            Count::Passes(within) => each(self.blocks(within)?),
+            Count::Calls(within, callee) => each(self.calls(within, callee)?),
+            Count::Heads(within) => {
+                let heads = self.heads(within)?;
+                each(heads.into_iter().map(|(at, own)| Part::Block(at, own.header)))
+            }
+            Count::Entries(within) => {
+                let heads = self.heads(within)?;
+                let edges = heads.iter().flat_map(|(at, own)| own.enter.iter().map(|&e| (*at, e)));
+                each(edges.map(|(at, edge)| Part::Edge(at, edge)))
+            }
+            Count::Bytes(callee) => {
+                let calls = self.calls(&[], callee)?;
+                let copied = calls.into_iter().map(|part| Ok((part, self.length(part)?)));
+                copied.collect::<Result<_>>()?
+            }
+        };
+        ensure!(!found.is_empty(), "nothing in the program matches {count:?}");
+        Ok(found)
+    }
+
+    /// Blocks with an instruction in these frames, in the innermost loop that has such, that no other of them is always
+    /// before.
+    fn blocks(&self, within: &[Within]) -> Result<Vec<Part>> {
+        let is_there = self.lines.all(within)?;
+        let mut found = Vec::new();
+        for (&at, function) in &self.program.functions {
+            let has = |block: &usize| {
+                function.blocks[*block].instructions.iter().any(|&place| is_there(place))
+            };
+            let depth = |block: &usize| {
+                self.loops[&at].iter().filter(|own| own.blocks.contains(block)).count()
+            };
+            let mut all: Vec<usize> = (0..function.blocks.len()).filter(has).collect();
+            let Some(deepest) = all.iter().map(depth).max() else { continue };
+            all.retain(|block| depth(block) == deepest);
+            let before = dominators(function);
+            let is_first = |&&block: &&usize| {
+                !all.iter().any(|other| *other != block && before[block].contains(other))
+            };
+            found.extend(all.iter().filter(is_first).map(|&block| Part::Block(at, block)));
+        }
+        Ok(found)
+    }
+
+    /// Blocks that end in a call, in these frames, of a function whose name has this in it.
+    pub fn calls(&self, within: &[Within], callee: &str) -> Result<Vec<Part>> {
+        let is_there = self.lines.all(within)?;
+        let is_it =
+            |at: u32| self.program.functions.get(&at).is_some_and(|f| f.name.contains(callee));
+        let mut found = Vec::new();
+        for (&at, function) in &self.program.functions {
+            for (number, block) in function.blocks.iter().enumerate() {
+                let last = block.instructions.last().copied().unwrap_or_default();
+                if block.call.is_some_and(is_it) && is_there(last) {
+                    found.push(Part::Block(at, number));
+                }
+            }
+            for (number, edge) in function.edges.iter().enumerate() {
+                let last = function.blocks[edge.from].instructions.last().copied();
+                if edge.tail.is_some_and(is_it) && is_there(last.unwrap_or_default()) {
+                    found.push(Part::Edge(at, number));
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// The loops whose header has an instruction in these frames, without those within another of them.
+    fn heads(&self, within: &[Within]) -> Result<Vec<(u32, &Loop)>> {
+        let is_there = self.lines.all(within)?;
+        let mut found = Vec::new();
+        for (&at, loops) in &self.loops {
+            let function: &Function = &self.program.functions[&at];
+            let has = |own: &&Loop| {
+                function.blocks[own.header].instructions.iter().any(|&place| is_there(place))
+            };
+            let all: Vec<&Loop> = loops.iter().filter(has).collect();
+            let is_within = |own: &Loop, other: &Loop| {
+                own.header != other.header && other.blocks.contains(&own.header)
+            };
+            let outer = all.iter().filter(|own| !all.iter().any(|other| is_within(own, other)));
+            found.extend(outer.map(|own| (at, *own)));
+        }
+        Ok(found)
+    }
+
+    /// The constant length that a call copies, in r2.
+    fn length(&self, part: Part) -> Result<i64> {
+        let Part::Block(at, number) = part else { anyhow::bail!("copied by a jump") };
+        let block = &self.program.functions[&at].blocks[number];
+        for &place in block.instructions.iter().rev() {
+            let first = self.image.code(place)?;
+            // MOVS r2, and MOV.W r2 of a byte, and MOVW r2.
+            if first >> 8 == 0x22 {
+                return Ok(i64::from(first & 0xFF));
+            }
+            if first >> 11 < 0b11101 {
+                continue;
+            }
+            let second = self.image.code(place + 2)?;
+            let byte = i64::from(second & 0xFF);
+            match (first, second >> 8) {
+                (0xF04F, 2) => return Ok(byte),
+                (0xF240, high) if high & 15 == 2 => return Ok(byte | i64::from(high >> 4 & 7) << 8),
+                _ => {}
+            }
+        }
+        anyhow::bail!("the length that is copied at {:#x} is no constant", block.instructions[0])
+    }
+}
+
+fn each(parts: impl IntoIterator<Item = Part>) -> Vec<(Part, i64)> {
+    parts.into_iter().map(|part| (part, 1)).collect()
+}

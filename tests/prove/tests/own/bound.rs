@@ -1,0 +1,135 @@
+//! The path bound, on functions of a few instructions.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::env;
+
+use dibs_prove::bound::facts::{Count, Fact, Most};
+use dibs_prove::bound::graph::Program;
+use dibs_prove::bound::image::Image;
+use dibs_prove::bound::lines::{Lines, Within};
+use dibs_prove::bound::prices::least;
+use dibs_prove::bound::system::{Part, Row, System};
+use dibs_prove::bound::trace::Follower;
+use dibs_prove::bound::walk::{Longest, UNIT, longest};
+use xtask::workspace;
+
+/// PUSH; MOVS; a loop of ADDS, CBZ over the second half of it, CMP and BNE; POP.
+const SHORT: [u16; 8] = [0xB510, 0x2400, 0x3401, 0xB104, 0x42A0, 0xD1FB, 0xBD10, 0xBF00];
+/// The same with two NOP that CBZ may pass over.
+const LONG: [u16; 9] = [0xB510, 0x2400, 0x3401, 0xB10C, 0xBF00, 0xBF00, 0x42A0, 0xD1F9, 0xBD10];
+
+const ONE_NODE: Most = Most { base: 0, roots: 0, nodes: 1, triangles: 0 };
+const TYPICAL: Most = Most { base: 1, roots: 1, nodes: 100, triangles: 1 };
+
+fn program(halves: &[u16]) -> Program {
+    Program::read(&Image::of_halves(halves), 0, &BTreeSet::new()).expect("a program")
+}
+
+/// Each turn of the loop, which starts at the third instruction, is a node test.
+fn counted(program: &Program) -> System {
+    let blocks = &program.functions[&0].blocks;
+    let turn = blocks.iter().position(|block| block.instructions[0] == 4).expect("a loop");
+    let coefficients = BTreeMap::from([(Part::Block(0, turn), 1)]);
+    let mut system = System::default();
+    system.add(Row { name: "turns", coefficients, most: ONE_NODE });
+    system
+}
+
+/// Base and node test, in instructions.
+fn constants(halves: &[u16]) -> [f64; 2] {
+    let program = program(halves);
+    let system = counted(&program);
+    let bound = least(&program, &system, &TYPICAL, |at| format!("{at:#x}")).expect("a bound");
+    let [base, _, node, _] = bound.constants(&system).map(|part| part as f64 / UNIT as f64);
+    [base, node]
+}
+
+#[test]
+fn a_longer_path_raises_the_bound_by_its_length() {
+    let ([base, node], [longer_base, longer]) = (constants(&SHORT), constants(&LONG));
+    assert!((base - 3.0).abs() < 0.02 && (node - 4.0).abs() < 0.02, "{base} {node}");
+    assert!((longer_base - 3.0).abs() < 0.02, "{longer_base}");
+    assert!((longer - 6.0).abs() < 0.02, "{longer}");
+}
+
+#[test]
+fn a_loop_without_a_fact_is_named() {
+    let program = program(&LONG);
+    let found = least(&program, &System::default(), &TYPICAL, |at| format!("here {at:#x}"));
+    let error = found.err().expect("no bound").to_string();
+    assert!(error.contains("no fact bounds the loop through here"), "{error}");
+}
+
+/// So that a wrong answer of the solver is no bound.
+#[test]
+fn the_check_refuses_prices_that_are_too_low() {
+    let program = program(&LONG);
+    let system = counted(&program);
+    let at = |price: i128| longest(&program, &system, &[price]).expect("a program with an end");
+    assert!(matches!(at(6 * UNIT - 1), Longest::Cycles(_)));
+    let Longest::Walk(walk, gain) = at(6 * UNIT) else { panic!("the price is enough") };
+    // One turn, which pays for itself.
+    assert_eq!((walk.instructions, gain), (9, 3 * UNIT));
+    assert!(longest(&program, &system, &[-1]).is_err());
+}
+
+#[test]
+fn a_branch_to_a_register_and_recursion_are_errors() {
+    let read = |halves: &[u16]| Program::read(&Image::of_halves(halves), 0, &BTreeSet::new());
+    // BX r3, MOV pc, r3 and TBB [r1, r0].
+    for halves in [&[0x4718_u16][..], &[0x469F], &[0xE8D1, 0xF000]] {
+        let error = read(halves).err().expect("no program").to_string();
+        assert!(error.contains("leads to an address in a register"), "{error}");
+    }
+    // BL to itself.
+    let error = read(&[0xF7FF, 0xFFFE, 0x4770]).err().expect("no program").to_string();
+    assert!(error.contains("recursion"), "{error}");
+}
+
+#[test]
+fn a_return_under_a_condition_ends_the_function_or_not() {
+    // PUSH; CMP; IT NE; POPNE; NOP; POP.
+    let program = program(&[0xB510, 0x42A0, 0xBF18, 0xBD10, 0xBF00, 0xBD10]);
+    let Ok(Longest::Walk(walk, _)) = longest(&program, &System::default(), &[]) else {
+        panic!("no loop")
+    };
+    assert_eq!(walk.instructions, 6);
+    let ends = program.functions[&0].edges.iter().filter(|edge| edge.to.is_none()).count();
+    assert_eq!(ends, 2);
+}
+
+/// A line that is gone, and one whose code is not in the program.
+#[test]
+fn a_fact_that_matches_nothing_is_an_error() {
+    const GONE: &[(i64, Count)] =
+        &[(1, Count::Passes(&[Within::Line("Cargo.toml", "no such line")]))];
+    const NOWHERE: &[(i64, Count)] = &[(1, Count::Heads(&[Within::Function("nothing")]))];
+    let (image, program) = (Image::of_halves(&LONG), program(&LONG));
+    let own = env::current_exe().expect("a program");
+    let lines = Lines::read(&own, &workspace::root(), [].into_iter()).expect("symbols");
+    for (terms, says) in [(GONE, "has no `no such line`"), (NOWHERE, "nothing in the program")] {
+        let facts = [Fact { name: "wrong", terms, most: ONE_NODE, because: "" }];
+        let found = System::new(&program, &image, &lines, facts.iter());
+        let error = format!("{:#}", found.err().expect("no system"));
+        assert!(error.contains(says), "{error}");
+    }
+}
+
+#[test]
+fn a_trace_that_leaves_the_graph_or_breaks_a_fact_is_found() {
+    let program = program(&LONG);
+    let system = counted(&program);
+    let turn = [4, 6, 8, 10, 12, 14];
+    let path = |turns: usize| [&[0, 2][..], &turn.repeat(turns), &[16]].concat();
+    let mut follower = Follower::new(&program);
+    for at in path(3) {
+        follower.step(at).expect("on the graph");
+    }
+    let runs = follower.runs();
+    let [run] = &runs[..] else { panic!("one run") };
+    assert_eq!((run.instructions, run.left(&system.rows[0])), (21, 3));
+    // The second half of the loop without the first.
+    let mut follower = Follower::new(&program);
+    let left: Result<(), _> = [0, 2, 4, 12].into_iter().try_for_each(|at| follower.step(at));
+    assert!(left.is_err());
+}
