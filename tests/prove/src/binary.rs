@@ -12,6 +12,8 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
+use crate::bound::decode::{far, long_branch, near, signed};
+
 /// Stack of an exception's entry: 26 words with the FPU's registers, and alignment.
 pub const EXCEPTION_FRAME: u32 = 26 * 4 + 8;
 
@@ -310,20 +312,6 @@ fn decode(
     }
 }
 
-/// Target of a branch that the linker put in because it is far, from flash to the TCM: MOVW ip, MOVT ip, BX ip.
-fn long_branch(halves: [u32; 5]) -> Option<u32> {
-    let [first, second, third, fourth, last] = halves;
-    let half = |first: u32, second: u32| {
-        (first & 15) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
-    };
-    let loads_ip = first & 0xFBF0 == 0xF240
-        && third & 0xFBF0 == 0xF2C0
-        && second >> 8 & 15 == 12
-        && fourth >> 8 & 15 == 12;
-    let target = half(third, fourth) << 16 | half(first, second);
-    (loads_ip && last == 0x4760).then_some(target & !1)
-}
-
 /// Bytes by which a wide instruction lowers the stack pointer.
 fn wide_push(first: u32, second: u32) -> u32 {
     match first {
@@ -351,26 +339,4 @@ fn expand(constant: u32) -> u32 {
         3 => byte | byte << 8 | byte << 16 | byte << 24,
         _ => (0x80 | constant & 0x7F).rotate_right(constant >> 7),
     }
-}
-
-/// Target of BL and B.W (T4).
-fn far(at: u32, first: u32, second: u32) -> u32 {
-    let sign = first >> 10 & 1;
-    let one = !(second >> 13 ^ sign) & 1;
-    let two = !(second >> 11 ^ sign) & 1;
-    let offset = sign << 24 | one << 23 | two << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
-    at.wrapping_add(4).wrapping_add(signed(offset, 25))
-}
-
-/// Target of B.W under a condition (T3).
-fn near(at: u32, first: u32, second: u32) -> u32 {
-    let (sign, one, two) = (first >> 10 & 1, second >> 13 & 1, second >> 11 & 1);
-    let offset = sign << 20 | two << 19 | one << 18 | (first & 0x3F) << 12 | (second & 0x7FF) << 1;
-    at.wrapping_add(4).wrapping_add(signed(offset, 21))
-}
-
-/// The lower `bits` bits as a two's complement number.
-fn signed(value: u32, bits: u32) -> u32 {
-    let shift = 32 - bits;
-    ((value << shift).cast_signed() >> shift).cast_unsigned()
 }

@@ -91,6 +91,29 @@ fn wide(at: u32, first: u32, second: u32) -> Flow {
     Flow::Next
 }
 
+/// Whether an instruction may write a register of the lower eight: where its code has that number in any field for one. Some
+/// that only read the register count too.
+pub fn may_write(register: u32, first: u32, second: u32) -> bool {
+    let is_field = |half: u32, from: u32| half >> from & 15 == register;
+    if first >> 11 < 0b11101 {
+        let is_list = matches!(first >> 8, 0xBC | 0xBD) || first >> 12 == 0b1100;
+        return first & 7 == register
+            || first >> 8 & 7 == register
+            || is_list && first >> register & 1 == 1;
+    }
+    // Arithmetic, loads and stores of floats have none but the base that a load or store moves.
+    let is_float = first >> 8 == 0xEE && second & 16 == 0
+        || first >> 9 == 0b111_0110 && first & 0xFFE0 != 0xEC40;
+    if is_float && second >> 9 & 7 == 0b101 {
+        return first >> 8 != 0xEE && first & 0x20 != 0 && is_field(first, 0);
+    }
+    let is_list = first & 0xFE40 == 0xE800;
+    [(first, 0), (second, 0), (second, 8), (second, 12)]
+        .into_iter()
+        .any(|(half, from)| is_field(half, from))
+        || is_list && second >> register & 1 == 1
+}
+
 /// Target of BL and B.W (T4).
 pub fn far(at: u32, first: u32, second: u32) -> u32 {
     let sign = first >> 10 & 1;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
+use super::decode::may_write;
 use super::facts::{Count, Fact, Most};
 use super::graph::{Function, Program};
 use super::image::Image;
@@ -186,20 +187,19 @@ impl<'a> Finder<'a> {
     fn length(&self, part: Part) -> Result<i64> {
         let Part::Block(at, number) = part else { anyhow::bail!("copied by a jump") };
         let block = &self.program.functions[&at].blocks[number];
+        let last = block.instructions.last().copied().unwrap_or_default();
         for &place in block.instructions.iter().rev() {
             let first = self.image.code(place)?;
-            // MOVS r2, and MOV.W r2 of a byte, and MOVW r2.
-            if first >> 8 == 0x22 {
-                return Ok(i64::from(first & 0xFF));
-            }
-            if first >> 11 < 0b11101 {
-                continue;
-            }
-            let second = self.image.code(place + 2)?;
+            let is_wide = first >> 11 >= 0b11101;
+            let second = if is_wide { self.image.code(place + 2)? } else { 0 };
             let byte = i64::from(second & 0xFF);
+            // MOVS r2, and MOV.W r2 of a byte, and MOVW r2.
             match (first, second >> 8) {
+                _ if first >> 8 == 0x22 => return Ok(i64::from(first & 0xFF)),
                 (0xF04F, 2) => return Ok(byte),
                 (0xF240, high) if high & 15 == 2 => return Ok(byte | i64::from(high >> 4 & 7) << 8),
+                // The call itself has no register.
+                _ if place != last && may_write(2, first, second) => break,
                 _ => {}
             }
         }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 
+use dibs_prove::bound::decode::may_write;
 use dibs_prove::bound::facts::{Count, Fact, Most};
 use dibs_prove::bound::graph::Program;
 use dibs_prove::bound::image::Image;
@@ -132,4 +133,26 @@ fn a_trace_that_leaves_the_graph_or_breaks_a_fact_is_found() {
     let mut follower = Follower::new(&program);
     let left: Result<(), _> = [0, 2, 4, 12].into_iter().try_for_each(|at| follower.step(at));
     assert!(left.is_err());
+}
+
+#[test]
+fn what_may_write_a_register_is_found() {
+    // ADDS r2, #1; LDR r2, [r0]; POP {r2, pc}; MOV r2, r9; MOVW r2; LDRD r4, r2; LDM r0, {r2, r3}; VMOV r2, s0; VMOV r2, r3, d0;
+    // VLDMIA r2!
+    let writes = [
+        (0x3201, 0),
+        (0x6802, 0),
+        (0xBD04, 0),
+        (0x464A, 0),
+        (0xF240, 0x0210),
+        (0xE9D0, 0x4200),
+        (0xE890, 0x000C),
+        (0xEE10, 0x2A10),
+        (0xEC53, 0x2B10),
+        (0xECB2, 0x0A02),
+    ];
+    assert!(writes.iter().all(|&(first, second)| may_write(2, first, second)), "{writes:x?}");
+    // ADDS r3, #1; LDR r4, [r0]; MOVW r3; VADD.F32 s4, s4, s4; VLDR s5, [r2].
+    let others = [(0x3301, 0), (0x6804, 0), (0xF240, 0x0310), (0xEE32, 0x2A02), (0xEDD2, 0x2A00)];
+    assert!(!others.iter().any(|&(first, second)| may_write(2, first, second)), "{others:x?}");
 }
