@@ -10,6 +10,7 @@ mod misuse;
 mod nodes;
 mod programs;
 mod readme;
+mod ros2;
 mod script;
 mod sender;
 mod wrapper;
