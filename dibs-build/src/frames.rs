@@ -160,6 +160,12 @@ impl FrameCheck {
         &self.order
     }
 
+    /// Corners of the tree's triangles, by the mesh's numbers. None for frames of nodes.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        if self.is_of_nodes { &[] } else { &self.triangles }
+    }
+
     /// Positions of a frame: the vertices of the mesh's file, or the nodes.
     #[must_use]
     pub const fn positions(&self) -> usize {

@@ -53,6 +53,7 @@ enum Command {
     /// Write a page in which the surface moves and the query runs
     View(view::Args),
     /// Send a motion, recorded or as it comes, to a controller, over a serial line or a socket
+    #[command(visible_alias = "bridge")]
     Stream(stream::Args),
     /// Generate a procedural heart or brain
     Generate(generate::Args),

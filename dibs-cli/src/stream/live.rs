@@ -1,9 +1,7 @@
 //! Frames as they come: a thread reads them, and the newest waits to be sent.
 
-use super::parse::{Parsed, Parser};
 use anyhow::Result;
 use dibs_build::glam::Vec3;
-use std::io::Read;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -11,16 +9,33 @@ use std::time::{Duration, Instant};
 /// The time to the next frame that is assumed at the first one: of 30 frames a second.
 const FIRST_GAP: Duration = Duration::from_millis(33);
 
+/// A frame that fits the tree, as a source has it.
+pub struct Parsed {
+    /// In the mesh's order.
+    pub positions: Vec<Vec3>,
+    /// When its last byte came.
+    pub came: Instant,
+    pub age: Age,
+}
+
+/// What a source knows of a frame's age.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Age {
+    /// It states the time since the capture, also of frames that are equal.
+    Stated(Duration),
+    /// At least so long on the way. A frame that equals the one before it is as old as that one.
+    Delay(Duration),
+}
+
 /// A frame of a live source.
 pub struct Frame {
     /// In the mesh's order.
     pub positions: Vec<Vec3>,
     /// When it came.
     pub came: Instant,
-    /// When it came or, if it states no age, when the first of the equal ones before it did: a source that stands still
-    /// grows old.
-    pub captured: Instant,
-    /// Its age when it came.
+    /// When the one that it repeats came, or it did: a source that states no age and stands still grows old.
+    pub first: Instant,
+    /// The age at that time.
     pub age: Duration,
     /// Time from the frame before it.
     pub gap: Duration,
@@ -54,12 +69,16 @@ struct Place {
 }
 
 impl Live {
-    /// Starts to read. With `keeps_all` a frame waits until the one before it is taken; otherwise it replaces that one.
-    pub fn start<R: Read + Send + 'static>(parser: Parser<R>, keeps_all: bool) -> Self {
+    /// Starts to read what `next` gives, `None` at the end. With `keeps_all` a frame waits until the one before it is
+    /// taken; otherwise it replaces that one.
+    pub fn start(
+        next: impl FnMut() -> Result<Option<Parsed>> + Send + 'static,
+        keeps_all: bool,
+    ) -> Self {
         let shared = Arc::new(Shared::default());
         let filled = Arc::clone(&shared);
         // It may wait for input for ever: the program ends without it.
-        thread::spawn(move || filled.fill(parser, keeps_all));
+        thread::spawn(move || filled.fill(next, keeps_all));
         Self(shared)
     }
 
@@ -93,23 +112,24 @@ impl Shared {
         self.place.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn fill<R: Read>(&self, mut parser: Parser<R>, keeps_all: bool) {
-        let mut last: Option<(Vec<Vec3>, Instant, Instant)> = None;
+    fn fill(&self, mut next: impl FnMut() -> Result<Option<Parsed>>, keeps_all: bool) {
+        // The last positions, when they came, when their like first did, and its age then.
+        let mut last: Option<(Vec<Vec3>, Instant, Instant, Duration)> = None;
         let end = loop {
-            let Parsed { positions, age } = match parser.next() {
+            let Parsed { positions, came, age } = match next() {
                 Ok(Some(parsed)) => parsed,
                 Ok(None) => break Ok(()),
                 Err(error) => break Err(error),
             };
-            let came = Instant::now();
-            let captured = match &last {
-                Some((before, _, captured)) if age.is_none() && *before == positions => *captured,
-                _ => came,
+            let (first, age) = match (age, &last) {
+                (Age::Delay(_), Some((before, _, first, age))) if *before == positions => {
+                    (*first, *age)
+                }
+                (Age::Delay(age) | Age::Stated(age), _) => (came, age),
             };
-            let gap = last.as_ref().map_or(FIRST_GAP, |(_, last, _)| came - *last);
-            last = Some((positions.clone(), came, captured));
-            let age = age.unwrap_or_default();
-            let frame = Frame { positions, came, captured, age, gap };
+            let gap = last.as_ref().map_or(FIRST_GAP, |(_, last, ..)| came - *last);
+            last = Some((positions.clone(), came, first, age));
+            let frame = Frame { positions, came, first, age, gap };
             let mut place = self.place();
             if keeps_all {
                 let is_full = |place: &mut Place| place.frame.is_some();

@@ -1,12 +1,15 @@
 //! `dibs stream`: a motion, recorded or as it comes, sent to a controller.
 
+mod igtl;
 mod interrupt;
 mod key;
 mod live;
 mod memory;
 mod parse;
+mod place;
 mod player;
 mod report;
+mod timing;
 
 use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
@@ -18,13 +21,17 @@ use dibs_build::{Builder, Import, ReadOptions};
 use dibs_nostd::wire::AesCmac;
 use dibs_stream::transport::Target;
 use dibs_stream::{Sender, Settings, SurfaceOrder};
+use igtl::{Address, Exchange, Igtl};
 use interrupt::Interrupt;
 use live::Live;
 use memory::Memory;
 use parse::{Format, Parser};
+use place::{Axes, Place};
 use player::Player;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Duration;
 
 #[derive(clap::Args)]
 #[command(mut_arg("motion", |motion| motion.required_unless_present_any(["from", "unnamed_motion"]).conflicts_with("from")))]
@@ -40,6 +47,7 @@ Examples:
   solver | dibs stream heart.dibs --from - --to udp:192.168.1.20:5000
   solver | dibs stream heart.dibs --from - --format json --unit m --to udp:192.168.1.20:5000
   dibs stream heart.dibs --from shm:heart --to udp:192.168.1.20:5000
+  dibs bridge heart.dibs --from igtl:192.168.1.30:18944 --axes RAS:LPS --to udp:192.168.1.20:5000
 
 Frames of --from shm:NAME are raw in memory of that name, /dev/shm/NAME, after 16 bytes: a sequence number (u64), the number of
 positions (u32), 0 (u32). The number is 0 while there is no frame; the program that writes adds 1 before a frame and 1 after
@@ -59,12 +67,19 @@ pub struct Args {
     tree: PathBuf,
     #[command(flatten)]
     motion: MotionFile,
-    /// Frames as they come, instead of a recorded motion: from standard input (-), or from shared memory (shm:NAME)
+    /// Frames as they come, instead of a recorded motion: from standard input (-), from shared memory (shm:NAME), or from
+    /// OpenIGTLink (igtl:HOST:PORT, igtl-listen:PORT)
     #[arg(long, value_name = "SOURCE", conflicts_with_all = ["weights", "repeat"])]
     from: Option<LiveSource>,
     /// What the frames of --from are
     #[arg(long, value_enum, default_value_t = Format::Raw, conflicts_with_all = ["motion", "unnamed_motion"])]
     format: Format,
+    /// The axes of the frames and of the tree, FROM:TO: RAS:LPS turns frames of 3D Slicer for a mesh that it saved
+    #[arg(long, conflicts_with_all = ["motion", "unnamed_motion"])]
+    axes: Option<Axes>,
+    /// Take the messages of this OpenIGTLink device alone
+    #[arg(long, conflicts_with_all = ["motion", "unnamed_motion"])]
+    device: Option<String>,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
     /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next one
     #[arg(long)]
@@ -102,7 +117,8 @@ pub struct Args {
     /// Frames that may be on their way before the next one waits, where the receiver reports
     #[arg(long, default_value_t = 2)]
     window: u32,
-    /// How long to try to connect again after the connection broke; 0 gives up at once
+    /// How long to try to connect again after the connection broke, and to an OpenIGTLink server also at the start; 0 gives
+    /// up at once
     #[arg(long, value_name = "SECONDS", default_value_t = 10)]
     retry: u64,
     #[command(flatten)]
@@ -136,6 +152,7 @@ enum LiveSource {
     Input,
     /// Shared memory by its name.
     Memory(String),
+    Igtl(Address),
 }
 
 impl FromStr for LiveSource {
@@ -147,7 +164,10 @@ impl FromStr for LiveSource {
                 Ok(Self::Memory(name.to_owned()))
             }
             None if text == "-" => Ok(Self::Input),
-            _ => Err("give - for standard input, or shm:NAME for shared memory".to_owned()),
+            _ => text.parse().map(Self::Igtl).map_err(|()| {
+                "give - for standard input, or shm:NAME for shared memory, or igtl:HOST:PORT or igtl-listen:PORT for OpenIGTLink"
+                    .to_owned()
+            }),
         }
     }
 }
@@ -167,28 +187,43 @@ enum Frames {
         /// The weights of each frame, if weights are sent.
         weights: Option<Vec<Vec<f32>>>,
     },
-    Live(Live),
+    Live {
+        live: Live,
+        /// With a source that counts what it refuses, and is told what the receiver reports.
+        exchange: Option<Arc<Exchange>>,
+    },
 }
 
 /// Starts to read frames as they come.
 fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> Result<Source> {
-    let (unit, keeps_all) = (args.lengths.unit(), rate.is_some());
-    let (name, live) = match &args.from {
-        Some(LiveSource::Memory(memory)) => {
-            if args.format != Format::Raw {
-                bail!("--format: frames in shared memory are raw");
-            }
-            let (name, input) = (format!("shm:{memory}"), Memory::open(memory, order.positions())?);
-            let parser = Parser::new(name.clone(), Format::Raw, unit, origin, order, input);
-            (name, Live::start(parser, keeps_all))
-        }
-        _ => {
+    let (unit, axes, keeps_all) = (args.lengths.unit(), args.axes, rate.is_some());
+    let place = Place { unit, axes, origin, order: order.clone() };
+    let source = args.from.as_ref().unwrap_or(&LiveSource::Input);
+    if args.format != Format::Raw && !matches!(source, LiveSource::Input) {
+        bail!("--format: frames in shared memory are raw, and those of OpenIGTLink have its own");
+    }
+    if args.device.is_some() && !matches!(source, LiveSource::Igtl(_)) {
+        bail!("--device: only OpenIGTLink has devices");
+    }
+    let (name, live, exchange) = match source {
+        LiveSource::Input => {
             let (name, input) = ("standard input".to_owned(), std::io::stdin());
-            let parser = Parser::new(name.clone(), args.format, unit, origin, order, input);
-            (name, Live::start(parser, keeps_all))
+            let mut parser = Parser::new(name.clone(), args.format, place, input);
+            (name, Live::start(move || parser.next(), keeps_all), None)
+        }
+        LiveSource::Memory(memory) => {
+            let (name, input) = (format!("shm:{memory}"), Memory::open(memory, order.positions())?);
+            let mut parser = Parser::new(name.clone(), Format::Raw, place, input);
+            (name, Live::start(move || parser.next(), keeps_all), None)
+        }
+        LiveSource::Igtl(address) => {
+            let exchange = Arc::<Exchange>::default();
+            let (device, patience) = (args.device.clone(), Duration::from_secs(args.retry));
+            let mut igtl = Igtl::new(address, device, patience, place, Arc::clone(&exchange))?;
+            (address.to_string(), Live::start(move || igtl.next(), keeps_all), Some(exchange))
         }
     };
-    Ok(Source { name, frames: Frames::Live(live), rate })
+    Ok(Source { name, frames: Frames::Live { live, exchange }, rate })
 }
 
 /// Reads a recorded motion, all of whose frames can be sent.

@@ -1,12 +1,11 @@
 //! Frames from a stream of bytes: raw numbers, or JSON lines.
 
+use super::live::{Age, Parsed};
+use super::place::Place;
 use anyhow::{Result, anyhow, bail};
-use dibs_build::glam::{DVec3, Vec3};
-use dibs_build::{Motion, ReadErrorKind, Unit};
-use dibs_stream::SurfaceOrder;
 use serde::Deserialize;
 use std::io::{BufRead, BufReader, Read};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Bytes of a raw position.
 pub const RAW: usize = 12;
@@ -29,19 +28,9 @@ pub struct Parser<R> {
     name: String,
     input: BufReader<R>,
     format: Format,
-    unit: Option<Unit>,
-    origin: DVec3,
-    order: SurfaceOrder,
+    place: Place,
     /// Of the next frame, from 0.
     number: usize,
-}
-
-/// A frame that fits the tree.
-pub struct Parsed {
-    /// In the mesh's order.
-    pub positions: Vec<Vec3>,
-    /// The time since its capture that it states.
-    pub age: Option<Duration>,
 }
 
 /// Positions in the source's unit, and the age that they state.
@@ -58,16 +47,9 @@ struct Object {
 }
 
 impl<R: Read> Parser<R> {
-    pub fn new(
-        name: String,
-        format: Format,
-        unit: Option<Unit>,
-        origin: DVec3,
-        order: &SurfaceOrder,
-        input: R,
-    ) -> Self {
+    pub fn new(name: String, format: Format, place: Place, input: R) -> Self {
         let input = BufReader::with_capacity(1 << 18, input);
-        Self { name, input, format, unit, origin, order: order.clone(), number: 0 }
+        Self { name, input, format, place, number: 0 }
     }
 
     /// The next frame; `None` at the end.
@@ -84,22 +66,16 @@ impl<R: Read> Parser<R> {
             }
             return Ok(None);
         };
+        let came = Instant::now();
         self.number += 1;
-        // Fewer positions have an error of their own.
-        let positions = Motion::frame_around(&positions, number, self.unit, self.origin);
-        let positions = positions.map_err(|error| match error {
-            ReadErrorKind::NonFinite { vertex, value } => anyhow!(
-                "{name}: {vertex} has the coordinate {value}, which is not a finite number: leave such frames out, and \
-                 check that --format is what the program writes"
-            ),
-            error => anyhow!("{name}: {error}"),
-        })?;
-        self.order.to_rows(&positions).map_err(|error| in_frame(error.into()))?;
-        Ok(Some(Parsed { positions, age }))
+        let positions = self.place.frame(positions, number);
+        let positions = positions.map_err(|error| anyhow!("{name}: {error}"))?;
+        let age = age.map_or(Age::Delay(Duration::ZERO), Age::Stated);
+        Ok(Some(Parsed { positions, came, age }))
     }
 
     fn raw(&mut self) -> Result<Option<Unplaced>> {
-        let count = self.order.positions();
+        let count = self.place.order.positions();
         let size = RAW * count;
         let mut bytes = Vec::with_capacity(size);
         (&mut self.input).take(size as u64).read_to_end(&mut bytes)?;
@@ -123,7 +99,7 @@ impl<R: Read> Parser<R> {
     }
 
     fn json(&mut self) -> Result<Option<Unplaced>> {
-        let most = (MOST_JSON * (self.order.positions() + 16)) as u64;
+        let most = (MOST_JSON * (self.place.order.positions() + 16)) as u64;
         let mut line = Vec::new();
         while line.trim_ascii().is_empty() {
             line.clear();

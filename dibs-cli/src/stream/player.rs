@@ -3,6 +3,7 @@
 use super::interrupt::Interrupt;
 use super::live::Next;
 use super::report::{self, Display, Outcome};
+use super::timing::Timing;
 use super::{Args, Frames, Source};
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::Vec3;
@@ -54,6 +55,8 @@ struct Due<'a> {
     ago: Duration,
     /// Time to the next one, as far as it is known.
     period: Duration,
+    /// When its last byte came, of a live source.
+    came: Option<Instant>,
 }
 
 impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
@@ -75,7 +78,11 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         let played = self.play();
         let refused = self.refused();
         self.display.finish();
-        report::print(&self.sender, &self.outcome, self.args.json);
+        let exchange = match &self.source.frames {
+            Frames::Live { exchange, .. } => exchange.as_deref(),
+            Frames::Recorded { .. } => None,
+        };
+        report::print(&self.sender, &self.outcome, exchange, self.args.json);
         played.and(refused)
     }
 
@@ -171,9 +178,9 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                     None => Rows::Positions(Cow::Borrowed(&positions[at])),
                 };
                 // A recorded frame counts as captured when it is due, even if the surface stands still.
-                return Ok(Some(Due { rows, ago: Duration::ZERO, period }));
+                return Ok(Some(Due { rows, ago: Duration::ZERO, period, came: None }));
             }
-            Frames::Live(live) => live,
+            Frames::Live { live, .. } => live,
         };
         while !self.interrupt.is_raised() {
             match live.next(GLANCE)? {
@@ -182,9 +189,10 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                     self.outcome.passed_over = live.passed_over();
                     let rows = Rows::Positions(Cow::Owned(frame.positions));
                     let waited =
-                        if period.is_zero() { frame.captured.elapsed() } else { Duration::ZERO };
+                        if period.is_zero() { frame.first.elapsed() } else { Duration::ZERO };
                     let period = if period.is_zero() { frame.gap } else { period };
-                    return Ok(Some(Due { rows, ago: frame.age + waited, period }));
+                    let (ago, came) = (frame.age + waited, Some(frame.came));
+                    return Ok(Some(Due { rows, ago, period, came }));
                 }
                 Next::Later => self.poll()?,
                 Next::End => break,
@@ -206,6 +214,9 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         };
         let sent = prepared.and_then(|prepared| {
             let packets = prepared.sent().packets;
+            if let Some(came) = frame.came {
+                self.outcome.timing.get_or_insert_with(Timing::new).count(came);
+            }
             let mut pace = Pace::new(Instant::now(), spread, packets);
             sender.transmit_paced(prepared, || pace.wait())
         });
@@ -227,6 +238,14 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     }
 
     fn poll(&mut self) -> Result<()> {
+        if let Frames::Live { exchange: Some(exchange), .. } = &self.source.frames {
+            if let Some(note) = exchange.note() {
+                self.display.note(&note);
+            }
+            if let Some(report) = report::receiver(&self.sender) {
+                exchange.report(report);
+            }
+        }
         match self.sender.poll() {
             Err(SendError::Line(error)) => self.reconnect(&error),
             polled => Ok(polled?),

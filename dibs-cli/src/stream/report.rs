@@ -1,5 +1,7 @@
 //! The display of `dibs stream`, while it runs and at the end.
 
+use super::igtl::{Exchange, Report};
+use super::timing::Timing;
 use dibs_nostd::wire::{Content, Counters, Event, Mac};
 use dibs_stream::transport::Line;
 use dibs_stream::{Sender, Sent};
@@ -25,6 +27,8 @@ pub struct Outcome {
     pub reconnections: u64,
     /// Datagrams that came back.
     pub refused: u64,
+    /// Times of a live source's frames.
+    pub timing: Option<Timing>,
     /// Whether the user ended it.
     pub is_interrupted: bool,
 }
@@ -85,30 +89,37 @@ fn line<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>, sent: &Sent) ->
     };
     let Sent { epoch, bytes, rows, .. } = sent;
     let mut text = format!("frame {epoch}: {bytes} bytes, {kind} {rows}");
-    match (sender.status(), sender.acknowledged()) {
-        (None, _) => text += "; no status from the receiver yet",
-        (Some(_), None) => text += "; nothing published yet",
-        (Some(status), Some(newest)) => {
-            let published = status.published;
-            let age = published.map_or(0, |p| p.age_ms);
-            let _ = write!(text, "; published {newest}, {age} ms old");
-            if let Some(stretch) = published.and_then(|p| p.stretch) {
-                let _ = write!(text, ", stretch {stretch:.3}");
-            }
+    text += "; ";
+    text += &receiver(sender).map_or("no status from the receiver yet".to_owned(), |it| it.text);
+    text
+}
+
+/// What the receiver says of itself; `None` before its first status.
+pub fn receiver<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>) -> Option<Report> {
+    let status = sender.status()?;
+    let mut text = match sender.acknowledged() {
+        None => "nothing published yet".to_owned(),
+        Some(newest) => {
+            let age = status.published.map_or(0, |p| p.age_ms);
+            format!("published {newest}, {age} ms old")
         }
+    };
+    let is_acknowledged = sender.acknowledged().is_some();
+    let stretch = status.published.and_then(|p| p.stretch).filter(|_| is_acknowledged);
+    if let Some(stretch) = stretch {
+        let _ = write!(text, ", stretch {stretch:.3}");
     }
-    let safety = sender.status().map_or("", |status| match status.safety {
+    text += match status.safety {
         1 => ", nominal",
         2 => ", degraded",
         3 => ", SAFE",
         _ => "",
-    });
-    text += safety;
+    };
     let rejected = sender.counters().rejected();
     if rejected > 0 {
         let _ = write!(text, "; {rejected} rejected: {}", causes(sender.counters()).join(", "));
     }
-    text
+    Some(Report { is_ready: is_acknowledged && status.safety != 3, text })
 }
 
 /// The causes of rejection that have occurred, with their counts.
@@ -124,9 +135,11 @@ fn causes(counters: &Counters) -> Vec<String> {
 pub fn print<M: Mac, const MTU: usize>(
     sender: &Sender<Line, MTU, M>,
     outcome: &Outcome,
+    source: Option<&Exchange>,
     json: bool,
 ) {
-    let Outcome { late, passed_over, reconnections, refused, is_interrupted } = *outcome;
+    let &Outcome { late, passed_over, reconnections, refused, ref timing, is_interrupted } =
+        outcome;
     let totals = sender.totals();
     let per_frame = totals.bytes as f64 / totals.frames.max(1) as f64;
     if json {
@@ -146,6 +159,8 @@ pub fn print<M: Mac, const MTU: usize>(
                 "passed_over": passed_over,
                 "reconnections": reconnections,
                 "refused": refused,
+                "timing": timing.as_ref().map(Timing::json),
+                "source": source.map(Exchange::json),
                 "interrupted": is_interrupted,
                 "statuses": totals.statuses,
                 "acknowledged": sender.acknowledged(),
@@ -165,6 +180,12 @@ pub fn print<M: Mac, const MTU: usize>(
         println!(
             "passed    {passed_over} frames over: newer ones came; --motion-rate sends all of a recording"
         );
+    }
+    if let Some(timing) = timing {
+        println!("timing    {}", timing.text());
+    }
+    if let Some(source) = source {
+        println!("source    {}", source.text());
     }
     if reconnections > 0 {
         println!("line      broke and came back {reconnections} times");

@@ -48,6 +48,8 @@ pub const WORDS: &[Row] = &[
     ("origin", "X,Y,Z", "the point that coordinates count from", "build stretch"),
     ("from", "SOURCE", "where frames come from as they are made", "stream"),
     ("format", "FORMAT", "what those frames are", "stream"),
+    ("axes", "AXES", "the axes of those frames and of the tree", "stream"),
+    ("device", "DEVICE", "the OpenIGTLink device whose frames are taken", "stream"),
     ("to", "TO", "the receiver's address", "stream"),
     ("quantise", "", "6 bytes a vertex", "stream"),
     ("partial", "TOLERANCE", "distance of vertices that stand still", "stream"),

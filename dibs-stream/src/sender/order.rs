@@ -57,6 +57,12 @@ impl SurfaceOrder {
         self.check.as_ref().map_or_else(last, FrameCheck::positions)
     }
 
+    /// Corners of the tree's triangles, by the mesh's numbers. None where the order is that of no tree, or of nodes.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        self.check.as_ref().map_or(&[], FrameCheck::triangles)
+    }
+
     /// Checks that the faces of a motion's files are those of the tree, where the order is that of one.
     ///
     /// # Errors

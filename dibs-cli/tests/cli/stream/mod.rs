@@ -3,6 +3,9 @@
 //!
 //! One file, because all tests receive by the same helpers.
 
+mod igtl;
+mod igtl_messages;
+mod igtl_peers;
 mod live;
 #[cfg(target_os = "linux")]
 mod memory;

@@ -1,0 +1,119 @@
+//! The one way in which two lists of triangles are the same, if there is one.
+//!
+//! Vertices get colours that tell their surroundings apart, farther in each round (Weisfeiler and Leman). Once every vertex
+//! has a colour of its own, any two numberings of the mesh pair vertices of one colour: there is one at most. The pairs are
+//! compared triangle by triangle, so a colour that two surroundings share by chance gives no wrong pair.
+
+/// Whether lists of triangles are the same.
+#[derive(Debug, PartialEq)]
+pub enum Matched {
+    /// In one way: each vertex of the first with that of the second.
+    One(Vec<[u32; 2]>),
+    /// In several ways, or in one that colours do not find.
+    Several,
+    None,
+}
+
+/// Compares with the triangles turned as they are, and if they are not the same so, however they are turned: a builder
+/// turns triangles outwards.
+pub fn matched(ours: &[[u32; 3]], theirs: &[[u32; 3]]) -> Matched {
+    match turned(ours, theirs, true) {
+        Matched::None => turned(ours, theirs, false),
+        found => found,
+    }
+}
+
+fn turned(ours: &[[u32; 3]], theirs: &[[u32; 3]], is_oriented: bool) -> Matched {
+    let mut both = [Colours::new(ours, is_oriented), Colours::new(theirs, is_oriented)];
+    let mut last = 0;
+    loop {
+        let [first, second] = both.each_ref().map(Colours::sorted);
+        if ours.len() != theirs.len()
+            || !first.iter().map(|one| one.0).eq(second.iter().map(|one| one.0))
+        {
+            return Matched::None;
+        }
+        let colours = first.chunk_by(|one, next| one.0 == next.0).count();
+        if colours == first.len() {
+            let pairs: Vec<[u32; 2]> =
+                first.iter().zip(&second).map(|(one, other)| [one.1, other.1]).collect();
+            let is_same = is_same(ours, theirs, &pairs, is_oriented);
+            return if is_same { Matched::One(pairs) } else { Matched::None };
+        }
+        if colours == last {
+            return Matched::Several;
+        }
+        last = colours;
+        both.iter_mut().for_each(Colours::refine);
+    }
+}
+
+struct Colours<'a> {
+    triangles: &'a [[u32; 3]],
+    is_oriented: bool,
+    /// Vertices that a triangle has.
+    used: Vec<u32>,
+    of: Vec<u64>,
+}
+
+impl<'a> Colours<'a> {
+    fn new(triangles: &'a [[u32; 3]], is_oriented: bool) -> Self {
+        let mut used: Vec<u32> = triangles.concat();
+        used.sort_unstable();
+        used.dedup();
+        let count = used.last().map_or(0, |&last| last as usize + 1);
+        Self { triangles, is_oriented, used, of: vec![0; count] }
+    }
+
+    /// Colours with their vertices, in the order of the colours.
+    fn sorted(&self) -> Vec<(u64, u32)> {
+        let mut sorted: Vec<_> =
+            self.used.iter().map(|&vertex| (self.of[vertex as usize], vertex)).collect();
+        sorted.sort_unstable();
+        sorted
+    }
+
+    /// The next colour of a vertex is made of its own and those of its triangles, in any order.
+    fn refine(&mut self) {
+        let mut next: Vec<u64> = self.of.iter().map(|&colour| mixed(colour)).collect();
+        for &[a, b, c] in self.triangles {
+            for [one, left, right] in [[a, b, c], [b, c, a], [c, a, b]] {
+                let [left, right] = [left, right].map(|vertex| mixed(self.of[vertex as usize] ^ 1));
+                let right = if self.is_oriented { right.rotate_left(17) } else { right };
+                let next = &mut next[one as usize];
+                *next = next.wrapping_add(mixed(left.wrapping_add(right)));
+            }
+        }
+        self.of = next;
+    }
+}
+
+/// The output function of `SplitMix64`.
+fn mixed(bits: u64) -> u64 {
+    let bits = bits.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    let bits = (bits ^ bits >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    let bits = (bits ^ bits >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    bits ^ bits >> 31
+}
+
+fn is_same(ours: &[[u32; 3]], theirs: &[[u32; 3]], pairs: &[[u32; 2]], is_oriented: bool) -> bool {
+    let count = pairs.iter().map(|pair| pair[0] as usize + 1).max().unwrap_or(0);
+    let mut theirs_of = vec![0; count];
+    pairs.iter().for_each(|&[one, other]| theirs_of[one as usize] = other);
+    let normal = |mut triangle: [u32; 3]| {
+        if is_oriented {
+            let least = (0..3).min_by_key(|&at| triangle[at]).unwrap_or(0);
+            triangle.rotate_left(least);
+        } else {
+            triangle.sort_unstable();
+        }
+        triangle
+    };
+    let sorted = |triangles: &mut dyn Iterator<Item = [u32; 3]>| {
+        let mut triangles: Vec<_> = triangles.map(normal).collect();
+        triangles.sort_unstable();
+        triangles
+    };
+    let mut ours = ours.iter().map(|triangle| triangle.map(|vertex| theirs_of[vertex as usize]));
+    sorted(&mut ours) == sorted(&mut theirs.iter().copied())
+}

@@ -1,0 +1,170 @@
+//! `--from igtl:HOST:PORT`: positions out of OpenIGTLink messages, and the receiver's status back.
+//!
+//! A message that cannot be used is counted and passed over, and a connection that ends is made again: the receiver's
+//! surface ages meanwhile.
+
+mod content;
+mod delay;
+mod exchange;
+mod matching;
+mod message;
+mod peer;
+#[cfg(test)]
+mod tests;
+mod topology;
+
+pub use exchange::{Exchange, Report};
+pub use peer::Address;
+
+use super::live::{Age, Parsed};
+use super::place::Place;
+use anyhow::Result;
+use content::{Content, Kind};
+use delay::Delay;
+use exchange::Cause;
+use message::{BodyError, Header};
+use peer::{Door, Ended, Peer};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use topology::Topology;
+
+/// A source of frames.
+pub struct Igtl {
+    name: String,
+    door: Door,
+    peer: Option<Peer>,
+    /// The only device whose positions are taken.
+    device: Option<String>,
+    place: Place,
+    topology: Topology,
+    exchange: Arc<Exchange>,
+    delay: Delay,
+    body: Vec<u8>,
+    /// Of the next message with positions, from 0.
+    number: usize,
+}
+
+/// A message that is refused.
+type Refusal = (Cause, String);
+
+impl Igtl {
+    /// # Errors
+    /// If nobody can connect here.
+    pub fn new(
+        address: &Address,
+        device: Option<String>,
+        patience: Duration,
+        place: Place,
+        exchange: Arc<Exchange>,
+    ) -> Result<Self> {
+        let topology = Topology::new(place.order.clone());
+        let (name, door) = (address.to_string(), Door::new(address.clone(), patience)?);
+        let (peer, delay, body, number) = (None, Delay::new(), Vec::new(), 0);
+        Ok(Self { name, door, peer, device, place, topology, exchange, delay, body, number })
+    }
+
+    /// The next frame that fits the tree.
+    ///
+    /// # Errors
+    /// If the server cannot be reached within the time that the user allows.
+    pub fn next(&mut self) -> Result<Option<Parsed>> {
+        loop {
+            let mut peer = match self.peer.take() {
+                Some(peer) => peer,
+                None => {
+                    self.exchange.connected();
+                    self.delay = Delay::new();
+                    self.door.next()?
+                }
+            };
+            match self.message(&mut peer) {
+                Ok(parsed) => {
+                    self.peer = Some(peer);
+                    if parsed.is_some() {
+                        return Ok(parsed);
+                    }
+                }
+                Err(Ended::Closed) => (),
+                Err(Ended::Broken(why)) => self.exchange.broken(format!("{}: {why}", self.name)),
+            }
+        }
+    }
+
+    /// Reads one message. `None` if it has no frame, or none that fits.
+    fn message(&mut self, peer: &mut Peer) -> Result<Option<Parsed>, Ended> {
+        let header = peer.header(&self.door, &self.exchange)?;
+        let is_device = self.device.as_ref().is_none_or(|device| *device == header.device);
+        let Some(kind) = Kind::of(&header.kind).filter(|_| is_device) else {
+            peer.skip(header.size)?;
+            self.exchange.passed();
+            return Ok(None);
+        };
+        let most = self.most();
+        let read = if header.size > most {
+            peer.skip(header.size)?;
+            Err((
+                Cause::Layout,
+                format!("has {} bytes, and the tree's surface needs at most {most}", header.size),
+            ))
+        } else {
+            let mut body = std::mem::take(&mut self.body);
+            let whole = peer.body(header.size, &mut body);
+            let came = Instant::now();
+            let read = whole.map(|()| self.read(&header, kind, &body, came));
+            self.body = body;
+            read?
+        };
+        self.number += 1;
+        match read {
+            Ok(parsed) => {
+                self.exchange.accepted();
+                Ok(Some(parsed))
+            }
+            Err((cause, why)) => {
+                let what = format!(
+                    "{}, {} of device \"{}\": {why}",
+                    self.name, header.kind, header.device
+                );
+                self.exchange.refused(cause, what);
+                peer.report(&self.exchange);
+                Ok(None)
+            }
+        }
+    }
+
+    /// Bytes of the largest message of this surface: 256 for a point, with its attributes, and 64 for a triangle.
+    fn most(&self) -> u64 {
+        let order = &self.place.order;
+        (1 << 20) + 256 * order.positions() as u64 + 64 * order.triangles().len() as u64
+    }
+
+    fn read(
+        &mut self,
+        header: &Header,
+        kind: Kind,
+        body: &[u8],
+        came: Instant,
+    ) -> Result<Parsed, Refusal> {
+        let content = header.content(body).map_err(|error| match error {
+            BodyError::Checksum => (Cause::Checksum, "its checksum is wrong".to_owned()),
+            BodyError::Layout => {
+                (Cause::Layout, "its extended header reaches outside of it".to_owned())
+            }
+        })?;
+        let layout = match kind {
+            Kind::Array => "is no array of N times 3 numbers, float32 or float64",
+            Kind::PolyData | Kind::Point => {
+                "is not as the protocol has it: a list ends early, or too late"
+            }
+        };
+        let Content { mut positions, cells } =
+            kind.read(content).ok_or_else(|| (Cause::Layout, layout.to_owned()))?;
+        if let Some(cells) = cells {
+            let numbering = self.topology.numbering(positions.len(), cells);
+            positions = numbering.map_err(|why| (Cause::Topology, why))?.apply(positions);
+        }
+        let positions = self.place.frame(positions, self.number);
+        let positions = positions.map_err(|error| (Cause::Frame, error.to_string()))?;
+        Ok(Parsed { positions, came, age: Age::Delay(self.delay.of(header.time)) })
+    }
+}

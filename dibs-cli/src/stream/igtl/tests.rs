@@ -1,0 +1,190 @@
+//! No message puts a vertex where another one is. `DIBS_FRAMES` gives the number of messages.
+
+use super::content::Kind;
+use super::matching::{Matched, matched};
+use super::message::{HEADER, Header, pack};
+use super::topology::Topology;
+use dibs_build::generate::{brain, heart};
+use dibs_build::glam::Vec3;
+use dibs_build::{Builder, Mesh};
+use dibs_stream::SurfaceOrder;
+use fastrand::Rng;
+
+/// Messages between two topologies.
+const RUN: u64 = 50;
+
+fn order(mesh: &Mesh) -> SurfaceOrder {
+    let built = Builder::new().build(mesh).expect("a tree");
+    SurfaceOrder::of(&built.tree::<u16>().expect("a tree"))
+}
+
+/// Triangles with their points in another order, turned and listed otherwise, some of them in strips. Returns the polygons,
+/// the strips, and the point of each vertex.
+fn renumbered(
+    triangles: &[[u32; 3]],
+    vertices: usize,
+    random: &mut Rng,
+) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
+    let mut point_of: Vec<u32> = (0..vertices as u32).collect();
+    random.shuffle(&mut point_of);
+    let mut triangles: Vec<[u32; 3]> =
+        triangles.iter().map(|corners| corners.map(|corner| point_of[corner as usize])).collect();
+    random.shuffle(&mut triangles);
+    let (mut polygons, mut strips) = (Vec::new(), Vec::new());
+    for mut corners in triangles {
+        corners.rotate_left(random.usize(..3));
+        let list = if random.u8(..8) == 0 { &mut strips } else { &mut polygons };
+        list.push(3);
+        list.extend(corners);
+    }
+    (polygons, strips, point_of)
+}
+
+/// Another mesh of as many triangles.
+fn changed(triangles: &[[u32; 3]], vertices: usize, random: &mut Rng) -> Vec<[u32; 3]> {
+    let mut changed = triangles.to_vec();
+    match random.u8(..3) {
+        // Another diagonal of two triangles.
+        0 => {
+            let at = random.usize(..changed.len());
+            let [a, b, c] = changed[at];
+            let beside =
+                |other: &[u32; 3]| *other != [a, b, c] && other.contains(&a) && other.contains(&b);
+            let other = changed.iter().position(beside).expect("a closed surface");
+            let far = changed[other].into_iter().find(|corner| *corner != a && *corner != b);
+            let far = far.expect("a third corner");
+            (changed[at], changed[other]) = ([far, b, c], [a, far, c]);
+        }
+        // A corner that is elsewhere.
+        1 => {
+            let at = random.usize(..changed.len());
+            let elsewhere =
+                (changed[at][0] + 1 + random.u32(..vertices as u32 - 1)) % vertices as u32;
+            changed[at][0] = elsewhere;
+        }
+        // One for another.
+        _ => {
+            let (from, to) = (random.usize(..changed.len()), random.usize(1..changed.len()));
+            changed[from] = changed[(from + to) % triangles.len()];
+        }
+    }
+    changed
+}
+
+fn poly_data(positions: &[[f32; 3]], polygons: &[u32], strips: &[u32]) -> Vec<u8> {
+    let sizes = [polygons, strips].map(|cells| 4 * cells.len() as u32);
+    let head =
+        [positions.len() as u32, 0, 0, 0, 0, sizes[0] / 16, sizes[0], sizes[1] / 16, sizes[1], 0];
+    let words = [polygons, strips].concat();
+    let positions = positions.iter().flatten().flat_map(|x| x.to_be_bytes());
+    let head = head.iter().flat_map(|word| word.to_be_bytes());
+    head.chain(positions).chain(words.iter().flat_map(|word| word.to_be_bytes())).collect()
+}
+
+/// Messages of one mesh, each of whose points says which vertex it is and in which message: with its points in the file's
+/// order and others, and of other meshes among them.
+fn wrong_correspondences(mesh: &Mesh, messages: u64, seed: u64) -> (u64, u64) {
+    let (order, vertices) = (order(mesh), mesh.positions.len());
+    let triangles = order.triangles();
+    assert_eq!((order.positions(), triangles.len()), (vertices, mesh.triangles.len()));
+    let mut topology = Topology::new(order.clone());
+    let mut random = Rng::with_seed(seed);
+    let (mut wrong, mut refused) = (0, 0);
+    let (mut polygons, mut strips, mut point_of, mut is_ours) = Default::default();
+    for number in 0..messages {
+        if number % RUN == 0 {
+            is_ours = random.u8(..3) > 0;
+            let shown = if is_ours {
+                triangles.to_vec()
+            } else {
+                changed(triangles, vertices, &mut random)
+            };
+            (polygons, strips, point_of) = renumbered(&shown, vertices, &mut random);
+            if random.u8(..3) == 0 {
+                (strips, point_of) = (Vec::new(), (0..vertices as u32).collect());
+                polygons = shown.iter().flat_map(|&[a, b, c]| [3, a, b, c]).collect();
+            }
+        }
+        let mut positions = vec![[0.0; 3]; vertices];
+        for (vertex, &point) in point_of.iter().enumerate() {
+            positions[point as usize] = [vertex as f32, (number % (1 << 24)) as f32, 0.5];
+        }
+        let message = pack("POLYDATA", "mesh", 1.0, &poly_data(&positions, &polygons, &strips));
+        let (header, body) = message.split_first_chunk::<HEADER>().expect("a header");
+        let content = Header::parse(header).expect("a header").content(body).expect("a content");
+        let content = Kind::PolyData.read(content).expect("a list");
+        match topology.numbering(content.positions.len(), content.cells.expect("cells")) {
+            Ok(numbering) if is_ours => {
+                let found = numbering.apply(content.positions);
+                let time = (number % (1 << 24)) as f64;
+                let is_at =
+                    |(vertex, found): (usize, &[f64; 3])| *found == [vertex as f64, time, 0.5];
+                wrong +=
+                    u64::from(!(found.len() == vertices && found.iter().enumerate().all(is_at)));
+            }
+            Err(_) if !is_ours => refused += 1,
+            _ => wrong += 1,
+        }
+    }
+    (wrong, refused)
+}
+
+#[test]
+fn no_vertex_is_taken_for_another() {
+    let messages =
+        std::env::var("DIBS_FRAMES").map_or(4000, |count| count.parse().expect("a number"));
+    let organs = [heart(1000).expect("a size").mesh, brain(2000).expect("a size")];
+    for (seed, mesh) in (1..).zip(&organs) {
+        let (wrong, refused) = wrong_correspondences(mesh, messages / 2, seed);
+        let triangles = mesh.triangles.len();
+        println!(
+            "{triangles} triangles: {} messages, {refused} of another mesh, {wrong} wrong",
+            messages / 2
+        );
+        assert_eq!(wrong, 0);
+        assert!((messages / 10..messages / 4).contains(&refused), "{refused}");
+    }
+}
+
+/// Where the triangles are symmetric they do not tell the points, and no guess is made. In the order of the mesh's file they
+/// need not.
+#[test]
+fn symmetric_meshes_are_not_guessed() {
+    const CORNERS: [[u32; 3]; 8] =
+        [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    let at = [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z].map(|way| 20.0 * way);
+    let octahedron =
+        Mesh { origin: Default::default(), positions: at.to_vec(), triangles: CORNERS.to_vec() };
+    let mut topology = Topology::new(order(&octahedron));
+    let mut answer = |turn: u32| {
+        let words: Vec<u32> = CORNERS
+            .iter()
+            .flat_map(|corners| {
+                [3, (corners[0] + turn) % 6, (corners[1] + turn) % 6, (corners[2] + turn) % 6]
+            })
+            .collect();
+        let body = poly_data(&[[0.0; 3]; 6], &words, &[]);
+        let content = Kind::PolyData.read(&body).expect("a list");
+        topology
+            .numbering(6, content.cells.expect("cells"))
+            .map(|_| ())
+            .map_err(|why| why.contains("symmetric"))
+    };
+    assert_eq!([0, 1, 0, 1].map(&mut answer), [Ok(()), Err(true), Ok(()), Err(true)]);
+    // Two parts that are the same.
+    let one = [[0, 1, 2], [0, 2, 3], [0, 3, 4]];
+    let two = [&one[..], &one.map(|corners| corners.map(|corner| corner + 5))].concat();
+    assert_eq!(matched(&two, &two), Matched::Several);
+    // A mirrored fan is the same once it may be turned.
+    assert!(matches!(matched(&one[..2], &one[..1]), Matched::None));
+}
+
+/// Triangles that a builder turned are still those of the source.
+#[test]
+fn turned_triangles_are_the_same() {
+    let mesh = heart(1000).expect("a size").mesh;
+    let mut theirs = mesh.triangles.clone();
+    theirs.iter_mut().step_by(3).for_each(|corners| corners.swap(0, 1));
+    let Matched::One(pairs) = matched(&mesh.triangles, &theirs) else { panic!("not the same") };
+    assert!(pairs.iter().all(|[one, other]| one == other));
+}

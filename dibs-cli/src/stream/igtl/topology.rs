@@ -1,0 +1,128 @@
+//! Which vertex of the mesh each point of a POLYDATA is: by the triangles alone, once for each way to number them.
+
+use super::content::Cells;
+use super::matching::{Matched, matched};
+use dibs_stream::SurfaceOrder;
+
+/// The points of the last topology, and the last that was refused.
+pub struct Topology {
+    order: SurfaceOrder,
+    known: Option<(Key, Numbering)>,
+    refused: Option<(Key, String)>,
+}
+
+/// How a source numbers the mesh's vertices.
+#[derive(Debug, PartialEq)]
+pub enum Numbering {
+    /// As the mesh's file does.
+    Own,
+    /// The point of each vertex; a vertex that no triangle has may have none.
+    Other(Vec<Option<u32>>),
+}
+
+/// A topology, of which no other one has the same key: a hash may.
+#[derive(PartialEq)]
+struct Key {
+    points: usize,
+    polygons: Vec<u8>,
+    strips: Vec<u8>,
+}
+
+impl Key {
+    fn is_of(&self, points: usize, cells: Cells<'_>) -> bool {
+        (self.points, &*self.polygons, &*self.strips) == (points, cells.polygons, cells.strips)
+    }
+}
+
+impl Topology {
+    pub fn new(order: SurfaceOrder) -> Self {
+        Self { order, known: None, refused: None }
+    }
+
+    /// The numbering of so many points that these cells join.
+    ///
+    /// # Errors
+    /// A sentence, where they are not the tree's mesh or may be it in several ways.
+    pub fn numbering(&mut self, points: usize, cells: Cells<'_>) -> Result<&Numbering, String> {
+        let is_known = self.known.as_ref().is_some_and(|(key, _)| key.is_of(points, cells));
+        if !is_known {
+            if let Some((_, why)) =
+                self.refused.as_ref().filter(|(key, _)| key.is_of(points, cells))
+            {
+                return Err(why.clone());
+            }
+            let (polygons, strips) = (cells.polygons.to_vec(), cells.strips.to_vec());
+            let key = Key { points, polygons, strips };
+            match self.compare(points, cells) {
+                Ok(numbering) => self.known = Some((key, numbering)),
+                Err(why) => {
+                    self.refused = Some((key, why.clone()));
+                    return Err(why);
+                }
+            }
+        }
+        self.known.as_ref().map(|(_, numbering)| numbering).ok_or_else(String::new)
+    }
+
+    fn compare(&self, points: usize, cells: Cells<'_>) -> Result<Numbering, String> {
+        let ours = self.order.triangles();
+        if ours.is_empty() {
+            return Err("the tree's frames are nodes, which no polygons join: send them as POINT or NDARRAY".to_owned());
+        }
+        let Some(faces) = cells.faces(points) else {
+            return Err("a polygon ends early, or has a point that is not there".to_owned());
+        };
+        if faces.is_empty() {
+            return Err("no polygon says which surface it is: send points alone as POINT or NDARRAY, in the order of the mesh's file"
+                .to_owned());
+        }
+        let own = self.order.check_faces(&faces);
+        if points == self.order.positions() && own.is_ok() {
+            return Ok(Numbering::Own);
+        }
+        let theirs: Vec<[u32; 3]> = faces.iter().flat_map(|face| fan(face)).collect();
+        match matched(ours, &theirs) {
+            Matched::One(pairs) => {
+                let mut point_of = vec![None; self.order.positions()];
+                for [vertex, point] in pairs {
+                    if let Some(of) = point_of.get_mut(vertex as usize) {
+                        *of = Some(point);
+                    }
+                }
+                Ok(Numbering::Other(point_of))
+            }
+            Matched::None => Err(format!(
+                "its {} triangles of {points} points are not the {} that the tree has: it is of another mesh",
+                theirs.len(),
+                ours.len()
+            )),
+            Matched::Several => Err(
+                "it is the tree's mesh with its points in another order, which the triangles do not tell, as they are \
+                 symmetric: send the points in the order of the mesh's file"
+                    .to_owned(),
+            ),
+        }
+    }
+}
+
+impl Numbering {
+    /// Positions in the mesh's order.
+    pub fn apply(&self, positions: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
+        match self {
+            Self::Own => positions,
+            Self::Other(point_of) => {
+                let at = |point: &Option<u32>| positions.get((*point)? as usize).copied();
+                // A vertex without a point is of no triangle, and is not sent.
+                point_of.iter().map(|point| at(point).unwrap_or_default()).collect()
+            }
+        }
+    }
+}
+
+/// A polygon's triangles, without those that have a point twice.
+fn fan(face: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    let (first, rest) = face.split_first().map_or((0, face), |(&first, rest)| (first, rest));
+    let triangles =
+        rest.windows(2).filter_map(move |pair| Some([first, *pair.first()?, *pair.get(1)?]));
+    triangles.filter(|&[a, b, c]| a != b && b != c && c != a)
+}

@@ -1,0 +1,103 @@
+//! Positions of a live source, in the tree's unit, axes and origin.
+
+use anyhow::{Result, anyhow};
+use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::{Motion, ReadErrorKind, Unit};
+use dibs_stream::SurfaceOrder;
+use std::str::FromStr;
+
+/// The patient's axes, each by the letters of its two directions.
+const AXES: [[char; 2]; 3] = [['R', 'L'], ['A', 'P'], ['S', 'I']];
+
+/// Where a source's positions are in the tree.
+#[derive(Clone)]
+pub struct Place {
+    pub unit: Option<Unit>,
+    pub axes: Option<Axes>,
+    pub origin: DVec3,
+    pub order: SurfaceOrder,
+}
+
+/// For each axis of the tree, the source's axis and its sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes([(usize, f64); 3]);
+
+impl Place {
+    /// A frame in the mesh's order and the source's unit and axes, as the tree has it.
+    ///
+    /// # Errors
+    /// What no frame of the tree's surface has: a coordinate that is not finite, another number of vertices, another size,
+    /// inside out.
+    pub fn frame(&self, mut positions: Vec<[f64; 3]>, number: usize) -> Result<Vec<Vec3>> {
+        if let Some(axes) = self.axes {
+            positions.iter_mut().for_each(|position| *position = axes.turn(*position));
+        }
+        let positions = Motion::frame_around(&positions, number, self.unit, self.origin);
+        let positions = positions.map_err(|error| match error {
+            ReadErrorKind::NonFinite { vertex, value } => anyhow!(
+                "{vertex} has the coordinate {value}, which is not a finite number: leave such frames out, and check \
+                 the format"
+            ),
+            error => anyhow!("{error}"),
+        })?;
+        self.order.to_rows(&positions).map_err(|error| anyhow!("frame {number}: {error}"))?;
+        Ok(positions)
+    }
+}
+
+impl Axes {
+    fn turn(self, position: [f64; 3]) -> [f64; 3] {
+        self.0.map(|(axis, sign)| sign * position[axis])
+    }
+}
+
+impl FromStr for Axes {
+    type Err = String;
+
+    /// `FROM:TO`, three letters each.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let directions = |text: &str| {
+            let of = |letter: char| {
+                let letter = letter.to_ascii_uppercase();
+                let axis = AXES.iter().position(|pair| pair.contains(&letter))?;
+                Some((axis, if AXES[axis][0] == letter { 1.0 } else { -1.0 }))
+            };
+            let found: Option<Vec<(usize, f64)>> = text.chars().map(of).collect();
+            let found: [(usize, f64); 3] = found?.try_into().ok()?;
+            (0..3).all(|axis| found.iter().any(|one| one.0 == axis)).then_some(found)
+        };
+        let both = text.split_once(':');
+        let both = both.and_then(|(from, to)| Some((directions(from)?, directions(to)?)));
+        let Some((from, to)) = both else {
+            return Err(
+                "give the frames' axes and the tree's as FROM:TO, say RAS:LPS; each has one of R and L, of A and P, and of S \
+                 and I"
+                    .to_owned(),
+            );
+        };
+        let source = |(axis, sign): (usize, f64)| {
+            let at = from.iter().position(|one| one.0 == axis).unwrap_or(axis);
+            (at, sign * from[at].1)
+        };
+        Ok(Self(to.map(source)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Axes;
+
+    #[test]
+    fn axes_are_turned_as_their_letters_say() {
+        let turned = |text: &str| text.parse::<Axes>().map(|axes| axes.turn([1.0, 2.0, 3.0]));
+        assert_eq!(turned("RAS:LPS"), Ok([-1.0, -2.0, 3.0]));
+        assert_eq!(turned("lps:ras"), Ok([-1.0, -2.0, 3.0]));
+        assert_eq!(turned("RAS:RAS"), Ok([1.0, 2.0, 3.0]));
+        // ROS: forwards, left, up. Its first axis is A, the tree's second.
+        assert_eq!(turned("ALS:RAS"), Ok([-2.0, 1.0, 3.0]));
+        assert_eq!(turned("ALS:PIR"), Ok([-1.0, -3.0, -2.0]));
+        for wrong in ["RAS", "RAS:", "RAS:RAL", "RAS:LPSS", "XYZ:RAS", "RRS:LPS"] {
+            assert!(turned(wrong).is_err(), "{wrong}");
+        }
+    }
+}
