@@ -20,11 +20,9 @@ from shape_msgs.msg import Mesh
 
 import dibs
 
-MM = 1000.0  # in a metre
-
 
 def positions(cloud):
-    """x, y and z of every point of a cloud, in millimetres."""
+    """x, y and z of every point of a cloud, in metres."""
     offsets = [field.offset for name in "xyz" for field in cloud.fields if field.name == name]
     types = {field.datatype for field in cloud.fields if field.name in ("x", "y", "z")}
     if len(offsets) != 3 or types != {PointField.FLOAT32}:
@@ -34,7 +32,7 @@ def positions(cloud):
     rows = np.frombuffer(bytes(cloud.data), np.uint8).reshape(cloud.height, cloud.row_step)
     rows = np.ascontiguousarray(rows[:, : cloud.width * cloud.point_step])
     points = rows.reshape(-1).view(point)
-    return np.stack([points[name] for name in "xyz"], axis=1).astype(np.float64) * MM
+    return np.stack([points[name] for name in "xyz"], axis=1).astype(np.float64)
 
 
 class SurfaceNode(Node):
@@ -42,7 +40,7 @@ class SurfaceNode(Node):
 
     def __init__(self, tree, triangles, to, **choices):
         super().__init__("dibs_surface")
-        self.sender = dibs.Sender(tree, to, **choices)
+        self.sender = dibs.Sender(tree, to, unit="m", **choices)
         self.triangles = {tuple(sorted(corners)) for corners in triangles}
         self.create_subscription(PointCloud2, "surface", self.cloud, qos_profile_sensor_data)
         self.create_subscription(Mesh, "surface_mesh", self.mesh, qos_profile_sensor_data)
@@ -65,7 +63,7 @@ class SurfaceNode(Node):
         if not self.triangles <= {tuple(sorted(triangle.vertex_indices)) for triangle in mesh.triangles}:
             self.get_logger().error("another mesh: its triangles are not the tree's", throttle_duration_sec=1.0)
             return
-        self.send(lambda: np.array([[at.x, at.y, at.z] for at in mesh.vertices]) * MM, None)
+        self.send(lambda: np.array([[at.x, at.y, at.z] for at in mesh.vertices]), None)
 
     def send(self, surface, age):
         try:
