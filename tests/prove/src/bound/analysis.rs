@@ -47,20 +47,28 @@ impl Analysis {
 fn never(program: &Program, all: &[Never]) -> Result<BTreeSet<u32>> {
     let mut places = BTreeSet::new();
     let mut is_found = vec![false; all.len()];
+    let mut is_seen = vec![false; ONLY_FROM.len()];
     for function in program.functions.values() {
         for (block, callee) in function.calls() {
             let name = &program.functions[&callee].name;
             for ((caller, part, _), is_found) in all.iter().zip(&mut is_found) {
                 if function.name.ends_with(caller) && name.contains(part) {
+                    let from = &function.blocks[block];
+                    let is_certain = from.out.len() == 1 && !from.is_call_conditional;
+                    ensure!(is_certain, "{} may call {name}, or go on", function.name);
                     places.extend(function.blocks[block].instructions.last());
                     *is_found = true;
                 }
             }
-            for (part, caller) in ONLY_FROM {
+            for ((part, caller), is_seen) in ONLY_FROM.iter().zip(&mut is_seen) {
+                *is_seen |= name.contains(part);
                 let is_other = name.contains(part) && !function.name.contains(caller);
                 ensure!(!is_other, "{} calls {name}", function.name);
             }
         }
+    }
+    for ((part, caller), is_seen) in ONLY_FROM.iter().zip(is_seen) {
+        ensure!(is_seen, "no call to `{part}` is there, which only {caller} may make");
     }
     for ((caller, part, _), is_found) in all.iter().zip(is_found) {
         ensure!(is_found, "no call of `{caller}` to `{part}` is there to be left out");

@@ -8,9 +8,12 @@ use anyhow::{Context, Result, ensure};
 use super::analysis::Analysis;
 use super::facts::{PLAIN, WITHOUT_EDGES};
 use super::queries::{Batch, Kind, Proven, Table, to_trace};
-use super::trace::{Follower, Run};
+use super::trace::{Follower, OffGraph, Run};
 use super::walk::UNIT;
 use crate::probe::{Answers, traced};
+
+/// Node tests that an answer may have beyond those that were made.
+const ROOT: i64 = 1;
 
 /// What traces have shown.
 #[derive(Default)]
@@ -108,6 +111,15 @@ fn compare(
         *broken += usize::from(left > right);
         *is_tight |= left == right && run.is_of(row);
     }
+    // What a query counted is what it did: no place of these facts is missed, and none is doubled.
+    for (name, counted, spare) in
+        [("node tests", counts[1], ROOT), ("triangle tests", counts[2], 0)]
+    {
+        let row = proven.analysis.system.rows.iter().find(|row| row.name == name);
+        let left = run.left(row.with_context(|| format!("no fact of {name}"))?);
+        let is_counted = (counted - spare..=counted).contains(&left);
+        ensure!(is_counted, "{counted} {name} were counted, and {left} were executed");
+    }
     let took = run.instructions;
     ensure!(
         i128::from(took) * UNIT <= proven.at(counts),
@@ -121,9 +133,11 @@ pub fn planted(kind: &'static Kind, probe: &Path) -> Result<[bool; 2]> {
     let batches = to_trace(40)?;
     let batches = batches.get(..1).context("no batch")?;
     let mut wrong = Proven::new(kind, probe, &PLAIN)?;
-    wrong.analysis.system.halve("turns of a leaf");
+    wrong.analysis.system.narrow("turns of a leaf");
     let traced = trace(&[wrong], probe, batches)?;
     let is_broken = traced.iter().any(|traced| !traced.broken.is_empty());
     let shorter = Proven::new(kind, probe, &WITHOUT_EDGES)?;
-    Ok([is_broken, trace(&[shorter], probe, batches).is_err()])
+    let left = trace(&[shorter], probe, batches).err();
+    let is_left = left.is_some_and(|error| error.downcast_ref::<OffGraph>().is_some());
+    Ok([is_broken, is_left])
 }

@@ -91,8 +91,9 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
          through the linked program that keeps the flow facts below is longer. The facts are of \
          [facts.rs](../../tests/prove/src/bound/facts.rs); the proof is checked in whole numbers \
          ([walk.rs](../../tests/prove/src/bound/walk.rs)), so neither the solver nor its rounding is trusted. Trusted are the \
-         facts, the reader of the program, and that an instruction counts one, as it does for the emulator. A bound is of \
-         one linked program. Instructions, not cycles.\n\n\
+         facts, that the debug information places them, the calls declared as never made, the reader of the program, and \
+         that an instruction counts one, as it does for the emulator; without interrupts. A bound is of \
+         one linked program, here the probe's, of 16-bit indices; `n` is `Proximity::node_tests`. Instructions, not cycles.\n\n\
          | query | base | root | node test | triangle test | times the typical base, node and triangle test | functions | instructions in the graph |\n\
          |---|---:|---:|---:|---:|---|---:|---:|\n",
         run.commit, run.compiler, run.emulator
@@ -112,10 +113,11 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
     writeln!(
         text,
         "\nThe typical constants are those of `Cost`, a plane above measured queries plus a margin. The bound's worst leaf is one \
-         that two planes scan to the last vertex in vain, which queries seldom do: most of all a sphere's node test pays for it. The proof takes {:.1} s.\n\n\
+         that two planes scan to the last vertex in vain, which queries seldom do: most of all a sphere's node test pays for it. On a surface of modes an exact test costs less than the node test that is \
+         counted before it, so its own price is 0. The proof takes {:.1} s.\n\n\
          ## Against the emulated board\n\n\
          | query | counted | above the bound | largest share of the bound | mean share | traced | their instructions | facts \
-         broken | facts met with equality | blocks executed | instructions that a second decoder reads alike |\n\
+         broken | facts met with equality | blocks executed | instructions whose length and target a second decoder reads alike |\n\
          |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
         findings.seconds
     )?;
@@ -140,7 +142,8 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
     writeln!(
         text,
         "\nA traced query is followed instruction by instruction: each must be where the graph leads, and each fact is \
-         compared with the numbers of executions. Planted were {} errors, a wrong fact and a path that the graph does not \
+         compared with the numbers of executions; triangle tests are as many as the answer says, and node tests as many or one fewer. Queries of modes \
+         are traced whole and cold, in a tree of one root. Planted were {} errors, a wrong fact and a path that the graph does not \
          have; not found: {}.\n\n## Flow facts\n\nThe price of a fact is what one more of its right side adds to the bound, in \
          instructions, in the order of the queries above.\n\n| fact | price | reason |\n|---|---:|---|",
         findings.planted, findings.unnoticed

@@ -64,12 +64,10 @@ impl System {
         self.rows.push(row);
     }
 
-    /// Halves what a fact allows for each other execution: a wrong fact, to be found.
-    pub fn halve(&mut self, name: &str) {
+    /// Takes away what a fact allows for each other execution: a wrong fact, to be found.
+    pub fn narrow(&mut self, name: &str) {
         for row in self.rows.iter_mut().filter(|row| row.name == name) {
-            for times in row.coefficients.values_mut().filter(|times| **times < 0) {
-                *times /= 2;
-            }
+            row.coefficients.retain(|_, times| *times > 0);
         }
     }
 
@@ -198,7 +196,8 @@ impl<'a> Finder<'a> {
                 _ if first >> 8 == 0x22 => return Ok(i64::from(first & 0xFF)),
                 (0xF04F, 2) => return Ok(byte),
                 (0xF240, high) if high & 15 == 2 => return Ok(byte | i64::from(high >> 4 & 7) << 8),
-                // The call itself has no register.
+                // The call itself has no register. After IT a length may or may not be loaded.
+                _ if first >> 8 == 0xBF && first & 15 != 0 => break,
                 _ if place != last && may_write(2, first, second) => break,
                 _ => {}
             }

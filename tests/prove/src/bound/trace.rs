@@ -1,12 +1,29 @@
 //! What an emulated processor executes, against the graph and the facts.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::mem::take;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::Result;
 
 use super::graph::Program;
 use super::system::{Part, Row};
+
+/// An instruction to which no path of the graph leads.
+#[derive(Debug)]
+pub struct OffGraph(String);
+
+impl std::error::Error for OffGraph {}
+
+impl fmt::Display for OffGraph {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+fn on_graph(is_on: bool, text: impl FnOnce() -> String) -> Result<(), OffGraph> {
+    if is_on { Ok(()) } else { Err(OffGraph(text())) }
+}
 
 /// One run of the root.
 #[derive(Default)]
@@ -88,7 +105,9 @@ impl<'a> Follower<'a> {
             let function = &self.program.functions[&level.function];
             let block = &function.blocks[level.block];
             if let Some(&next) = block.instructions.get(level.done) {
-                ensure!(next == at, "{at:#x} instead of {next:#x} in {}", function.name);
+                on_graph(next == at, || {
+                    format!("{at:#x} instead of {next:#x} in {}", function.name)
+                })?;
                 level.done += 1;
                 self.run.instructions += 1;
                 return Ok(());
@@ -99,7 +118,9 @@ impl<'a> Follower<'a> {
                 return Ok(());
             }
             let may_go_on = block.call.is_none() || level.has_called || block.is_call_conditional;
-            ensure!(may_go_on, "{at:#x} without the call before it in {}", function.name);
+            on_graph(may_go_on, || {
+                format!("{at:#x} without the call before it in {}", function.name)
+            })?;
             let edges = || block.out.iter().map(|&edge| (edge, &function.edges[edge]));
             let leads = |to: usize| function.blocks[to].instructions[0] == at;
             let of = level.function;
@@ -113,16 +134,17 @@ impl<'a> Follower<'a> {
                 return Ok(());
             }
             let Some((edge, end)) = edges().find(|(_, edge)| edge.to.is_none()) else {
-                bail!(
-                    "{at:#x} after {:#x} in {}",
-                    block.instructions[level.done - 1],
-                    function.name
+                let last = block.instructions[level.done - 1];
+                return Err(
+                    OffGraph(format!("{at:#x} after {last:#x} in {}", function.name)).into()
                 );
             };
             self.levels.pop();
             self.count(Part::Edge(of, edge));
             if let Some(tail) = end.tail {
-                ensure!(tail == at, "{at:#x} instead of {tail:#x} after {}", function.name);
+                on_graph(tail == at, || {
+                    format!("{at:#x} instead of {tail:#x} after {}", function.name)
+                })?;
                 self.enter(at);
                 return Ok(());
             }

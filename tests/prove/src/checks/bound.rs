@@ -26,7 +26,7 @@ pub const CHECK: Check = Check {
             bound: Bound::Is(0.0),
             unit: "of {bound.queries} plain queries on the emulated Cortex-M7, whole and cut short",
             limits: "Of this linked program. The proof trusts the flow facts of `facts.rs`. Unsigned queries of a table of \
-                     vertices; instructions, not cycles.",
+                     vertices, and whole and cold ones of a surface of modes; instructions, not cycles.",
         },
         Promise {
             id: "bound.broken",
