@@ -226,7 +226,8 @@ impl FrameCheck {
     }
 }
 
-/// Checks that each triangle is one of these faces, or a part of one, if there are any.
+/// Checks that each triangle is one of these faces, or a part of one, if there are any. A face has no more of them than its
+/// corners make: one face of all corners would have every mesh's.
 pub(crate) fn check_faces(
     triangles: &[[u32; 3]],
     vertices: usize,
@@ -235,23 +236,36 @@ pub(crate) fn check_faces(
     if faces.is_empty() {
         return Ok(());
     }
+    // The faces' corners, each once and sorted, so that faces of many corners take no longer.
+    let sorted = |face: &Vec<u32>| {
+        let mut corners = face.clone();
+        corners.sort_unstable();
+        corners.dedup();
+        corners
+    };
+    let faces: Vec<Vec<u32>> = faces.iter().map(sorted).collect();
     let mut at: Vec<Vec<u32>> = vec![Vec::new(); vertices];
-    for (number, face) in (0..).zip(faces) {
+    for (number, face) in (0..).zip(&faces) {
         for &corner in face {
             if let Some(at) = at.get_mut(corner as usize) {
                 at.push(number);
             }
         }
     }
-    let has = |corners: &[u32; 3]| {
+    let mut left: Vec<usize> = faces.iter().map(|face| face.len().saturating_sub(2)).collect();
+    let mut takes = |corners: &[u32; 3]| {
         // At a hub of many faces another corner has few.
         let few = corners.iter().filter_map(|&corner| at.get(corner as usize));
-        let few = few.min_by_key(|at| at.len());
-        let holds =
-            |&face: &u32| corners.iter().all(|corner| faces[face as usize].contains(corner));
-        few.is_some_and(|few| few.iter().any(holds))
+        let few = few.min_by_key(|at| at.len()).map_or(&[][..], Vec::as_slice);
+        let holds = |&face: &usize| {
+            left[face] > 0 && corners.iter().all(|corner| faces[face].binary_search(corner).is_ok())
+        };
+        // The smallest is not a larger one's to take.
+        let smallest = few.iter().map(|&face| face as usize).filter(holds);
+        let smallest = smallest.min_by_key(|&face| faces[face].len());
+        smallest.inspect(|&face| left[face] -= 1).is_some()
     };
-    match triangles.iter().find(|corners| !has(corners)) {
+    match triangles.iter().find(|corners| !takes(corners)) {
         Some(&corners) => Err(FrameError::Triangle { corners }),
         None => Ok(()),
     }

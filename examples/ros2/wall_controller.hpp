@@ -20,6 +20,9 @@ public:
     /** `tree` are the bytes of `dibs build`; `vertices` as `dibs inspect` prints them; `limits` of the tissue. */
     dibs::Code configure(std::span<const std::uint8_t> tree, std::uint32_t vertices, const dibs_guard_limits &limits,
                          const dibs_wall &of_wall) {
+        /* Until it succeeds, packets and ticks have an error, and the force is the hold. */
+        bus = nullptr;
+        guard = nullptr;
         bytes.assign(tree.begin(), tree.end());
         const std::size_t size = DIBS_START_SIZE(std::size_t{vertices});
         memory.reset(new (std::align_val_t{DIBS_ALIGNMENT}) std::uint8_t[size]);

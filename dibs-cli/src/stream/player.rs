@@ -1,5 +1,6 @@
 //! Plays a motion to a receiver: a recording at its speed, live frames as they come.
 
+use super::igtl::Exchange;
 use super::interrupt::Interrupt;
 use super::live::Next;
 use super::report::{self, Display, Outcome};
@@ -40,6 +41,8 @@ pub struct Player<'a, const MTU: usize, M> {
     interval: Duration,
     display: Display,
     outcome: Outcome,
+    /// The receiver's statuses so far, and when the last one came.
+    heard: (u64, Instant),
 }
 
 /// What is sent of a frame.
@@ -69,7 +72,8 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         let interval =
             source.rate.map_or(Duration::ZERO, |rate| Duration::from_secs_f64(1.0 / rate));
         let (display, outcome) = (Display::new(), Outcome::default());
-        Self { args, source, sender, interrupt, interval, display, outcome }
+        let heard = (0, Instant::now());
+        Self { args, source, sender, interrupt, interval, display, outcome, heard }
     }
 
     /// Sends the frames, and prints the totals, after an interrupt too.
@@ -77,11 +81,14 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         self.await_challenge()?;
         let played = self.play();
         let refused = self.refused();
-        self.display.finish();
         let exchange = match &self.source.frames {
             Frames::Live { exchange, .. } => exchange.as_deref(),
             Frames::Recorded { .. } => None,
         };
+        for note in exchange.into_iter().flat_map(Exchange::notes) {
+            self.display.note(&note);
+        }
+        self.display.finish();
         report::print(&self.sender, &self.outcome, exchange, self.args.json);
         played.and(refused)
     }
@@ -170,6 +177,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     /// interrupt.
     fn next(&mut self, number: u64, due: &mut Instant) -> Result<Option<Due<'a>>> {
         let period = self.interval;
+        let is_due_when_it_came;
         let live = match &self.source.frames {
             Frames::Recorded { positions, weights } => {
                 let at = (number % positions.len() as u64) as usize;
@@ -180,7 +188,10 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                 // A recorded frame counts as captured when it is due, even if the surface stands still.
                 return Ok(Some(Due { rows, ago: Duration::ZERO, period, came: None }));
             }
-            Frames::Live { live, .. } => live,
+            Frames::Live { live, exchange } => {
+                is_due_when_it_came = exchange.is_some();
+                live
+            }
         };
         while !self.interrupt.is_raised() {
             match live.next(GLANCE)? {
@@ -188,8 +199,9 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                     *due = frame.came.max(*due);
                     self.outcome.passed_over = live.passed_over();
                     let rows = Rows::Positions(Cow::Owned(frame.positions));
-                    let waited =
-                        if period.is_zero() { frame.first.elapsed() } else { Duration::ZERO };
+                    // A program that prints faster than the rate has frames that are due later.
+                    let is_waiting = period.is_zero() || is_due_when_it_came;
+                    let waited = if is_waiting { frame.first.elapsed() } else { Duration::ZERO };
                     let period = if period.is_zero() { frame.gap } else { period };
                     let (ago, came) = (frame.age + waited, Some(frame.came));
                     return Ok(Some(Due { rows, ago, period, came }));
@@ -214,12 +226,12 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         };
         let sent = prepared.and_then(|prepared| {
             let packets = prepared.sent().packets;
-            if let Some(came) = frame.came {
-                self.outcome.timing.get_or_insert_with(Timing::new).count(came);
-            }
             let mut pace = Pace::new(Instant::now(), spread, packets);
             sender.transmit_paced(prepared, || pace.wait())
         });
+        if let (Ok(_), Some(came)) = (&sent, frame.came) {
+            self.outcome.timing.get_or_insert_with(Timing::new).count(came);
+        }
         match sent {
             Ok(sent) => {
                 let refused = self.sender.transport().refusals().count;
@@ -242,7 +254,17 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             if let Some(note) = exchange.note() {
                 self.display.note(&note);
             }
-            if let Some(report) = report::receiver(&self.sender) {
+            let statuses = self.sender.totals().statuses;
+            if statuses != self.heard.0 {
+                self.heard = (statuses, Instant::now());
+            }
+            if let Some(mut report) = report::receiver(&self.sender) {
+                let silence = self.heard.1.elapsed();
+                if silence > SILENT {
+                    report.is_ready = false;
+                    report.text =
+                        format!("no status from the receiver for {} s", silence.as_secs());
+                }
                 exchange.report(report);
             }
         }

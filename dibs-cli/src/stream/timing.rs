@@ -1,4 +1,4 @@
-//! The rate of a live source, its gaps, and the time from a frame's last byte to its first packet.
+//! The rate of a live source, its gaps, and the time from a frame's last byte until it is sent.
 
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
@@ -21,7 +21,7 @@ impl Timing {
         Self { came: None, longest_gap, frames: 0, bins: vec![0; BINS], longest }
     }
 
-    /// Counts a frame whose packets are made.
+    /// Counts a frame that was sent.
     pub fn count(&mut self, came: Instant) {
         let latency = came.elapsed();
         let (first, last) = self.came.unwrap_or((came, came));
@@ -65,7 +65,7 @@ impl Timing {
 
     pub fn text(&self) -> String {
         format!(
-            "{:.1} frames a second, the longest gap {} ms; {:.1} ms from a frame to its packets, for 99 % at most {:.1}",
+            "{:.1} frames a second, the longest gap {} ms; {:.1} ms from a frame until it is sent, for 99 % at most {:.1}",
             self.rate(),
             self.longest_gap.as_millis(),
             self.latency(0.5),

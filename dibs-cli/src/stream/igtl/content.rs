@@ -109,34 +109,46 @@ fn floats(bytes: &[u8]) -> Vec<[f64; 3]> {
 }
 
 impl Cells<'_> {
-    /// The faces, strips as their triangles. `None` if a cell ends early, or has a point that is not there.
-    pub fn faces(&self, points: usize) -> Option<Vec<Vec<u32>>> {
-        let mut faces = cells(self.polygons, points)?;
-        for strip in cells(self.strips, points)? {
+    /// The faces, strips as their triangles. `None` if a cell ends early, or has a point that is not there, and for more than
+    /// `most` faces.
+    pub fn faces(&self, points: usize, most: usize) -> Option<Vec<Vec<u32>>> {
+        let mut faces = Vec::new();
+        each_cell(self.polygons, points, |cell| {
+            faces.push(cell);
+            faces.len() <= most
+        })?;
+        each_cell(self.strips, points, |strip| {
             let triangles = strip.windows(3).enumerate();
             // Every other triangle of a strip turns the other way.
-            faces.extend(triangles.map(|(number, corners)| match (number % 2, corners) {
+            let triangles = triangles.map(|(number, corners)| match (number % 2, corners) {
                 (1, &[a, b, c]) => vec![b, a, c],
                 _ => corners.to_vec(),
-            }));
-        }
+            });
+            let is_room = triangles.len() <= most.saturating_sub(faces.len());
+            faces.extend(triangles.take(if is_room { usize::MAX } else { 0 }));
+            is_room
+        })?;
         Some(faces)
     }
 }
 
-fn cells(mut rest: &[u8], points: usize) -> Option<Vec<Vec<u32>>> {
-    let mut cells = Vec::new();
+/// Gives each cell that has a face, until `take_cell` refuses one.
+fn each_cell(
+    mut rest: &[u8],
+    points: usize,
+    mut take_cell: impl FnMut(Vec<u32>) -> bool,
+) -> Option<()> {
     while !rest.is_empty() {
         let count = u32_of(&mut rest)? as usize;
         let bytes = take(&mut rest, count.checked_mul(4)?)?;
         let (words, _) = bytes.as_chunks::<4>();
         let cell: Vec<u32> = words.iter().map(|&word| u32::from_be_bytes(word)).collect();
-        if cell.iter().any(|&point| point as usize >= points) {
+        let is_right = cell.iter().all(|&point| (point as usize) < points);
+        if !is_right || cell.len() > 2 && !take_cell(cell) {
             return None;
         }
-        cells.push(cell);
     }
-    Some(cells)
+    Some(())
 }
 
 #[cfg(test)]
@@ -153,10 +165,12 @@ mod tests {
         let (polygons, strips) = (words(&[4, 0, 1, 2, 3]), words(&[5, 0, 1, 2, 3, 4]));
         let cells = Cells { polygons: &polygons, strips: &strips };
         let faces = [vec![0, 1, 2, 3], vec![0, 1, 2], vec![2, 1, 3], vec![2, 3, 4]];
-        assert_eq!(cells.faces(5), Some(faces.to_vec()));
-        assert_eq!(cells.faces(4), None, "a point that is not there");
+        assert_eq!(cells.faces(5, 4), Some(faces.to_vec()));
+        assert_eq!(cells.faces(4, 4), None, "a point that is not there");
+        assert_eq!(cells.faces(5, 3), None, "more faces than a mesh of theirs has");
+        assert_eq!(Cells { polygons: &[0; 400], strips: &[] }.faces(5, 0), Some(Vec::new()));
         for wrong in [&words(&[3, 0, 1])[..], &words(&[u32::MAX])[..], &strips[1..]] {
-            assert_eq!(Cells { polygons: wrong, strips: &[] }.faces(9), None);
+            assert_eq!(Cells { polygons: wrong, strips: &[] }.faces(9, 9), None);
         }
     }
 
@@ -200,7 +214,7 @@ mod tests {
                 for body in [&body[..], &body[40..]] {
                     if let Some(Content { positions, cells }) = kind.read(body) {
                         prop_assert!(12 * positions.len() <= body.len());
-                        drop(cells.and_then(|cells| cells.faces(positions.len())));
+                        drop(cells.and_then(|cells| cells.faces(positions.len(), 40)));
                     }
                 }
             }

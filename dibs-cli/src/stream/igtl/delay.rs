@@ -1,39 +1,37 @@
 //! How late a message is, by the time in its header.
 //!
-//! The peer's clock may show any time. The least difference to this computer's clock of the last minute counts as none, so
-//! that clocks which run apart do not make frames old; what every message takes is not seen.
+//! The peer's clock may show any time. The least difference to this computer's clock counts as none; what every message takes
+//! is not seen. Clocks run apart, so the least rises with time, by more than theirs do: a delay that lasts is seen for hours.
+//! A clock that the peer sets back makes its messages old until it connects anew.
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
-/// Half of the time over which the least difference counts, in seconds.
-const HALF: f64 = 30.0;
+/// Seconds by which two clocks run apart in a second, at most: ten times as many as quartz.
+const DRIFT: f64 = 5e-4;
 
 pub struct Delay {
-    /// The least differences of this half and of the one before, in seconds.
-    least: [f64; 2],
-    /// When this half began, by this computer's clock.
-    began: f64,
+    start: Instant,
+    /// The least difference, in seconds, and when it was so.
+    least: Option<(f64, f64)>,
 }
 
 impl Delay {
-    pub const fn new() -> Self {
-        Self { least: [f64::INFINITY; 2], began: 0.0 }
+    pub fn new() -> Self {
+        Self { start: Instant::now(), least: None }
     }
 
-    /// Time on the way of a message that came now, beyond that of the fastest; zero where it has no time.
-    pub fn of(&mut self, time: f64) -> Duration {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        if time > 0.0 { self.at(now.as_secs_f64(), time) } else { Duration::ZERO }
+    /// Time on the way of a message that came then, beyond that of the fastest; zero where it has no time.
+    pub fn of(&mut self, came: Instant, time: f64) -> Duration {
+        let now = came.saturating_duration_since(self.start).as_secs_f64();
+        if time > 0.0 { self.at(now, time) } else { Duration::ZERO }
     }
 
     fn at(&mut self, now: f64, time: f64) -> Duration {
         let difference = now - time;
-        if !(0.0..HALF).contains(&(now - self.began)) {
-            (self.least, self.began) = ([f64::INFINITY, self.least[0]], now);
-        }
-        self.least[0] = self.least[0].min(difference);
-        let beyond = difference - self.least[0].min(self.least[1]);
-        Duration::try_from_secs_f64(beyond).unwrap_or_default()
+        let risen = self.least.map_or(difference, |(least, at)| least + DRIFT * (now - at));
+        let least = risen.min(difference);
+        self.least = Some((least, now));
+        Duration::try_from_secs_f64(difference - least).unwrap_or_default()
     }
 }
 
@@ -48,10 +46,20 @@ mod tests {
         // The peer's clock is 1,000 s behind.
         assert_eq!(late(2000.0, 999.0), 0.0);
         assert_eq!(late(2001.0, 1000.5), 0.0, "faster than the first");
-        assert_eq!(late(2002.0, 1000.5), 1.0);
-        // A clock that loses 0.1 s in 25 s does not make frames older and older.
-        let slow = |step: f64| late(2003.0 + 25.0 * step, 1002.5 + 24.9 * step);
+        assert!((late(2002.0, 1000.5) - 1.0).abs() < 1e-3);
+        // A clock that loses 100 parts in a million does not make frames older and older.
+        let slow = |hour: f64| late(2003.0 + 3600.0 * hour, 1002.5 + 3600.0 * (1.0 - 1e-4) * hour);
         let latest = (0..100).map(f64::from).map(slow).fold(0.0, f64::max);
-        assert!((0.1..0.4).contains(&latest), "{latest}");
+        assert!(latest < 1e-3, "{latest}");
+    }
+
+    /// Two seconds that stay are still seen a quarter of an hour later.
+    #[test]
+    fn a_delay_that_lasts_is_not_forgotten() {
+        let mut delay = Delay::new();
+        let mut late = |now: f64, behind: f64| delay.at(now, now - behind).as_secs_f64();
+        assert_eq!(late(0.0, 0.005), 0.0);
+        let latest = (1..900).map(f64::from).map(|now| late(now, 2.005));
+        assert!(latest.fold(2.0, f64::min) > 1.5);
     }
 }

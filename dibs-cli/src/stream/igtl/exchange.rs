@@ -2,11 +2,16 @@
 
 use super::message;
 use serde_json::{Value, json};
+use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Between two statuses that say the same.
+/// Between two statuses that say the same, and between any two.
 const STATUS: Duration = Duration::from_secs(1);
+const BETWEEN: Duration = Duration::from_millis(100);
+
+/// Notes that wait.
+const NOTES: usize = 8;
 
 /// Least time between two notes.
 const NOTE: Duration = Duration::from_secs(1);
@@ -16,6 +21,7 @@ const DEVICE: &str = "dibs";
 
 /// Codes of STATUS.
 const OK: u16 = 1;
+const CHECKSUM: u16 = 9;
 const CONFIGURATION: u16 = 10;
 const NOT_READY: u16 = 13;
 
@@ -61,11 +67,16 @@ struct State {
     messages: u64,
     /// Messages of other types and devices.
     passed: u64,
+    /// Messages with a frame and without a time.
+    timeless: u64,
     refused: [u64; Cause::ALL.len()],
     broken: u64,
-    /// What is wrong with the last message.
+    /// Why the last message was refused.
+    last: Option<Cause>,
+    /// The refusal that the peer is told, and whether it was.
     refusal: Option<(Cause, String)>,
-    note: Option<String>,
+    is_told: bool,
+    notes: VecDeque<String>,
     noted: Option<Instant>,
     report: Option<Report>,
     /// The code of the last status, and its time.
@@ -97,10 +108,25 @@ impl Exchange {
         state.passed += 1;
     }
 
-    pub fn accepted(&self) {
+    /// Counts a message whose frame is taken.
+    pub fn accepted(&self, has_time: bool) {
         let mut state = self.state();
         state.messages += 1;
-        state.refusal = None;
+        state.last = None;
+        if state.is_told {
+            state.refusal = None;
+        }
+        if !has_time {
+            if state.timeless == 0 {
+                state.tell("messages without a time: how long they wait is not seen".to_owned());
+            }
+            state.timeless += 1;
+        }
+    }
+
+    /// Leaves a note.
+    pub fn tell(&self, note: String) {
+        self.state().tell(note);
     }
 
     /// Counts a message that is refused, and tells of it if the last one was not for the same cause.
@@ -108,15 +134,30 @@ impl Exchange {
         let mut state = self.state();
         state.messages += 1;
         state.refused[cause as usize] += 1;
-        if state.refusal.as_ref().is_none_or(|(last, _)| *last != cause) {
+        if state.last != Some(cause) {
             state.tell(text.clone());
         }
-        state.refusal = Some((cause, text));
+        state.last = Some(cause);
+        // The first of many that come between two statuses: the others follow from it, or come again.
+        if state.refusal.is_none() || state.is_told {
+            (state.refusal, state.is_told) = (Some((cause, text)), false);
+        }
     }
 
-    /// Takes the note that waits to be shown.
+    /// Takes the next note, once it is due.
     pub fn note(&self) -> Option<String> {
-        self.state().note.take()
+        let mut state = self.state();
+        if state.noted.is_some_and(|at| at.elapsed() < NOTE) {
+            return None;
+        }
+        let note = state.notes.pop_front()?;
+        state.noted = Some(Instant::now());
+        Some(note)
+    }
+
+    /// Takes the notes that are left at the end.
+    pub fn notes(&self) -> VecDeque<String> {
+        std::mem::take(&mut self.state().notes)
     }
 
     pub fn report(&self, report: Report) {
@@ -127,16 +168,22 @@ impl Exchange {
     pub fn status_due(&self) -> Option<Vec<u8>> {
         let mut state = self.state();
         let (code, name, text) = match (&state.refusal, &state.report) {
+            (Some((Cause::Checksum, text)), _) => (CHECKSUM, Cause::Checksum.name(), text.clone()),
             (Some((cause, text)), _) => (CONFIGURATION, cause.name(), text.clone()),
             (None, None) => (NOT_READY, "receiver", "no status from the receiver yet".to_owned()),
             (None, Some(report)) if report.is_ready => (OK, "", report.text.clone()),
             (None, Some(report)) => (NOT_READY, "receiver", report.text.clone()),
         };
-        let is_same = |(last, at): (u16, Instant)| last == code && at.elapsed() < STATUS;
-        if state.reported.is_some_and(is_same) {
+        let is_early =
+            |(last, at): (u16, Instant)| at.elapsed() < if last == code { STATUS } else { BETWEEN };
+        if state.reported.is_some_and(is_early) {
             return None;
         }
         state.reported = Some((code, Instant::now()));
+        state.is_told = true;
+        if state.last.is_none() {
+            state.refusal = None;
+        }
         let mut body = code.to_be_bytes().to_vec();
         body.extend([0; 8]);
         body.extend(name.bytes().chain(std::iter::repeat(0)).take(20));
@@ -155,6 +202,7 @@ impl Exchange {
             "connections": state.connections,
             "messages": state.messages,
             "passed": state.passed,
+            "without_time": state.timeless,
             "refused": refused,
             "broken": state.broken,
         })
@@ -173,6 +221,9 @@ impl Exchange {
         if !refused.is_empty() {
             text += &format!("; refused {}", refused.join(", "));
         }
+        if state.timeless > 0 {
+            text += &format!("; {} without a time", state.timeless);
+        }
         if state.broken > 0 {
             text += &format!("; {} connections broke", state.broken);
         }
@@ -182,9 +233,8 @@ impl Exchange {
 
 impl State {
     fn tell(&mut self, note: String) {
-        if self.noted.is_none_or(|at| at.elapsed() >= NOTE) {
-            self.noted = Some(Instant::now());
-            self.note = Some(note);
+        if self.notes.len() < NOTES && !self.notes.contains(&note) {
+            self.notes.push_back(note);
         }
     }
 }

@@ -4,6 +4,10 @@
 //! has a colour of its own, any two numberings of the mesh pair vertices of one colour: there is one at most. The pairs are
 //! compared triangle by triangle, so a colour that two surroundings share by chance gives no wrong pair.
 
+/// Rounds in which colours must have told all vertices apart: organs take fewer than ten, a regular grid as many as it is
+/// long.
+const ROUNDS: usize = 64;
+
 /// Whether lists of triangles are the same.
 #[derive(Debug, PartialEq)]
 pub enum Matched {
@@ -17,8 +21,14 @@ pub enum Matched {
 /// Compares with the triangles turned as they are, and if they are not the same so, however they are turned: a builder
 /// turns triangles outwards.
 pub fn matched(ours: &[[u32; 3]], theirs: &[[u32; 3]]) -> Matched {
+    if ours.len() != theirs.len() {
+        return Matched::None;
+    }
+    let any = turned(ours, theirs, false);
     match turned(ours, theirs, true) {
-        Matched::None => turned(ours, theirs, false),
+        // A mesh that mirrors itself, from a source that may turn all its triangles.
+        Matched::One(_) if any == Matched::Several => Matched::Several,
+        Matched::None => any,
         found => found,
     }
 }
@@ -26,11 +36,9 @@ pub fn matched(ours: &[[u32; 3]], theirs: &[[u32; 3]]) -> Matched {
 fn turned(ours: &[[u32; 3]], theirs: &[[u32; 3]], is_oriented: bool) -> Matched {
     let mut both = [Colours::new(ours, is_oriented), Colours::new(theirs, is_oriented)];
     let mut last = 0;
-    loop {
+    for _ in 0..ROUNDS {
         let [first, second] = both.each_ref().map(Colours::sorted);
-        if ours.len() != theirs.len()
-            || !first.iter().map(|one| one.0).eq(second.iter().map(|one| one.0))
-        {
+        if !first.iter().map(|one| one.0).eq(second.iter().map(|one| one.0)) {
             return Matched::None;
         }
         let colours = first.chunk_by(|one, next| one.0 == next.0).count();
@@ -46,6 +54,7 @@ fn turned(ours: &[[u32; 3]], theirs: &[[u32; 3]], is_oriented: bool) -> Matched 
         last = colours;
         both.iter_mut().for_each(Colours::refine);
     }
+    Matched::Several
 }
 
 struct Colours<'a> {

@@ -38,7 +38,7 @@ impl Header {
         let mut rest = &bytes[..];
         let header = Self {
             version: u16_of(&mut rest)?,
-            kind: text(take(&mut rest, 12)?)?,
+            kind: text(take(&mut rest, 12)?).filter(|kind| kind.is_ascii())?,
             device: text(take(&mut rest, 20)?)?,
             time: {
                 let (seconds, fraction) = (u32_of(&mut rest)?, u32_of(&mut rest)?);
@@ -110,10 +110,10 @@ fn u64_of(rest: &mut &[u8]) -> Option<u64> {
     array(rest).map(u64::from_be_bytes)
 }
 
-/// Printable text up to the first zero.
+/// Text up to the first zero, without control characters; in whatever encoding.
 fn text(bytes: &[u8]) -> Option<String> {
     let text = bytes.split(|&byte| byte == 0).next()?.trim_ascii();
-    let is_text = text.iter().all(|byte| byte.is_ascii_graphic() || *byte == b' ');
+    let is_text = text.iter().all(|byte| !byte.is_ascii_control());
     is_text.then(|| String::from_utf8_lossy(text).into_owned())
 }
 

@@ -42,6 +42,10 @@ pub struct Igtl {
     body: Vec<u8>,
     /// Of the next message with positions, from 0.
     number: usize,
+    /// When the last whole message came, or the source was started.
+    heard: Instant,
+    /// Whether this connection has brought one.
+    has_message: bool,
 }
 
 /// A message that is refused.
@@ -59,40 +63,66 @@ impl Igtl {
     ) -> Result<Self> {
         let topology = Topology::new(place.order.clone());
         let (name, door) = (address.to_string(), Door::new(address.clone(), patience)?);
-        let (peer, delay, body, number) = (None, Delay::new(), Vec::new(), 0);
-        Ok(Self { name, door, peer, device, place, topology, exchange, delay, body, number })
+        let (delay, heard) = (Delay::new(), Instant::now());
+        Ok(Self {
+            name,
+            door,
+            peer: None,
+            device,
+            place,
+            topology,
+            exchange,
+            delay,
+            body: Vec::new(),
+            number: 0,
+            heard,
+            has_message: false,
+        })
     }
 
     /// The next frame that fits the tree.
     ///
     /// # Errors
-    /// If the server cannot be reached within the time that the user allows.
+    /// If the server cannot be reached, or brings no message, within the time that the user allows.
     pub fn next(&mut self) -> Result<Option<Parsed>> {
         loop {
             let mut peer = match self.peer.take() {
                 Some(peer) => peer,
                 None => {
+                    let peer = self.door.next(self.heard)?;
                     self.exchange.connected();
                     self.delay = Delay::new();
-                    self.door.next()?
+                    self.topology.forget();
+                    self.has_message = false;
+                    peer
                 }
             };
             match self.message(&mut peer) {
                 Ok(parsed) => {
                     self.peer = Some(peer);
+                    (self.heard, self.has_message) = (Instant::now(), true);
                     if parsed.is_some() {
                         return Ok(parsed);
                     }
+                    continue;
                 }
                 Err(Ended::Closed) => (),
                 Err(Ended::Broken(why)) => self.exchange.broken(format!("{}: {why}", self.name)),
+                Err(Ended::Replaced) => {
+                    let why = "a peer that was silent gives way to another";
+                    self.exchange.tell(format!("{}: {why}", self.name));
+                    continue;
+                }
+            }
+            if !self.has_message {
+                self.door.pause(self.heard)?;
             }
         }
     }
 
     /// Reads one message. `None` if it has no frame, or none that fits.
     fn message(&mut self, peer: &mut Peer) -> Result<Option<Parsed>, Ended> {
-        let header = peer.header(&self.door, &self.exchange)?;
+        let header = peer.header(&mut self.door, &self.exchange)?;
         let is_device = self.device.as_ref().is_none_or(|device| *device == header.device);
         let Some(kind) = Kind::of(&header.kind).filter(|_| is_device) else {
             peer.skip(header.size)?;
@@ -117,7 +147,7 @@ impl Igtl {
         self.number += 1;
         match read {
             Ok(parsed) => {
-                self.exchange.accepted();
+                self.exchange.accepted(header.time > 0.0);
                 Ok(Some(parsed))
             }
             Err((cause, why)) => {
@@ -162,9 +192,13 @@ impl Igtl {
         if let Some(cells) = cells {
             let numbering = self.topology.numbering(positions.len(), cells);
             positions = numbering.map_err(|why| (Cause::Topology, why))?.apply(positions);
+        } else if self.topology.is_other() {
+            let why = "the POLYDATA before it have the points in another order than the mesh's file, and this one has no \
+                       triangles that say it: send POLYDATA alone";
+            return Err((Cause::Topology, why.to_owned()));
         }
         let positions = self.place.frame(positions, self.number);
         let positions = positions.map_err(|error| (Cause::Frame, error.to_string()))?;
-        Ok(Parsed { positions, came, age: Age::Delay(self.delay.of(header.time)) })
+        Ok(Parsed { positions, came, age: Age::Delay(self.delay.of(came, header.time)) })
     }
 }

@@ -13,13 +13,16 @@ use std::time::{Duration, Instant};
 /// Between two looks at the line, and two attempts to connect.
 const GLANCE: Duration = Duration::from_millis(20);
 
+/// Between two connections, where the one before brought no message.
+const PAUSE: Duration = Duration::from_millis(200);
+
 /// Longest time to connect.
 const CONNECT: Duration = Duration::from_secs(5);
 
 /// A peer that is silent for so long between two messages gives way to the next one.
 const IDLE: Duration = Duration::from_secs(1);
 
-/// And inside of a message is given up.
+/// And one whose message takes longer than this, and a second for each megabyte, is given up.
 const STALLED: Duration = Duration::from_secs(5);
 
 /// Bytes that are read at once.
@@ -67,8 +70,13 @@ impl fmt::Display for Address {
 
 /// Makes connections, and makes them again.
 pub enum Door {
-    Server { address: Address, at: String, patience: Duration },
-    Listen(TcpListener),
+    Server {
+        address: Address,
+        at: String,
+        patience: Duration,
+    },
+    /// With a peer that takes the place of one that was silent.
+    Listen(TcpListener, Option<TcpStream>),
 }
 
 impl Door {
@@ -86,27 +94,26 @@ impl Door {
                     Ok(listener)
                 });
                 listener
-                    .map(Self::Listen)
+                    .map(|listener| Self::Listen(listener, None))
                     .map_err(|error| anyhow!("{address}: cannot listen there ({error})"))
             }
         }
     }
 
-    /// The next connection: of a server within the time that the user allows, of others whenever one comes.
-    pub fn next(&self) -> Result<Peer> {
-        let start = Instant::now();
+    /// The next connection: of a server within the time that the user allows from `since` on, of others whenever one comes.
+    pub fn next(&mut self, since: Instant) -> Result<Peer> {
         loop {
             let made = match self {
-                Self::Listen(listener) => listener.accept().map(|(socket, _)| socket),
-                Self::Server { at, .. } => at.to_socket_addrs().and_then(|mut all| {
-                    let first = all.next().ok_or(ErrorKind::NotFound)?;
-                    TcpStream::connect_timeout(&first, CONNECT)
-                }),
+                Self::Listen(listener, waiting) => match waiting.take() {
+                    Some(socket) => Ok(socket),
+                    None => listener.accept().map(|(socket, _)| socket),
+                },
+                Self::Server { at, .. } => connect(at),
             };
-            match (made.and_then(Peer::new), self) {
+            match (made.and_then(Peer::new), &self) {
                 (Ok(peer), _) => return Ok(peer),
                 (Err(error), Self::Server { address, patience, .. })
-                    if start.elapsed() >= *patience =>
+                    if since.elapsed() >= *patience =>
                 {
                     bail!(
                         "{address}: cannot be reached within {} s ({error}); is the program that sends frames running?",
@@ -118,13 +125,44 @@ impl Door {
         }
     }
 
-    /// A connection that waits, of whoever connects.
-    fn waiting(&self) -> Option<TcpStream> {
+    /// After a connection that brought no message: a pause before the next one.
+    ///
+    /// # Errors
+    /// If the server has brought none for as long as the user allows.
+    pub fn pause(&self, since: Instant) -> Result<()> {
         match self {
-            Self::Listen(listener) => listener.accept().ok().map(|(socket, _)| socket),
-            Self::Server { .. } => None,
+            Self::Server { address, patience, .. } if since.elapsed() >= *patience => bail!(
+                "{address}: connects, but has sent no message within {} s; is it an OpenIGTLink server, and does another \
+                 program hold it?",
+                patience.as_secs()
+            ),
+            _ => thread::sleep(PAUSE),
+        }
+        Ok(())
+    }
+
+    /// Takes the connection that came last of those that wait. Returns whether there is one.
+    fn is_wanted(&mut self) -> bool {
+        if let Self::Listen(listener, waiting) = self {
+            while let Ok((socket, _)) = listener.accept() {
+                *waiting = Some(socket);
+            }
+            return waiting.is_some();
+        }
+        false
+    }
+}
+
+/// Connects to the first of a name's addresses that answers.
+fn connect(at: &str) -> std::io::Result<TcpStream> {
+    let mut last = ErrorKind::NotFound.into();
+    for address in at.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, CONNECT) {
+            Ok(socket) => return Ok(socket),
+            Err(error) => last = error,
         }
     }
+    Err(last)
 }
 
 /// How a connection ended.
@@ -134,6 +172,8 @@ pub enum Ended {
     Closed,
     /// Inside of one, or where none is.
     Broken(&'static str),
+    /// It was silent, and another one waits.
+    Replaced,
 }
 
 pub struct Peer {
@@ -153,9 +193,9 @@ impl Peer {
     }
 
     /// Waits for a header, and sends statuses meanwhile.
-    pub fn header(&mut self, door: &Door, exchange: &Exchange) -> Result<Header, Ended> {
+    pub fn header(&mut self, door: &mut Door, exchange: &Exchange) -> Result<Header, Ended> {
         let mut header = [0; HEADER];
-        let mut heard = Instant::now();
+        let start = Instant::now();
         let first = loop {
             self.report(exchange);
             match self.socket.read(&mut header) {
@@ -164,14 +204,11 @@ impl Peer {
                 Err(error) if !is_patience(&error) => return Err(Ended::Closed),
                 Err(_) => (),
             }
-            if heard.elapsed() >= IDLE
-                && let Some(next) = door.waiting().and_then(|socket| Self::new(socket).ok())
-            {
-                *self = next;
-                heard = Instant::now();
+            if start.elapsed() >= IDLE && door.is_wanted() {
+                return Err(Ended::Replaced);
             }
         };
-        self.fill(&mut header[first..])?;
+        self.fill(&mut header[first..], Instant::now() + STALLED)?;
         let parsed = Header::parse(&header);
         parsed.ok_or(Ended::Broken("no message begins where the one before it ends"))
     }
@@ -192,31 +229,29 @@ impl Peer {
             return Err(Ended::Broken("a message states a body of more than a gibibyte"));
         }
         let (mut chunk, mut left) = ([0; CHUNK], size);
+        let end = Instant::now() + STALLED + Duration::from_micros(size);
         while left > 0 {
             let now = &mut chunk[..left.min(CHUNK as u64) as usize];
-            self.fill(now)?;
+            self.fill(now, end)?;
             take(now);
             left -= now.len() as u64;
         }
         Ok(())
     }
 
-    fn fill(&mut self, mut bytes: &mut [u8]) -> Result<(), Ended> {
-        let mut heard = Instant::now();
+    /// Reads all these bytes until `end`.
+    fn fill(&mut self, mut bytes: &mut [u8], end: Instant) -> Result<(), Ended> {
         while !bytes.is_empty() {
             match self.socket.read(bytes) {
                 Ok(0) => return Err(Ended::Broken("a message was cut short")),
-                Ok(read) => {
-                    bytes = bytes.get_mut(read..).unwrap_or_default();
-                    heard = Instant::now();
-                }
+                Ok(read) => bytes = bytes.get_mut(read..).unwrap_or_default(),
                 Err(error) if !is_patience(&error) => {
                     return Err(Ended::Broken("a message was cut short"));
                 }
-                Err(_) if heard.elapsed() >= STALLED => {
-                    return Err(Ended::Broken("a message stopped in the middle"));
-                }
                 Err(_) => (),
+            }
+            if !bytes.is_empty() && Instant::now() >= end {
+                return Err(Ended::Broken("a message stopped in the middle, or comes too slowly"));
             }
         }
         Ok(())

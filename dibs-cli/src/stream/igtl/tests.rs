@@ -18,32 +18,35 @@ fn order(mesh: &Mesh) -> SurfaceOrder {
     SurfaceOrder::of(&built.tree::<u16>().expect("a tree"))
 }
 
-/// Triangles with their points in another order, turned and listed otherwise, some of them in strips. Returns the polygons,
-/// the strips, and the point of each vertex.
+/// Faces with their points in another order, turned and listed otherwise, some triangles in strips. Returns the polygons, the
+/// strips, and the point of each vertex.
 fn renumbered(
-    triangles: &[[u32; 3]],
+    faces: &[Vec<u32>],
     vertices: usize,
     random: &mut Rng,
 ) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
     let mut point_of: Vec<u32> = (0..vertices as u32).collect();
     random.shuffle(&mut point_of);
-    let mut triangles: Vec<[u32; 3]> =
-        triangles.iter().map(|corners| corners.map(|corner| point_of[corner as usize])).collect();
-    random.shuffle(&mut triangles);
+    let point = |corner: &u32| point_of[*corner as usize];
+    let mut faces: Vec<Vec<u32>> =
+        faces.iter().map(|corners| corners.iter().map(point).collect()).collect();
+    random.shuffle(&mut faces);
     let (mut polygons, mut strips) = (Vec::new(), Vec::new());
-    for mut corners in triangles {
-        corners.rotate_left(random.usize(..3));
-        let list = if random.u8(..8) == 0 { &mut strips } else { &mut polygons };
-        list.push(3);
+    for mut corners in faces {
+        let turn = random.usize(..corners.len());
+        corners.rotate_left(turn);
+        let is_strip = corners.len() == 3 && random.u8(..8) == 0;
+        let list = if is_strip { &mut strips } else { &mut polygons };
+        list.push(corners.len() as u32);
         list.extend(corners);
     }
     (polygons, strips, point_of)
 }
 
-/// Another mesh of as many triangles.
-fn changed(triangles: &[[u32; 3]], vertices: usize, random: &mut Rng) -> Vec<[u32; 3]> {
+/// Another mesh of as many points.
+fn changed(triangles: &[[u32; 3]], vertices: usize, random: &mut Rng) -> Vec<Vec<u32>> {
     let mut changed = triangles.to_vec();
-    match random.u8(..3) {
+    match random.u8(..4) {
         // Another diagonal of two triangles.
         0 => {
             let at = random.usize(..changed.len());
@@ -62,13 +65,19 @@ fn changed(triangles: &[[u32; 3]], vertices: usize, random: &mut Rng) -> Vec<[u3
                 (changed[at][0] + 1 + random.u32(..vertices as u32 - 1)) % vertices as u32;
             changed[at][0] = elsewhere;
         }
+        // All points in one polygon, which has the corners of every triangle.
+        2 => return vec![(0..vertices as u32).collect()],
         // One for another.
         _ => {
             let (from, to) = (random.usize(..changed.len()), random.usize(1..changed.len()));
             changed[from] = changed[(from + to) % triangles.len()];
         }
     }
-    changed
+    faces(&changed)
+}
+
+fn faces(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    triangles.iter().map(|corners| corners.to_vec()).collect()
 }
 
 fn poly_data(positions: &[[f32; 3]], polygons: &[u32], strips: &[u32]) -> Vec<u8> {
@@ -94,15 +103,13 @@ fn wrong_correspondences(mesh: &Mesh, messages: u64, seed: u64) -> (u64, u64) {
     for number in 0..messages {
         if number % RUN == 0 {
             is_ours = random.u8(..3) > 0;
-            let shown = if is_ours {
-                triangles.to_vec()
-            } else {
-                changed(triangles, vertices, &mut random)
-            };
+            let shown =
+                if is_ours { faces(triangles) } else { changed(triangles, vertices, &mut random) };
             (polygons, strips, point_of) = renumbered(&shown, vertices, &mut random);
             if random.u8(..3) == 0 {
                 (strips, point_of) = (Vec::new(), (0..vertices as u32).collect());
-                polygons = shown.iter().flat_map(|&[a, b, c]| [3, a, b, c]).collect();
+                let runs = shown.iter().map(|face| [&[face.len() as u32], &face[..]].concat());
+                polygons = runs.flatten().collect();
             }
         }
         let mut positions = vec![[0.0; 3]; vertices];
@@ -175,8 +182,30 @@ fn symmetric_meshes_are_not_guessed() {
     let one = [[0, 1, 2], [0, 2, 3], [0, 3, 4]];
     let two = [&one[..], &one.map(|corners| corners.map(|corner| corner + 5))].concat();
     assert_eq!(matched(&two, &two), Matched::Several);
-    // A mirrored fan is the same once it may be turned.
+    // A strip that mirrors itself, told by its turn alone, which a source may turn.
+    assert_eq!(matched(&one[..2], &[[4, 5, 6], [4, 6, 7]]), Matched::Several);
     assert!(matches!(matched(&one[..2], &one[..1]), Matched::None));
+}
+
+/// A quad of two triangles, and what is no such mesh though each triangle is a part of a face.
+#[test]
+fn faces_have_no_more_triangles_than_their_corners_make() {
+    let mesh = heart(1000).expect("a size").mesh;
+    let (order, vertices) = (order(&mesh), mesh.positions.len() as u32);
+    let [a, b, c] = mesh.triangles[0];
+    let is_beside = |t: &[u32; 3]| *t != [a, b, c] && t.contains(&a) && t.contains(&b);
+    let beside = mesh.triangles.iter().position(is_beside).expect("a closed surface");
+    let far = mesh.triangles[beside].into_iter().find(|v| *v != a && *v != b).expect("a corner");
+    let mut quads = faces(&mesh.triangles);
+    quads.swap_remove(beside.max(1));
+    quads[0] = vec![a, far, b, c];
+    assert!(order.check_faces(&quads).is_ok(), "two triangles of a quad");
+    quads.push((0..vertices).collect());
+    assert!(order.check_faces(&quads).is_ok(), "a part that the tree left out");
+    assert!(order.check_faces(&[(0..vertices).collect()]).is_err(), "one face of all corners");
+    quads[0] = vec![a, b, b, c, a];
+    quads.pop();
+    assert!(order.check_faces(&quads).is_err(), "three corners, one of two triangles");
 }
 
 /// Triangles that a builder turned are still those of the source.

@@ -3,12 +3,22 @@
 use super::content::Cells;
 use super::matching::{Matched, matched};
 use dibs_stream::SurfaceOrder;
+use std::collections::VecDeque;
+use std::hash::{BuildHasher, RandomState};
 
-/// The points of the last topology, and the last that was refused.
+/// Topologies whose refusal is remembered.
+const REFUSED: usize = 8;
+
+/// Faces that any source may send beside those of the tree's mesh.
+const FEW: usize = 1000;
+
+/// The points of the last topology, and those that were refused.
 pub struct Topology {
     order: SurfaceOrder,
+    hasher: RandomState,
     known: Option<(Key, Numbering)>,
-    refused: Option<(Key, String)>,
+    /// By a hash: what another one has in common with one of these is refused, too.
+    refused: VecDeque<(u64, String)>,
 }
 
 /// How a source numbers the mesh's vertices.
@@ -36,7 +46,17 @@ impl Key {
 
 impl Topology {
     pub fn new(order: SurfaceOrder) -> Self {
-        Self { order, known: None, refused: None }
+        Self { order, hasher: RandomState::new(), known: None, refused: VecDeque::new() }
+    }
+
+    /// Forgets how the last source numbers its points.
+    pub fn forget(&mut self) {
+        self.known = None;
+    }
+
+    /// Whether the source numbers its points otherwise than the mesh's file.
+    pub fn is_other(&self) -> bool {
+        self.known.as_ref().is_some_and(|(_, numbering)| *numbering != Numbering::Own)
     }
 
     /// The numbering of so many points that these cells join.
@@ -46,17 +66,18 @@ impl Topology {
     pub fn numbering(&mut self, points: usize, cells: Cells<'_>) -> Result<&Numbering, String> {
         let is_known = self.known.as_ref().is_some_and(|(key, _)| key.is_of(points, cells));
         if !is_known {
-            if let Some((_, why)) =
-                self.refused.as_ref().filter(|(key, _)| key.is_of(points, cells))
-            {
+            let hash = self.hasher.hash_one((points, cells.polygons, cells.strips));
+            if let Some((_, why)) = self.refused.iter().find(|(refused, _)| *refused == hash) {
                 return Err(why.clone());
             }
-            let (polygons, strips) = (cells.polygons.to_vec(), cells.strips.to_vec());
-            let key = Key { points, polygons, strips };
             match self.compare(points, cells) {
-                Ok(numbering) => self.known = Some((key, numbering)),
+                Ok(numbering) => {
+                    let (polygons, strips) = (cells.polygons.to_vec(), cells.strips.to_vec());
+                    self.known = Some((Key { points, polygons, strips }, numbering));
+                }
                 Err(why) => {
-                    self.refused = Some((key, why.clone()));
+                    self.refused.truncate(REFUSED - 1);
+                    self.refused.push_front((hash, why.clone()));
                     return Err(why);
                 }
             }
@@ -69,8 +90,12 @@ impl Topology {
         if ours.is_empty() {
             return Err("the tree's frames are nodes, which no polygons join: send them as POINT or NDARRAY".to_owned());
         }
-        let Some(faces) = cells.faces(points) else {
-            return Err("a polygon ends early, or has a point that is not there".to_owned());
+        // A source may send parts that the tree left out.
+        let Some(faces) = cells.faces(points, 2 * ours.len() + FEW) else {
+            return Err(
+                "a polygon ends early, or has a point that is not there, or there are far more than the tree's mesh has"
+                    .to_owned(),
+            );
         };
         if faces.is_empty() {
             return Err("no polygon says which surface it is: send points alone as POINT or NDARRAY, in the order of the mesh's file"

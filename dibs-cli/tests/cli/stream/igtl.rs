@@ -120,6 +120,7 @@ fn messages_of_every_kind_arrive_to_the_bit() {
             "{totals}"
         );
         assert_eq!((&source["messages"], &source["broken"]), (&100.into(), &0.into()), "{totals}");
+        assert_eq!(source["without_time"], 25, "{totals}");
         assert!(totals["timing"]["rate_hz"].as_f64().unwrap() > 10.0, "{totals}");
         assert!(totals["timing"]["latency_ms"]["p50"].as_f64().unwrap() > 0.0, "{totals}");
     }
@@ -145,11 +146,16 @@ fn points_in_any_order_are_the_meshs() {
                 triangles.iter().map(|t| t.map(|vertex| point_of[vertex as usize])).collect();
             random.shuffle(&mut triangles);
             peer.write_all(&message(1, "POLYDATA", "", &poly_data(&points, &triangles))).unwrap();
+            // Positions that do not say which order they have.
+            let moved: Vec<Vec3> = frame.iter().map(|&at| at + Vec3::X).collect();
+            let _ = peer.write_all(&message(1, "NDARRAY", "", &array(&moved)));
         }
         peer
     });
-    assert_all(&seen, &totals(&output));
+    let totals = totals(&output);
+    assert_all(&seen, &totals);
     assert_eq!(seen.error, 0.0);
+    assert!(totals["source"]["refused"]["topology"].as_u64().unwrap() >= 24, "{totals}");
 }
 
 /// Metres, and axes of which two point the other way.
@@ -311,9 +317,9 @@ fn a_peer_that_goes_is_met_again() {
             for frame in &frames[5 * number..5 * number + 5] {
                 peer.write_all(&good(frame)).unwrap();
             }
-            peer.write_all(last).unwrap();
-            // The bridge hangs up where it is right to.
-            peer.shutdown(std::net::Shutdown::Write).unwrap();
+            // The bridge hangs up where it is right to, and after the last frame.
+            let _ = peer.write_all(last);
+            let _ = peer.shutdown(std::net::Shutdown::Write);
             let _ = peer.read_to_end(&mut Vec::new());
         }
     });
@@ -351,10 +357,15 @@ fn what_no_source_is_is_one_sentence() {
     let folder = heart();
     let folder = folder.path();
     let closed = free_address();
+    // Connects whoever comes, and says nothing before it hangs up.
+    let mute = TcpListener::bind("127.0.0.1:0").unwrap();
+    let mute_address = mute.local_addr().unwrap();
+    thread::spawn(move || mute.incoming().for_each(drop));
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let taken = taken.local_addr().unwrap();
     for (line, code, part) in [
         (format!("--from igtl:{closed} --retry 0"), 1, "cannot be reached within 0 s"),
+        (format!("--from igtl:{mute_address} --retry 1"), 1, "has sent no message within 1 s"),
         (format!("--from igtl-listen:{taken}"), 1, "cannot listen there"),
         ("--from igtl:18944".to_owned(), 2, "igtl:HOST:PORT"),
         ("--from - --device heart".to_owned(), 1, "only OpenIGTLink has devices"),
