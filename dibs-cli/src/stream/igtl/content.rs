@@ -125,7 +125,9 @@ impl Cells<'_> {
                 _ => corners.to_vec(),
             });
             let is_room = triangles.len() <= most.saturating_sub(faces.len());
-            faces.extend(triangles.take(if is_room { usize::MAX } else { 0 }));
+            if is_room {
+                faces.extend(triangles);
+            }
             is_room
         })?;
         Some(faces)

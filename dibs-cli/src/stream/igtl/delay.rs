@@ -1,8 +1,9 @@
 //! How late a message is, by the time in its header.
 //!
-//! The peer's clock may show any time. The least difference to this computer's clock counts as none; what every message takes
-//! is not seen. Clocks run apart, so the least rises with time, by more than theirs do: a delay that lasts is seen for hours.
-//! A clock that the peer sets back makes its messages old until it connects anew.
+//! The two clocks need not agree: the fastest message so far counts as not late at all, and the others as late as they are
+//! behind it. So the part of the delay that all messages have is not seen. Clocks run apart, so the fastest message's lead is
+//! let go at a rate that is faster than they do: a delay that lasts is seen for an hour. A clock that the peer sets back makes
+//! its messages old until the peer connects anew.
 
 use std::time::{Duration, Instant};
 
@@ -20,7 +21,7 @@ impl Delay {
         Self { start: Instant::now(), least: None }
     }
 
-    /// Time on the way of a message that came then, beyond that of the fastest; zero where it has no time.
+    /// The lateness of a message, by when it came and by the time in its header; zero where the header has none.
     pub fn of(&mut self, came: Instant, time: f64) -> Duration {
         let now = came.saturating_duration_since(self.start).as_secs_f64();
         if time > 0.0 { self.at(now, time) } else { Duration::ZERO }

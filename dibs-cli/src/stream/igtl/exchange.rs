@@ -1,4 +1,4 @@
-//! What the thread that reads a peer and the one that sends to the receiver tell each other.
+//! The state that two threads share: the one that reads a peer, and the one that sends to the receiver.
 
 use super::message;
 use serde_json::{Value, json};

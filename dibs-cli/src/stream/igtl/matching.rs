@@ -11,7 +11,7 @@ const ROUNDS: usize = 64;
 /// Whether lists of triangles are the same.
 #[derive(Debug, PartialEq)]
 pub enum Matched {
-    /// In one way: each vertex of the first with that of the second.
+    /// In one way: pairs of a vertex of the first list and the vertex of the second that takes its place.
     One(Vec<[u32; 2]>),
     /// In several ways, or in one that colours do not find.
     Several,
@@ -82,7 +82,7 @@ impl<'a> Colours<'a> {
         sorted
     }
 
-    /// The next colour of a vertex is made of its own and those of its triangles, in any order.
+    /// Gives each vertex a new colour, made of its old one and its neighbours', whatever the order of the triangles.
     fn refine(&mut self) {
         let mut next: Vec<u64> = self.of.iter().map(|&colour| mixed(colour)).collect();
         for &[a, b, c] in self.triangles {

@@ -187,7 +187,7 @@ fn symmetric_meshes_are_not_guessed() {
     assert!(matches!(matched(&one[..2], &one[..1]), Matched::None));
 }
 
-/// A quad of two triangles, and what is no such mesh though each triangle is a part of a face.
+/// A quad has two triangles of the tree. A polygon of all points has room for half of them, and its mesh is refused.
 #[test]
 fn faces_have_no_more_triangles_than_their_corners_make() {
     let mesh = heart(1000).expect("a size").mesh;
