@@ -71,9 +71,9 @@ fn figures() -> String {
     block += &format!(
         "
 One measurement of the stretch serves every query until the next frame.
-On an emulated Cortex-M7, generated heart of 10,272 triangles, warm start: **{} instructions** a query on average, {} at
-most, in {} ticks. From [docs/evidence/benchmarks.md](docs/evidence/benchmarks.md), which also says where refitted trees win, and
-[docs/evidence/guarantees.md](docs/evidence/guarantees.md).
+On an emulated Cortex-M7, generated heart of 10,272 triangles, warm start: **{} instructions** a query on average,
+{} at most, in {} ticks. From [docs/evidence/benchmarks.md](docs/evidence/benchmarks.md), which also says where
+refitted trees win, and [docs/evidence/guarantees.md](docs/evidence/guarantees.md).
 ",
         figure("m7.warm.mean"),
         figure("m7.warm.largest"),
