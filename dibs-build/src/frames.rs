@@ -6,6 +6,7 @@ use dibs_nostd::{Index, Tree, TriangleRow};
 use glam::Vec3;
 
 use crate::Mesh;
+use crate::faces::first_without_face;
 
 /// Why positions are no frame of a tree's surface.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -66,7 +67,7 @@ pub enum FrameError {
 
 fn of_unit(unit: Option<Unit>) -> String {
     unit.map_or_else(String::new, |unit| {
-        format!(" (lengths in the mesh's file are in {unit}: read frames with --unit {unit})")
+        format!(" (--unit states its own; the mesh's file is in {unit}, as in --unit {unit})")
     })
 }
 
@@ -226,8 +227,7 @@ impl FrameCheck {
     }
 }
 
-/// Checks that each triangle is one of these faces, or a part of one, if there are any. A face has no more of them than its
-/// corners make: one face of all corners would have every mesh's.
+/// Checks that each triangle is one of these faces, or a part of one, if there are any.
 pub(crate) fn check_faces(
     triangles: &[[u32; 3]],
     vertices: usize,
@@ -236,37 +236,8 @@ pub(crate) fn check_faces(
     if faces.is_empty() {
         return Ok(());
     }
-    // The faces' corners, each once and sorted, so that faces of many corners take no longer.
-    let sorted = |face: &Vec<u32>| {
-        let mut corners = face.clone();
-        corners.sort_unstable();
-        corners.dedup();
-        corners
-    };
-    let faces: Vec<Vec<u32>> = faces.iter().map(sorted).collect();
-    let mut at: Vec<Vec<u32>> = vec![Vec::new(); vertices];
-    for (number, face) in (0..).zip(&faces) {
-        for &corner in face {
-            if let Some(at) = at.get_mut(corner as usize) {
-                at.push(number);
-            }
-        }
-    }
-    let mut left: Vec<usize> = faces.iter().map(|face| face.len().saturating_sub(2)).collect();
-    let mut takes = |corners: &[u32; 3]| {
-        // At a hub of many faces another corner has few.
-        let few = corners.iter().filter_map(|&corner| at.get(corner as usize));
-        let few = few.min_by_key(|at| at.len()).map_or(&[][..], Vec::as_slice);
-        let holds = |&face: &usize| {
-            left[face] > 0 && corners.iter().all(|corner| faces[face].binary_search(corner).is_ok())
-        };
-        // The smallest is not a larger one's to take.
-        let smallest = few.iter().map(|&face| face as usize).filter(holds);
-        let smallest = smallest.min_by_key(|&face| faces[face].len());
-        smallest.inspect(|&face| left[face] -= 1).is_some()
-    };
-    match triangles.iter().find(|corners| !takes(corners)) {
-        Some(&corners) => Err(FrameError::Triangle { corners }),
+    match first_without_face(triangles, vertices, faces) {
+        Some(missing) => Err(FrameError::Triangle { corners: triangles[missing] }),
         None => Ok(()),
     }
 }

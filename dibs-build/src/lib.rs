@@ -19,6 +19,7 @@ mod construct;
 mod crossing;
 mod error;
 mod export;
+mod faces;
 mod frame_file;
 mod frames;
 #[cfg(feature = "generate")]

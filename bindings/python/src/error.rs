@@ -9,7 +9,7 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 
 /// Advice that the library words for the command line, and its words here.
-const ADVICE: [(&str, &str); 13] = [
+const ADVICE: [(&str, &str); 14] = [
     ("`dibs build --orient` turns them", "orient=True turns them"),
     ("with --orient", "with orient=True"),
     ("--orient, unless", "orient=True, unless"),
@@ -21,6 +21,7 @@ const ADVICE: [(&str, &str); 13] = [
     ("--unit in", "unit='in'"),
     ("--unit um", "unit='um'"),
     ("--unit m", "unit='m'"),
+    ("(--unit states", "(unit states"),
     ("(--unit)", "(unit)"),
     ("`dibs stretch MESH MOTION --limits FILE` writes one", "`MotionStretch.limits` makes one"),
 ];

@@ -119,7 +119,12 @@ fn a_motion_of_another_mesh_or_unit_is_refused_before_anything_is_sent() {
         "stream metres.dibs --motion heart.pc2 --to udp:127.0.0.1:9 --frames 1",
     ] {
         let error = fails(folder, line);
-        assert!(error.starts_with("heart.pc2") && error.contains("--unit m"), "{line}: {error}");
+        assert!(
+            error.starts_with("heart.pc2")
+                && error
+                    .contains("(--unit states its own; the mesh's file is in m, as in --unit m)"),
+            "{line}: {error}"
+        );
     }
     json(
         folder,

@@ -1,0 +1,146 @@
+//! Whether faces have the triangles of a mesh.
+
+use std::collections::{HashMap, VecDeque};
+
+/// The first of these triangles that is no part of a face, by its place; `None` where each is. A face of `n` corners has at
+/// most `n - 2` of them, as many as its corners make: one face of all corners would have every mesh's.
+pub(crate) fn first_without_face(
+    triangles: &[[u32; 3]],
+    vertices: usize,
+    faces: &[Vec<u32>],
+) -> Option<usize> {
+    let mut faces = Faces::of(faces, vertices, triangles.len());
+    (0..triangles.len()).find(|&triangle| !faces.place(triangle, triangles))
+}
+
+/// Faces, and the triangles that each has been given.
+struct Faces {
+    /// Each face's corners, each once and sorted, so that faces of many corners take no longer.
+    corners: Vec<Vec<u32>>,
+    /// Faces at each vertex, by number.
+    at: Vec<Vec<u32>>,
+    /// Triangles given to each face.
+    given: Vec<Vec<usize>>,
+    /// The face that each triangle was given to.
+    face_of: Vec<Option<usize>>,
+}
+
+impl Faces {
+    fn of(faces: &[Vec<u32>], vertices: usize, triangles: usize) -> Self {
+        let sorted = |face: &Vec<u32>| {
+            let mut corners = face.clone();
+            corners.sort_unstable();
+            corners.dedup();
+            corners
+        };
+        let corners: Vec<Vec<u32>> = faces.iter().map(sorted).collect();
+        let mut at: Vec<Vec<u32>> = vec![Vec::new(); vertices];
+        for (number, face) in (0..).zip(&corners) {
+            for &corner in face {
+                if let Some(at) = at.get_mut(corner as usize) {
+                    at.push(number);
+                }
+            }
+        }
+        let given = vec![Vec::new(); corners.len()];
+        Self { corners, at, given, face_of: vec![None; triangles] }
+    }
+
+    /// Faces that have these three corners, the smallest first.
+    fn around(&self, corners: [u32; 3]) -> Vec<usize> {
+        // At a hub of many faces another corner has few.
+        let few = corners.iter().filter_map(|&corner| self.at.get(corner as usize));
+        let few = few.min_by_key(|at| at.len()).map_or(&[][..], Vec::as_slice);
+        let has = |&face: &usize| {
+            corners.iter().all(|corner| self.corners[face].binary_search(corner).is_ok())
+        };
+        let mut faces: Vec<usize> = few.iter().map(|&face| face as usize).filter(has).collect();
+        faces.sort_by_key(|&face| self.corners[face].len());
+        faces
+    }
+
+    /// Gives a triangle to a face. Where two faces share three corners, the first may have been given the other's triangle:
+    /// triangles given before move on to another of their faces, by the shortest chain of moves (a matching's augmenting path,
+    /// found breadth first).
+    fn place(&mut self, triangle: usize, triangles: &[[u32; 3]]) -> bool {
+        let mut wanted_by: HashMap<usize, usize> = HashMap::new();
+        let mut waiting = VecDeque::from([triangle]);
+        while let Some(next) = waiting.pop_front() {
+            for face in self.around(triangles[next]) {
+                if wanted_by.contains_key(&face) {
+                    continue;
+                }
+                wanted_by.insert(face, next);
+                if self.given[face].len() + 2 < self.corners[face].len() {
+                    self.move_along(face, &wanted_by);
+                    return true;
+                }
+                waiting.extend(&self.given[face]);
+            }
+        }
+        false
+    }
+
+    /// Gives `room` to the triangle that wants it, what that leaves to the one that wants that, and so on to the first.
+    fn move_along(&mut self, room: usize, wanted_by: &HashMap<usize, usize>) {
+        let mut free = Some(room);
+        while let Some(face) = free {
+            let triangle = wanted_by[&face];
+            free = self.face_of[triangle].replace(face);
+            self.given[face].push(triangle);
+            if let Some(left) = free {
+                self.given[left].retain(|&other| other != triangle);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::first_without_face;
+
+    /// The vertex 3 has two faces: both quads have the corners 0, 1 and 2.
+    const TWO_QUADS: [[u32; 4]; 2] = [[0, 1, 2, 3], [0, 1, 2, 4]];
+
+    fn misses(triangles: &[[u32; 3]], faces: &[&[u32]]) -> Option<usize> {
+        let faces: Vec<Vec<u32>> = faces.iter().map(|face| face.to_vec()).collect();
+        first_without_face(triangles, 8, &faces)
+    }
+
+    #[test]
+    fn quads_that_share_three_corners_have_their_triangles_in_every_order() {
+        let quads = TWO_QUADS.each_ref().map(<[u32; 4]>::as_slice);
+        let own = [[0, 1, 2], [0, 2, 3], [0, 1, 4], [1, 2, 4]];
+        for first in 0..4 {
+            for second in 0..4 {
+                let mut triangles = own;
+                triangles.swap(0, first);
+                triangles.swap(1, second);
+                assert_eq!(misses(&triangles, &quads), None, "{triangles:?}");
+                assert_eq!(misses(&triangles, &[quads[1], quads[0]]), None, "{triangles:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn triangles_move_along_a_chain_of_faces() {
+        // Each face shares three corners with the next, and the last triangle is the first face's alone.
+        let chain: [&[u32]; 4] = [&[0, 1, 2, 3], &[1, 2, 3, 4], &[2, 3, 4, 5], &[3, 4, 5]];
+        let taken = [[1, 2, 3], [0, 1, 2], [2, 3, 4], [1, 2, 4], [3, 4, 5], [2, 4, 5]];
+        assert_eq!(misses(&taken, &chain), None);
+        // Seven places, of which the last triangle's are full.
+        assert_eq!(misses(&[&taken[..], &[[0, 1, 3]]].concat(), &chain), None);
+        assert_eq!(misses(&[&taken[..], &[[0, 1, 3], [0, 2, 3]]].concat(), &chain), Some(7));
+    }
+
+    #[test]
+    fn a_face_has_no_more_triangles_than_its_corners_make() {
+        let all: &[u32] = &[0, 1, 2, 3, 4];
+        let three = [[0, 1, 2], [0, 2, 3], [0, 3, 4]];
+        assert_eq!(misses(&three, &[all]), None);
+        assert_eq!(misses(&[three[0], three[1], three[2], [1, 2, 3]], &[all]), Some(3));
+        // A corner that is named twice makes none.
+        assert_eq!(misses(&three[..2], &[&[0, 1, 2, 2]]), Some(1));
+        assert_eq!(misses(&[[0, 1, 9]], &[all]), Some(0), "a vertex that no face has");
+    }
+}
