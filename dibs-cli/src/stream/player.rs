@@ -80,6 +80,9 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     pub fn run(mut self) -> Result<()> {
         self.await_challenge()?;
         let played = self.play();
+        if let Some(timing) = &mut self.outcome.timing {
+            timing.end();
+        }
         let refused = self.refused();
         let exchange = match &self.source.frames {
             Frames::Live { exchange, .. } => exchange.as_deref(),

@@ -33,6 +33,12 @@ impl Timing {
         self.bins[bin as usize] += 1;
     }
 
+    /// The silence after the last frame is a gap, too.
+    pub fn end(&mut self) {
+        let silence = self.came.map_or(Duration::ZERO, |(_, last)| last.elapsed());
+        self.longest_gap = self.longest_gap.max(silence);
+    }
+
     /// Frames a second; 0 for fewer than two.
     fn rate(&self) -> f64 {
         let Some((first, last)) = self.came.filter(|_| self.frames > 1) else { return 0.0 };
@@ -89,8 +95,13 @@ mod tests {
             timing.count(start + Duration::from_millis(ms));
         }
         assert!((timing.rate() - 1.0).abs() < 1e-9, "{}", timing.rate());
+        timing.end();
         assert_eq!(timing.longest_gap, Duration::from_millis(2100));
         let [half, most] = [0.25, 1.0].map(|part| timing.latency(part));
         assert!(half < 100.0 && most >= 3000.0, "{half} {most}");
+        let mut timing = Timing::new();
+        timing.count(start);
+        timing.end();
+        assert!(timing.longest_gap >= Duration::from_secs(3), "silent after its only frame");
     }
 }

@@ -67,6 +67,8 @@ struct State {
     messages: u64,
     /// Messages of other types and devices.
     passed: u64,
+    /// Whether a note tells of another device with positions.
+    has_other: bool,
     /// Messages with a frame and without a time.
     timeless: u64,
     refused: [u64; Cause::ALL.len()],
@@ -102,10 +104,15 @@ impl Exchange {
         state.tell(note);
     }
 
-    pub fn passed(&self) {
+    /// Counts a message of another type or device, and leaves a note once.
+    pub fn passed(&self, note: Option<String>) {
         let mut state = self.state();
         state.messages += 1;
         state.passed += 1;
+        if let Some(note) = note.filter(|_| !state.has_other) {
+            state.has_other = true;
+            state.tell(note);
+        }
     }
 
     /// Counts a message whose frame is taken.
@@ -236,5 +243,23 @@ impl State {
         if self.notes.len() < NOTES && !self.notes.contains(&note) {
             self.notes.push_back(note);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Exchange;
+
+    /// Notes that come faster than they are shown wait, each once.
+    #[test]
+    fn notes_wait_for_their_turn() {
+        let exchange = Exchange::default();
+        for note in ["one", "two", "two", "three"] {
+            exchange.tell(note.to_owned());
+        }
+        assert_eq!(exchange.note().as_deref(), Some("one"));
+        assert_eq!(exchange.note(), None, "within a second");
+        assert_eq!(exchange.notes(), ["two", "three"]);
+        assert!(exchange.notes().is_empty());
     }
 }

@@ -123,10 +123,19 @@ impl Igtl {
     /// Reads one message. `None` if it has no frame, or none that fits.
     fn message(&mut self, peer: &mut Peer) -> Result<Option<Parsed>, Ended> {
         let header = peer.header(&mut self.door, &self.exchange)?;
-        let is_device = self.device.as_ref().is_none_or(|device| *device == header.device);
-        let Some(kind) = Kind::of(&header.kind).filter(|_| is_device) else {
+        let other = self.device.as_ref().filter(|device| **device != header.device);
+        let kind = Kind::of(&header.kind);
+        let Some(kind) = kind.filter(|_| other.is_none()) else {
+            let other = other.filter(|_| kind.is_some());
+            let note = other.map(|device| {
+                let Header { kind, device: theirs, .. } = &header;
+                format!(
+                    "{}: {kind} of device \"{theirs}\" passed over: --device is {device}",
+                    self.name
+                )
+            });
             peer.skip(header.size)?;
-            self.exchange.passed();
+            self.exchange.passed(note);
             return Ok(None);
         };
         let most = self.most();

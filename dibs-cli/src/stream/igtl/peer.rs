@@ -108,7 +108,7 @@ impl Door {
                     Some(socket) => Ok(socket),
                     None => listener.accept().map(|(socket, _)| socket),
                 },
-                Self::Server { at, .. } => connect(at),
+                Self::Server { at, .. } => connect(at.as_str()),
             };
             match (made.and_then(Peer::new), &self) {
                 (Ok(peer), _) => return Ok(peer),
@@ -154,7 +154,7 @@ impl Door {
 }
 
 /// Connects to the first of a name's addresses that answers.
-fn connect(at: &str) -> std::io::Result<TcpStream> {
+fn connect(at: impl ToSocketAddrs) -> std::io::Result<TcpStream> {
     let mut last = ErrorKind::NotFound.into();
     for address in at.to_socket_addrs()? {
         match TcpStream::connect_timeout(&address, CONNECT) {
@@ -270,4 +270,55 @@ impl Peer {
 
 fn is_patience(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Ended, Peer, connect};
+    use std::io::Write;
+    use std::net::{SocketAddr, TcpListener, TcpStream};
+    use std::thread;
+    use std::time::{Duration, Instant};
+
+    fn listener() -> (TcpListener, SocketAddr) {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let at = listener.local_addr().expect("an address");
+        (listener, at)
+    }
+
+    #[test]
+    fn the_next_address_of_a_name_is_tried() {
+        let (closed, (open, at)) = (listener().1, listener());
+        assert!(connect(&[closed][..]).is_err());
+        assert_eq!(connect(&[closed, at][..]).and_then(|to| to.peer_addr()).expect("open"), at);
+        drop(open);
+    }
+
+    /// Neither a peer that stops within a message nor one that sends a byte now and then is waited for beyond the end.
+    #[test]
+    fn a_message_has_a_time_to_come() {
+        let (listener, at) = listener();
+        let mut sender = TcpStream::connect(at).expect("a connection");
+        let mut peer = Peer::new(listener.accept().expect("a connection").0).expect("a peer");
+        let mut ends = |limit| {
+            let start = Instant::now();
+            let end = peer.fill(&mut [0; 1000], start + Duration::from_millis(limit));
+            assert!(
+                matches!(end, Err(Ended::Broken(why)) if why.contains("too slowly")),
+                "{end:?}"
+            );
+            start.elapsed()
+        };
+        sender.write_all(&[0; 999]).expect("room");
+        assert!(ends(100) >= Duration::from_millis(100));
+        thread::scope(|scope| {
+            scope.spawn(|| {
+                for _ in 0..100 {
+                    sender.write_all(&[0]).expect("room");
+                    thread::sleep(Duration::from_millis(10));
+                }
+            });
+            assert!(ends(200) < Duration::from_secs(1));
+        });
+    }
 }

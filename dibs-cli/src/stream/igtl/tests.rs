@@ -3,7 +3,7 @@
 use super::content::Kind;
 use super::matching::{Matched, matched};
 use super::message::{HEADER, Header, pack};
-use super::topology::Topology;
+use super::topology::{FEW, Topology};
 use dibs_build::generate::{brain, heart};
 use dibs_build::glam::Vec3;
 use dibs_build::{Builder, Mesh};
@@ -206,6 +206,34 @@ fn faces_have_no_more_triangles_than_their_corners_make() {
     quads[0] = vec![a, b, b, c, a];
     quads.pop();
     assert!(order.check_faces(&quads).is_err(), "three corners, one of two triangles");
+}
+
+/// A source may send as many faces again as the tree has, and a thousand: every face beyond is memory for nothing.
+#[test]
+fn there_is_a_most_of_faces() {
+    let mesh = heart(1000).expect("a size").mesh;
+    let order = order(&mesh);
+    let (points, most) = (order.positions(), 2 * order.triangles().len() + FEW);
+    let answer = |polygons: usize, strips: usize| {
+        let mut topology = Topology::new(order.clone());
+        let faces = order.triangles().iter().cycle().take(polygons);
+        let words: Vec<u32> = faces.flat_map(|&[a, b, c]| [3, a, b, c]).collect();
+        // One strip of so many triangles.
+        let corners = (0..strips as u32 + 2).map(|at| at % 3);
+        let strip: Vec<u32> = match strips {
+            0 => Vec::new(),
+            _ => [strips as u32 + 2].into_iter().chain(corners).collect(),
+        };
+        let body = poly_data(&vec![[0.0; 3]; points], &words, &strip);
+        let content = Kind::PolyData.read(&body).expect("a list");
+        topology.numbering(points, content.cells.expect("cells")).map(|_| ())
+    };
+    assert_eq!(answer(most, 0), Ok(()));
+    assert_eq!(answer(most - 10, 10), Ok(()));
+    for (polygons, strips) in [(most + 1, 0), (most - 10, 11)] {
+        let error = answer(polygons, strips).expect_err("more");
+        assert!(error.contains("far more than"), "{error}");
+    }
 }
 
 /// Triangles that a builder turned are still those of the source.

@@ -10,7 +10,7 @@ use std::hash::{BuildHasher, RandomState};
 const REFUSED: usize = 8;
 
 /// Faces that any source may send beside those of the tree's mesh.
-const FEW: usize = 1000;
+pub const FEW: usize = 1000;
 
 /// The points of the last topology, and those that were refused.
 pub struct Topology {

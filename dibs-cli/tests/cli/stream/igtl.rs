@@ -6,6 +6,7 @@ use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::Output;
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -15,12 +16,31 @@ use dibs_nostd::wire::NoMac;
 use dibs_nostd::{Tree, TriangleRow};
 use fastrand::Rng;
 
-use super::igtl_messages::{array, array_in_metres, crc, message, point_list, poly_data};
-use super::receiver::{Bytes, Seen, receive};
+use super::igtl_messages::{array, array_in_metres, crc, message, point_list, poly_data, timed};
+use super::receiver::{Bytes, Link, Seen, receive};
 use super::{FRAMES, N, PATIENCE, assert_all, heart, program, spawn, totals};
 
+/// A link that sends so many statuses, and no more.
+struct Quiet<L> {
+    link: L,
+    statuses: usize,
+}
+
+impl<L: Link> Link for Quiet<L> {
+    fn receive(&mut self) -> Option<Vec<Vec<u8>>> {
+        self.link.receive()
+    }
+
+    fn reply(&mut self, packet: &[u8]) {
+        if let Some(left) = self.statuses.checked_sub(1) {
+            self.statuses = left;
+            self.link.reply(packet);
+        }
+    }
+}
+
 /// The motion, and the triangles by the mesh's numbers.
-fn organ(folder: &Path) -> (Vec<Vec<Vec3>>, Vec<[u32; 3]>) {
+pub fn organ(folder: &Path) -> (Vec<Vec<Vec3>>, Vec<[u32; 3]>) {
     let blob = fs::read(folder.join("heart.dibs")).unwrap();
     let tree = Tree::<u16>::from_bytes(&blob).unwrap();
     let corners = (0..tree.triangle_count()).map(|row| tree.corners(TriangleRow(row)).unwrap());
@@ -29,20 +49,31 @@ fn organ(folder: &Path) -> (Vec<Vec<Vec3>>, Vec<[u32; 3]>) {
 }
 
 /// Runs a bridge of every frame, with `line`, to a receiver, beside `source`.
-fn bridged<T: Send>(
+pub fn bridged<T: Send>(
     folder: &Path,
     line: &str,
     source: impl FnOnce() -> T + Send,
 ) -> (Seen, Output, T) {
+    bridged_to(folder, &format!("--motion-rate 200 {line}"), usize::MAX, source)
+}
+
+/// As [`bridged`], to a receiver that is silent after so many statuses.
+fn bridged_to<T: Send>(
+    folder: &Path,
+    line: &str,
+    statuses: usize,
+    source: impl FnOnce() -> T + Send,
+) -> (Seen, Output, T) {
     let receiver = TcpListener::bind("127.0.0.1:0").unwrap();
     let to = receiver.local_addr().unwrap();
-    let line = format!("--to tcp:{to} --motion-rate 200 --frames {FRAMES} {line}");
+    let line = format!("--to tcp:{to} --frames {FRAMES} {line}");
     let child = spawn(folder, &line);
     let (socket, _) = receiver.accept().unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
     thread::scope(|scope| {
         let source = scope.spawn(source);
-        let (seen, output) = receive(folder, &mut Bytes::new(socket), NoMac, child);
+        let mut link = Quiet { link: Bytes::new(socket), statuses };
+        let (seen, output) = receive(folder, &mut link, NoMac, child);
         (seen, output, source.join().unwrap())
     })
 }
@@ -112,6 +143,9 @@ fn messages_of_every_kind_arrive_to_the_bit() {
     let (seen, output, _) = bridged(folder, &line, || send(connected(&address)));
     let from_client = totals(&output);
     assert_all(&seen, &from_client);
+    let notes = String::from_utf8_lossy(&output.stderr);
+    let passed = "POLYDATA of device \"bone\" passed over: --device is heart";
+    assert_eq!(notes.matches(passed).count(), 1, "{notes}");
     for totals in [from_server, from_client] {
         let source = &totals["source"];
         assert_eq!(
@@ -177,6 +211,13 @@ fn units_and_axes_are_converted() {
     });
     assert_all(&seen, &totals(&output));
     assert_eq!(seen.error, 0.0);
+}
+
+/// What a bridge sends until it hangs up.
+fn all(peer: &mut TcpStream) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let _ = peer.read_to_end(&mut bytes);
+    bytes
 }
 
 /// Statuses that a bridge sent back, as code, name and sentence.
@@ -252,10 +293,15 @@ fn wrong_messages_are_refused_and_the_last_surface_stays() {
         let mut peer = accepted(&server);
         let mut reader = peer.try_clone().unwrap();
         // Statuses are taken until the bridge ends.
-        let statuses = thread::spawn(move || {
-            let mut said = Vec::new();
-            let _ = reader.read_to_end(&mut said);
-            said
+        let said = Arc::new(Mutex::new(Vec::new()));
+        let heard = Arc::clone(&said);
+        let reading = thread::spawn(move || {
+            let mut chunk = [0; 1024];
+            while let Ok(bytes) = reader.read(&mut chunk)
+                && bytes > 0
+            {
+                heard.lock().unwrap().extend_from_slice(&chunk[..bytes]);
+            }
         });
         let mut sent = Vec::new();
         for (number, frame) in frames.iter().enumerate() {
@@ -268,8 +314,16 @@ fn wrong_messages_are_refused_and_the_last_surface_stays() {
                 thread::sleep(Duration::from_millis(1200));
             }
             peer.write_all(&message(1, "POLYDATA", "", &poly_data(frame, &triangles))).unwrap();
+            // Once no wrong message follows, the peer is told that all is well.
+            let start = Instant::now();
+            while number == 13 && !statuses(&said.lock().unwrap()).iter().any(|one| one.0 == 1) {
+                assert!(start.elapsed() < PATIENCE, "the peer is not told");
+                thread::sleep(Duration::from_millis(20));
+            }
         }
-        (sent, statuses.join().unwrap())
+        reading.join().unwrap();
+        let said = said.lock().unwrap().clone();
+        (sent, said)
     });
     let totals = totals(&output);
     assert_all(&seen, &totals);
@@ -350,6 +404,80 @@ fn a_silent_peer_gives_way() {
         (silent, peer)
     });
     assert_all(&seen, &totals(&output));
+}
+
+/// A message whose header's time says that it was half a second on its way makes a frame of that age.
+#[test]
+fn frames_are_as_old_as_their_headers_say() {
+    const LATE: usize = 15;
+    let folder = heart();
+    let folder = folder.path();
+    let (frames, _) = organ(folder);
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("--from igtl:{}", server.local_addr().unwrap());
+    let (seen, output, _) = bridged(folder, &line, || {
+        let mut peer = accepted(&server);
+        let start = Instant::now();
+        for (number, frame) in frames.iter().enumerate() {
+            if number == LATE {
+                // What is held up is late by as long.
+                thread::sleep(Duration::from_millis(500));
+            }
+            // The peer's clock has a beginning of its own.
+            let time = start.elapsed().as_secs_f64() + if number < LATE { 1000.5 } else { 1000.0 };
+            let message = message(1, "NDARRAY", "", &array(frame));
+            peer.write_all(&timed(message, time)).unwrap();
+            thread::sleep(Duration::from_millis(10));
+        }
+        peer
+    });
+    let totals = totals(&output);
+    assert_all(&seen, &totals);
+    assert_eq!(totals["source"]["without_time"], 0, "{totals}");
+    let (prompt, late) = seen.ages.split_at(LATE);
+    assert!(prompt.iter().any(|&age| age < 100), "{prompt:?}");
+    assert!(late.iter().all(|&age| age >= 498), "{late:?}");
+}
+
+/// Where the user gives a rate, a frame that waits for its turn grows old meanwhile.
+#[test]
+fn frames_that_wait_grow_old() {
+    let folder = heart();
+    let folder = folder.path();
+    let (frames, _) = organ(folder);
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("--from igtl:{} --motion-rate 20", server.local_addr().unwrap());
+    let (seen, output, _) = bridged_to(folder, &line, usize::MAX, || {
+        let mut peer = accepted(&server);
+        for frame in &frames {
+            peer.write_all(&message(1, "NDARRAY", "", &array(frame))).unwrap();
+        }
+        peer
+    });
+    assert_all(&seen, &totals(&output));
+    // Each came when the one before it was taken.
+    assert!(seen.ages[2..].iter().all(|&age| age >= 40), "{:?}", seen.ages);
+}
+
+/// Who sends is told once the receiver says no more.
+#[test]
+fn a_receiver_that_falls_silent_is_reported() {
+    let folder = heart();
+    let folder = folder.path();
+    let (frames, _) = organ(folder);
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("--from igtl:{} --motion-rate 10", server.local_addr().unwrap());
+    let (_, _, said) = bridged_to(folder, &line, 10, || {
+        let mut peer = accepted(&server);
+        for frame in &frames {
+            peer.write_all(&message(1, "NDARRAY", "", &array(frame))).unwrap();
+        }
+        all(&mut peer)
+    });
+    let said = statuses(&said);
+    let ready = said.iter().position(|(code, ..)| *code == 1);
+    let silent = said.iter().rposition(|(code, _, text)| *code == 13 && text.contains("for 2 s"));
+    assert!(ready.is_some_and(|ready| silent.is_some_and(|silent| ready < silent)), "{said:?}");
 }
 
 #[test]

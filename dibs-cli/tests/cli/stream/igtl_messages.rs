@@ -26,6 +26,14 @@ pub fn message(version: u16, kind: &str, device: &str, content: &[u8]) -> Vec<u8
     message
 }
 
+/// The message, with this time (s) in its header, which no checksum covers.
+pub fn timed(mut message: Vec<u8>, time: f64) -> Vec<u8> {
+    let fraction = (time.fract() * 4_294_967_296.0) as u32;
+    message[34..38].copy_from_slice(&(time as u32).to_be_bytes());
+    message[38..42].copy_from_slice(&fraction.to_be_bytes());
+    message
+}
+
 fn floats(points: &[Vec3]) -> Vec<u8> {
     points.iter().flat_map(Vec3::to_array).flat_map(f32::to_be_bytes).collect()
 }

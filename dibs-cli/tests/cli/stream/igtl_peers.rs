@@ -1,18 +1,13 @@
 //! `dibs bridge` beside another program's messages, on request: `DIBS_PYIGTL` is a Python that has `pyigtl`.
 
-use std::fs;
 use std::io::Write;
 use std::net::TcpListener;
 use std::process::{Command, Stdio};
-use std::time::Duration;
 
-use dibs_build::Motion;
 use dibs_build::glam::Vec3;
-use dibs_nostd::wire::NoMac;
-use dibs_nostd::{Tree, TriangleRow};
 
-use super::receiver::{Bytes, receive};
-use super::{FRAMES, assert_all, heart, spawn, totals};
+use super::igtl::{bridged, organ};
+use super::{FRAMES, assert_all, heart, totals};
 
 /// A server of frames that a file has: big-endian f32, and the triangles as u32.
 const SERVER: &str = "
@@ -43,30 +38,16 @@ fn frames_of_pyigtl_arrive() {
     for kind in ["POLYDATA", "POINT"] {
         let folder = heart();
         let folder = folder.path();
-        let blob = fs::read(folder.join("heart.dibs")).unwrap();
-        let tree = Tree::<u16>::from_bytes(&blob).unwrap();
-        let corners =
-            (0..tree.triangle_count()).flat_map(|row| tree.corners(TriangleRow(row)).unwrap());
-        let corners = corners.map(|row| tree.vertex_number(row).unwrap().0);
-        let mut data: Vec<u8> = corners.flat_map(u32::to_be_bytes).collect();
-        for frame in Motion::read_pc2(folder.join("heart.pc2")).unwrap().frames {
-            data.extend(frame.iter().flat_map(Vec3::to_array).flat_map(f32::to_be_bytes));
-        }
+        let (frames, triangles) = organ(folder);
+        let mut data: Vec<u8> = triangles.iter().flatten().flat_map(|x| x.to_be_bytes()).collect();
+        data.extend(frames.iter().flatten().flat_map(Vec3::to_array).flat_map(f32::to_be_bytes));
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let (count, corners) = (FRAMES.to_string(), triangles.len().to_string());
         let mut server = Command::new(&python);
-        server.args(["-c", SERVER, &port.to_string(), &FRAMES.to_string()]);
-        server.args([&tree.triangle_count().to_string(), kind]).stdin(Stdio::piped());
-        let mut server = server.spawn().unwrap();
+        server.args(["-c", SERVER, &port.to_string(), &count, &corners, kind]);
+        let mut server = server.stdin(Stdio::piped()).spawn().unwrap();
         server.stdin.take().unwrap().write_all(&data).unwrap();
-        let receiver = TcpListener::bind("127.0.0.1:0").unwrap();
-        let to = receiver.local_addr().unwrap();
-        let line = format!(
-            "--from igtl:127.0.0.1:{port} --to tcp:{to} --motion-rate 200 --frames {FRAMES}"
-        );
-        let child = spawn(folder, &line);
-        let (socket, _) = receiver.accept().unwrap();
-        socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
-        let (seen, output) = receive(folder, &mut Bytes::new(socket), NoMac, child);
+        let (seen, output, ()) = bridged(folder, &format!("--from igtl:127.0.0.1:{port}"), || ());
         server.kill().unwrap();
         server.wait().unwrap();
         assert_all(&seen, &totals(&output));

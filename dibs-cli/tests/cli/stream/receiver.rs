@@ -77,6 +77,8 @@ impl Link for Datagrams {
 #[derive(Default)]
 pub struct Seen {
     pub epochs: Vec<u32>,
+    /// The age (ms) that each had when it was sent, as the sender states it.
+    pub ages: Vec<u32>,
     pub published: u32,
     pub rejected: u32,
     pub heartbeats: u32,
@@ -133,6 +135,7 @@ pub fn receive<M: Mac>(
                     Advance::Pending => (),
                     Advance::Published { epoch } => {
                         seen.epochs.push(epoch);
+                        seen.ages.push(assembler.health().source_age.0);
                         let frame = reader.read().unwrap();
                         let label = frame.label();
                         assert_eq!(label.epoch, epoch);
