@@ -56,8 +56,8 @@ pub struct dibs_sender_settings {
     pub whole_every: u32,
     /// Time between two heartbeats, in ms; 0 sends none.
     pub heartbeat: u32,
-    /// Number of this run: the receiver ignores a run whose number is below that of one before. By default the time in
-    /// tenths of a second.
+    /// Number of this run of the sender. The receiver ignores packets of an earlier run, which is one with a smaller
+    /// number, so a program that starts anew needs a larger one. By default the time in tenths of a second.
     pub session: u32,
 }
 

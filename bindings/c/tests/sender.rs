@@ -10,8 +10,9 @@ use fastrand::Rng;
 
 use crate::programs::{include, library, run, tool};
 
-/// Every frame arrives in the order of the tree's rows from a mesh whose file has another order and a vertex of no
-/// triangle; the sending thread allocates nothing from the third frame on; and what cannot be sent is refused with a sentence.
+/// The mesh's file has its vertices in another order than the tree's rows, and one that no triangle has. All frames arrive in
+/// the tree's order. From the third frame on the sending thread allocates nothing. A frame of another length, or with NaN, is
+/// refused with a sentence.
 #[test]
 fn frames_go_from_c_to_a_bus() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -19,8 +19,9 @@ pub struct Settings {
     pub heartbeat: Option<Duration>,
     /// Time that a whole frame may be on its way, during which requests for another one are ignored.
     pub patience: Duration,
-    /// Number of this run: a receiver ignores a run whose number is below that of one before. By default the time in
-    /// tenths of a second, which wraps after 13 years. A sender that finds the number taken when it starts takes the next.
+    /// Number of this run of the sender. A receiver ignores packets of an earlier run, which is one with a smaller number, so a
+    /// program that starts anew needs a larger one. By default the time in tenths of a second, which wraps after 13 years. A
+    /// sender that finds the number taken when it starts takes the next.
     pub session: u32,
 }
 
