@@ -44,8 +44,9 @@ pub struct Proximity {
     pub point_on_tool: Vec3,
     /// Unit vector that leads out: from `point_on_surface` to the tool's axis outside, from the axis to
     /// `point_on_surface` inside and where it crosses. Next to contact it is the surface's pseudonormal; zero where
-    /// there is none. It can jump where two parts of the surface are equally near (the medial axis). Where a budget
-    /// ended a tracker's search, it can be that of the last tick's pair.
+    /// there is none. It can jump where two parts of the surface are equally near (the medial axis): a
+    /// [`Tracker`](crate::Tracker) keeps the last tick's triangle while the two tie. Where a budget ended its search, the
+    /// direction can be that of the last tick's pair.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub direction: Vec3,
     /// Parameter of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.

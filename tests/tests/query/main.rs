@@ -30,6 +30,7 @@ mod tracked_budget;
 mod tracked_chain;
 mod tracked_contacts;
 mod tracked_depth;
+mod tracked_direction;
 mod tracker;
 mod walls;
 mod wide;

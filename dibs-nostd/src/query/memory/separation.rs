@@ -38,6 +38,12 @@ impl KnownSeparation {
         self.last = Some((certain, clock.now()));
     }
 
+    /// What was certain then.
+    #[inline(always)]
+    pub fn last(&self) -> Option<&Certain> {
+        self.last.as_ref().map(|(certain, _)| certain)
+    }
+
     /// What is certain now.
     pub fn now(&self, clock: MotionClock) -> Option<Certain> {
         let (certain, at) = self.last?;

@@ -51,13 +51,14 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if tracked.is_kept {
             contacts.lower_bound(closest.lower);
         }
-        match surface.motion() {
+        let made = match surface.motion() {
             Some(_) => {
                 let front = self.memory.range.now(self.memory.clock, options.part);
                 contacts.add_tracked(&pair, &mut self.stack, &rest, front)?
             }
             None => contacts.add(&pair, &mut self.stack, &rest)?,
         };
+        tracked.closest.add_tests(made);
         // A search that found all but the side has found all contacts: the last tick's side comes after them.
         if !is_cut {
             let TrackerAnswer { closest, is_kept, .. } = &mut tracked;

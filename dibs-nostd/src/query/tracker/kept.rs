@@ -19,7 +19,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
 
 /// A pair closer than so many accuracies has no direction of its own.
-const DIRECTED: f32 = 8.0;
+pub(super) const DIRECTED: f32 = 8.0;
 
 impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     Tracker<'_, I, STACK, OPENED, RANGE>

@@ -1,6 +1,7 @@
 //! The closest pair from tick to tick: a tick costs in proportion to the change.
 
 mod contacts;
+mod direction;
 mod kept;
 mod several;
 #[cfg(test)]
@@ -39,6 +40,12 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 /// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
 /// that may have become so. A budget is divided: three eighths at most go to the closest pair of an axis that is inside or
 /// crosses, half of one that may be, the rest to the depth. A point's search that the budget ends goes on in the next tick.
+///
+/// Where a pose's last digits decide which of several triangles is the closest, a force along its direction would turn to
+/// and fro. So on a closed surface an answer keeps the last tick's triangle while that is no farther than the closest by more
+/// than the accuracy of both distances: from the axis outside, from the deepest point where the axis crosses or is inside.
+/// Separation, interval and side are the search's. Where the direction would turn by 8 degrees or more, this takes a triangle
+/// test.
 ///
 /// RAM: 16 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,944.
 ///
@@ -264,6 +271,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let nearest = closest.lower;
         let known = (&mut self.ties, Some(memory.depth.at(memory.clock, past)));
         signed(&self.tree, &mut self.stack, surface, tool, options, &mut closest, known)?;
+        self.keep_direction(surface, tool, options, &mut closest)?;
         let is_cut = closest.side == Side::Undefined(NoSide::CutShort);
         let is_kept = separation == f32::INFINITY
             && (purpose != Purpose::Contacts || is_cut)

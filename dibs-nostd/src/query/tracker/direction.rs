@@ -1,0 +1,100 @@
+//! The direction where triangles tie.
+//!
+//! On the medial axis the last digits of a pose decide which triangle is the closest, and a force along its direction would
+//! turn to and fro. So an answer keeps the last tick's triangle while that may be the closest, as far as the accuracy tells.
+//! The direction turns once another triangle is certainly closer.
+
+use super::Tracker;
+use super::kept::DIRECTED;
+use crate::math::sqrt::sqrt;
+use crate::query::memory::separation::Certain;
+use crate::query::{Budget, Options, Proximity, Side};
+use crate::tool::{AxisPoint, Tool};
+use crate::unavailable::QueryError;
+use crate::{Index, TriangleRow, VertexTable};
+
+/// The cosine of the least turn that is looked at: 8 degrees. As a tool slides along a surface, its direction turns by less
+/// in a tick, and the last triangle need not be tested.
+const TURNED: f32 = 0.99;
+
+impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
+    Tracker<'_, I, STACK, OPENED, RANGE>
+{
+    /// Keeps the last tick's direction where the triangle that it led from may still be the closest.
+    #[inline(always)]
+    pub(super) fn keep_direction<V: VertexTable + ?Sized, T: Tool>(
+        &self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+        found: &mut Proximity,
+    ) -> Result<(), QueryError> {
+        match self.memory.separation.last() {
+            Some(last) if last.direction.dot(found.direction) < TURNED => {
+                self.take_tied(vertices, tool, options, found, last)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes the last tick's triangle into an answer if it ties with that of the answer, of the same solid and seen from the
+    /// same side.
+    #[cold]
+    #[inline(never)]
+    fn take_tied<V: VertexTable + ?Sized, T: Tool>(
+        &self,
+        vertices: &V,
+        tool: &T,
+        options: &Options,
+        found: &mut Proximity,
+        last: &Certain,
+    ) -> Result<(), QueryError> {
+        let tree = &self.tree;
+        let (Some(TriangleRow(row)), Some(TriangleRow(other))) = (last.triangle, found.triangle)
+        else {
+            return Ok(());
+        };
+        let is_outside = found.side == Side::Outside;
+        // On an open surface the other sheet may be seen from its inner side.
+        let is_possible = match found.side {
+            Side::Undefined(_) => false,
+            Side::Outside => last.side == Side::Outside && !found.is_cut_short(),
+            _ => last.side != Side::Outside && tree.root_of(row) == tree.root_of(other),
+        };
+        let left = options.after(found.tests()).budget.tests();
+        if row == other || !tree.is_closed() || !is_possible || left < Budget::TRIANGLE {
+            return Ok(());
+        }
+        found.triangle_tests += 1;
+        let rows = tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+        let position = |row| vertices.position(row).ok_or(QueryError::Corrupt { row });
+        let [a, b, c] = rows;
+        let corners = [position(a)?, position(b)?, position(c)?];
+        let at = tool.axis_point(found.axis_parameter);
+        let pair = if is_outside {
+            tool.closest_on_triangle(&corners, f32::INFINITY)
+        } else {
+            AxisPoint(at).closest_on_triangle(&corners, f32::INFINITY)
+        };
+        let pair = pair.ok_or(QueryError::Position { vertex: a })?;
+        let towards = pair.on_axis - pair.on_surface;
+        let (length, closest) =
+            (sqrt(towards.length_squared()), sqrt(at.distance_squared(found.point_on_surface)));
+        let tie = 2.0 * (found.accuracy + vertices.position_error());
+        if !(length > DIRECTED * found.accuracy && length <= closest + tie) {
+            return Ok(());
+        }
+        let outward = if is_outside { towards / length } else { -towards / length };
+        if outward.dot(last.direction) > found.direction.dot(last.direction) {
+            if is_outside {
+                found.axis_parameter = pair.axis_parameter;
+            }
+            found.direction = outward;
+            found.point_on_surface = pair.on_surface;
+            found.point_on_tool = pair.on_axis - outward * tool.radius();
+            found.barycentric = pair.barycentric;
+            (found.triangle, found.corners) = (last.triangle, rows);
+        }
+        Ok(())
+    }
+}

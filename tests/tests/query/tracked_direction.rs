@@ -1,0 +1,155 @@
+//! Poses that jitter where triangles tie: a tracker's direction does not turn to and fro with their last digits.
+
+use dibs_build::{Builder, Mesh, generate};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{
+    Capsule, MovingTable, Odometer, Options, Proximity, Query, Side, Tool, Tracker, glam::Vec3,
+};
+use dibs_tests::deform::unit;
+use fastrand::Rng;
+
+/// Ticks at a tie.
+const TICKS: u32 = 60;
+
+/// How far (mm) each coordinate of a pose jitters to either side.
+const JITTER: f32 = 3e-4;
+
+/// How far (mm) beyond a tie no accuracy hides which triangle is closest.
+const CLEAR: f32 = 0.1;
+
+/// What was found at the ties of one kind of pose.
+#[derive(Debug, Default)]
+struct Turns {
+    ties: u32,
+    /// Turns by 45 degrees and more between two ticks: of whole queries, and of a tracker.
+    whole: u32,
+    tracked: u32,
+    /// Ticks in which the tracker's triangle is not the query's.
+    kept: u32,
+}
+
+/// The cosine of 45 degrees: a smaller product of two directions is a turn.
+const TURN: f32 = 0.707;
+
+/// The distance (mm) between the points of a pair, from the axis.
+fn length(tool: &Capsule, found: &Proximity) -> f32 {
+    tool.axis_point(found.axis_parameter).distance(found.point_on_surface)
+}
+
+/// A scene at rest, and what a whole query says of it.
+struct Scene<'t, 's> {
+    query: Query<'t, u16, MAX_STACK>,
+    surface: MovingTable<'s, [Vec3]>,
+}
+
+impl Scene<'_, '_> {
+    fn ask(&mut self, tool: &Capsule) -> Proximity {
+        self.query.closest(&self.surface, tool, &Options::cold()).expect("an answer")
+    }
+
+    /// Of two poses with the same side and other directions, two neighbours in between.
+    fn tie(&mut self, from: Capsule, to: Capsule) -> Option<[Capsule; 2]> {
+        let (mut from, mut to) = (from, to);
+        let side = self.ask(&from).side;
+        let first = self.ask(&from).direction;
+        for _ in 0..40 {
+            let middle = moved(&from, 0.5 * (to.start() - from.start()));
+            if middle.start() == from.start() || middle.start() == to.start() {
+                break;
+            }
+            let found = self.ask(&middle);
+            if found.side != side {
+                return None;
+            }
+            if found.direction.dot(first) < TURN { to = middle } else { from = middle }
+        }
+        let (one, other) = (self.ask(&from), self.ask(&to));
+        // Where the direction turns slowly nothing ties, and next to the surface it is the surface's own.
+        let is_tie = one.direction.dot(other.direction) < TURN && length(&from, &one) > 0.5;
+        is_tie.then_some([from, to])
+    }
+}
+
+fn moved(tool: &Capsule, by: Vec3) -> Capsule {
+    Capsule::new(tool.start() + by, tool.end() + by, tool.radius()).expect("finite")
+}
+
+/// Ticks at ties of a mesh, by the tool's length: outside, and inside or crossing.
+fn turns_at_ties(mesh: &Mesh, size: f32, axis: f32, most: u32) -> [Turns; 2] {
+    let built = Builder::new().build(mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let query = Query::new(&tree).expect("deep enough");
+    let mut scene = Scene { query, surface };
+    let mut rng = Rng::with_seed(37);
+    let mut found = [Turns::default(), Turns::default()];
+    for _ in 0..40 * most {
+        let start = unit(&mut rng) * size * rng.f32();
+        let along = unit(&mut rng) * axis;
+        let from = Capsule::new(start, start + along, 1.0).expect("finite");
+        let to = moved(&from, unit(&mut rng) * 3.0);
+        let (one, other) = (scene.ask(&from), scene.ask(&to));
+        if one.side != other.side || one.direction.dot(other.direction) >= TURN {
+            continue;
+        }
+        let turns = &mut found[usize::from(one.side != Side::Outside)];
+        if turns.ties == most {
+            continue;
+        }
+        let Some([near, beyond]) = scene.tie(from, to) else { continue };
+        turns.ties += 1;
+        let mut tracker = Tracker::<u16, MAX_STACK, 512>::new(&tree).expect("deep enough");
+        let (mut last, mut last_whole) = (None, None);
+        for _ in 0..TICKS {
+            let noise = [(); 3].map(|()| (2.0 * rng.f32() - 1.0) * JITTER);
+            let tool = moved(&near, noise.into());
+            let whole = scene.ask(&tool);
+            let tracked = tracker.closest(&scene.surface, &tool, &Options::new());
+            let tracked = tracked.expect("an answer").closest;
+            assert_eq!(tracked.side, whole.side);
+            let tie = 2.0 * tracked.accuracy + 2.0 * whole.accuracy;
+            let width = whole.separation - whole.lower + tracked.separation - tracked.lower;
+            let excess = length(&tool, &tracked) - length(&tool, &whole);
+            assert!(excess <= tie + width, "{excess} {tie} {width}");
+            let has_turned = |last: Option<Vec3>, now: Vec3| {
+                u32::from(last.is_some_and(|last| last.dot(now) < TURN))
+            };
+            turns.whole += has_turned(last_whole, whole.direction);
+            turns.tracked += has_turned(last, tracked.direction);
+            turns.kept += u32::from(tracked.direction.dot(whole.direction) < TURN);
+            (last, last_whole) = (Some(tracked.direction), Some(whole.direction));
+        }
+        // Beyond the tie, either way, the direction is that of a whole query.
+        let apart = (to.start() - from.start()).normalize() * CLEAR;
+        for tool in [moved(&near, -apart), moved(&beyond, apart)] {
+            let whole = scene.ask(&tool);
+            let tracked = tracker.closest(&scene.surface, &tool, &Options::new());
+            let tracked = tracked.expect("an answer").closest;
+            if axis == 0.0 && scene.ask(&moved(&tool, apart * 0.5)).triangle == whole.triangle {
+                assert!(tracked.direction.dot(whole.direction) > TURN, "{tracked:?} {whole:?}");
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn no_direction_turns_to_and_fro_at_a_tie() {
+    let most = if cfg!(debug_assertions) { 5 } else { 60 };
+    let heart = generate::heart(2_000).expect("a valid size").mesh;
+    let brain = generate::brain(8_000).expect("a valid size");
+    let (mut whole, mut tracked) = (0, 0);
+    for (mesh, size) in [(&heart, 60.0), (&brain, 70.0)] {
+        for axis in [0.0, 40.0] {
+            let found = turns_at_ties(mesh, size, axis, most);
+            for (turns, place) in found.iter().zip(["outside", "inside or crossing"]) {
+                println!("{place}, axis of {axis} mm: {turns:?}");
+                whole += turns.whole;
+                tracked += turns.tracked;
+            }
+        }
+    }
+    assert!(whole > 1_000 && tracked * 100 < whole, "{whole} {tracked}");
+}
