@@ -7,7 +7,7 @@
 /// | item | is |
 /// |---|---|
 /// | `TREE` | the bytes in flash, a [`TreeBytes`](crate::TreeBytes): `TREE.validate()` gives the `Tree` |
-/// | `Surface`, `start` | the vertices as they are now and their two ends, `Bus` and `Guard`: [`guard`](crate::guard) |
+/// | `Surface`, `start` | the vertices as they are now and their two ends, `Bus` and `Guard`: [`guard`](crate::guard); `start_with_contacts` for [contacts](crate::guard::Guard::contacts) |
 /// | `Frames` | a double buffer for its vertices, a [`Frames`](crate::Frames), for a loop of your own |
 /// | `Receiver` | the bus's end of it (feature `bus`), an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
 /// | `Reader` | the control loop's end of it |

@@ -206,14 +206,10 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
 /// The two ends of a surface whose frames are vertices, or nodes.
 fn guard_source(is_embedded: bool) -> String {
     let embedded = "::dibs_nostd::nodes::Nodes<'static>";
-    let (rows, bus, guard) = if is_embedded {
-        (
-            format!("NODES, {embedded}"),
-            format!(", ::dibs_nostd::wire::NoMac, {embedded}"),
-            format!(", {embedded}"),
-        )
+    let (rows, bus, kind) = if is_embedded {
+        (format!("NODES, {embedded}"), format!(", ::dibs_nostd::wire::NoMac, {embedded}"), embedded)
     } else {
-        ("VERTICES".to_owned(), String::new(), String::new())
+        ("VERTICES".to_owned(), String::new(), "::dibs_nostd::guard::Vertices")
     };
     let items = format!(
         r#"    ::dibs_nostd::if_guard! {{
@@ -223,8 +219,9 @@ fn guard_source(is_embedded: bool) -> String {
         /// The bus's end.
         pub type Bus = ::dibs_nostd::guard::Bus<'static, 'static, Index{bus}>;
 
-        /// The control tick's end, with room for 256 opened nodes.
-        pub type Guard = ::dibs_nostd::guard::Guard<'static, 'static, Index, STACK, 256{guard}>;
+        /// The control tick's end, with room for 256 opened nodes; and for so many more of the searches for contacts.
+        pub type Guard<const RANGE: usize = 0> =
+            ::dibs_nostd::guard::Guard<'static, 'static, Index, STACK, 256, {kind}, RANGE>;
 
         /// Validates the tree, and makes the two ends of its surface, once.
         ///
@@ -236,6 +233,18 @@ fn guard_source(is_embedded: bool) -> String {
             limits: ::dibs_nostd::guard::GuardLimits,
         ) -> ::core::result::Result<(Bus, Guard), ::dibs_nostd::Error> {{
             surface.start(TREE, limits)
+        }}
+
+        /// The same, for contacts: `start_with_contacts::<256>` has room for 256 nodes that a search for contacts opened.
+        ///
+        /// # Errors
+        /// Those of `start`.
+        #[inline(always)]
+        pub fn start_with_contacts<const RANGE: usize>(
+            surface: &'static Surface,
+            limits: ::dibs_nostd::guard::GuardLimits,
+        ) -> ::core::result::Result<(Bus, Guard<RANGE>), ::dibs_nostd::Error> {{
+            surface.start_with_contacts(TREE, limits, ::dibs_nostd::wire::NoMac)
         }}
     }}
 "#

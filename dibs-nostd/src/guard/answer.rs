@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::constraint::{ConstraintForce, ForbiddenRegion, Guidance};
 use crate::failsafe::{Link, Verdict};
-use crate::{FrameAge, Millis, Proximity, TrackerAnswer, Unavailable};
+use crate::{ContactIter, Contacts, FrameAge, Millis, Proximity, TrackerAnswer, Unavailable};
 
 /// The answer of a tick: what a constraint may act on, and how it came about.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +55,21 @@ impl Answer {
     #[must_use]
     pub fn force(&self, wall: &ForbiddenRegion) -> ConstraintForce {
         wall.force(&self.closest, self.velocity)
+    }
+
+    /// Of the list that [`Guard::contacts`](super::Guard::contacts) filled in this tick, the contacts that a
+    /// [`Proxy`](crate::constraint::Proxy) with this margin (mm) may act on, or why there are none: see
+    /// [`Contacts::within`].
+    ///
+    /// # Errors
+    /// That of the [closest](Self::closest) pair, and those of [`Contacts::within`].
+    pub fn contacts<'c, const N: usize, const NEAR: usize>(
+        &self,
+        contacts: &'c Contacts<N, NEAR>,
+        margin: f32,
+    ) -> Result<ContactIter<'c>, Unavailable> {
+        self.closest?;
+        contacts.within(margin)
     }
 
     /// The force that leads along the surface.

@@ -54,10 +54,31 @@ impl<const N: usize, R: Rows> Surface<N, R> {
     #[inline(always)]
     pub fn start_with_mac<'t, I: Index, M: Mac, const STACK: usize, const OPENED: usize>(
         &self,
-        bytes: TreeBytes<'t, I>,
+        tree: TreeBytes<'t, I>,
         limits: GuardLimits,
         mac: M,
     ) -> Result<Ends<'_, 't, I, M, R, STACK, OPENED>, Error> {
+        self.start_with_contacts(tree, limits, mac)
+    }
+
+    /// The same, for [`Guard::contacts`]: the guard has slots for `RANGE` opened nodes besides, some hundred as a rule.
+    ///
+    /// # Errors
+    /// Those of [`start`](Self::start).
+    #[inline(always)]
+    pub fn start_with_contacts<
+        't,
+        I: Index,
+        M: Mac,
+        const STACK: usize,
+        const OPENED: usize,
+        const RANGE: usize,
+    >(
+        &self,
+        bytes: TreeBytes<'t, I>,
+        limits: GuardLimits,
+        mac: M,
+    ) -> Result<Ends<'_, 't, I, M, R, STACK, OPENED, RANGE>, Error> {
         let tree = bytes.validate()?;
         let rows = R::of(&tree)?;
         let (expected, found) = (R::count(&tree, &rows), N as u32);
@@ -74,8 +95,8 @@ impl<const N: usize, R: Rows> Surface<N, R> {
 }
 
 /// The two ends of a surface.
-type Ends<'s, 't, I, M, R, const STACK: usize, const OPENED: usize> =
-    (Bus<'s, 't, I, M, R>, Guard<'s, 't, I, STACK, OPENED, R>);
+type Ends<'s, 't, I, M, R, const STACK: usize, const OPENED: usize, const RANGE: usize = 0> =
+    (Bus<'s, 't, I, M, R>, Guard<'s, 't, I, STACK, OPENED, R, RANGE>);
 
 /// The notes of the two ends for one another. Public for surfaces of a size that no type has: see
 /// [`Buffers`](crate::Buffers).

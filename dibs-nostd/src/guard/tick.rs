@@ -2,25 +2,35 @@
 
 use glam::Vec3;
 
+use super::rows::Blend;
 use super::surface::Notes;
 use super::{Answer, GuardLimits, Rows, Searched, Vertices};
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation, State, Verdict};
 use crate::filter::{Admitted, Filter, FilterError, Motion, Uncertainty};
 use crate::{
-    Error, FrameAge, FrameReader, Index, Millis, Options, Tool, Tracker, TrackerAnswer, Tree,
-    TreeBytes, Unavailable, VertexTable,
+    Contacts, Error, FrameAge, FrameReader, Index, Millis, Options, QueryError, Tool, Tracker,
+    TrackerAnswer, Tree, TreeBytes, Unavailable, VertexTable,
 };
 
 /// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the surface as it is now,
 /// and the trust in it.
 ///
-/// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` slots, and less than 500 bytes.
+/// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` slots and `RANGE` for
+/// [contacts](Self::contacts), and less than 500 bytes.
 #[derive(Debug)]
-pub struct Guard<'s, 't, I, const STACK: usize, const OPENED: usize, R: Rows = Vertices> {
+pub struct Guard<
+    's,
+    't,
+    I,
+    const STACK: usize,
+    const OPENED: usize,
+    R: Rows = Vertices,
+    const RANGE: usize = 0,
+> {
     notes: &'s Notes,
     reader: FrameReader<'s>,
     tree: TreeBytes<'t, I>,
-    tracker: Tracker<'t, I, STACK, OPENED>,
+    tracker: Tracker<'t, I, STACK, OPENED, RANGE>,
     failsafe: FailSafe,
     options: Options,
     /// Ticks a second.
@@ -55,8 +65,8 @@ impl Pose {
     }
 }
 
-impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows>
-    Guard<'s, 't, I, STACK, OPENED, R>
+impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const RANGE: usize>
+    Guard<'s, 't, I, STACK, OPENED, R, RANGE>
 {
     /// The control tick's end of buffers in anybody's memory, of which there are three.
     ///
@@ -74,7 +84,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows>
             notes,
             reader,
             tree: bytes,
-            tracker: Tracker::new(tree)?,
+            tracker: Tracker::with_range(tree)?,
             failsafe: FailSafe::new(limits.failsafe()?),
             options: limits.options,
             rate: limits.rate,
@@ -92,7 +102,43 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows>
     ///
     /// Cost: the budget at most, and about a thousand instructions.
     pub fn closest<T: Tool>(&mut self, tool: &T, now: Millis) -> Answer {
-        self.on_latest(tool, now, |_, _, _| ()).0
+        self.on_latest(
+            tool,
+            now,
+            |tracker, surface, _, options| tracker.closest(surface, tool, options),
+            |_, _, _| (),
+        )
+        .0
+    }
+
+    /// The answer of this tick, and all contacts within `margin` (mm): those of [`Tracker::contacts`], in the one budget,
+    /// with the velocity of the surface at each. [`Answer::contacts`] gives those that a constraint may act on.
+    ///
+    /// A guard of [`start_with_contacts`](super::Surface::start_with_contacts) remembers what a search for contacts opened;
+    /// for others each tick searches anew. The list is empty where there is no surface, or the query failed. Its
+    /// [accuracy](Contacts::accuracy) covers what the pair's does.
+    ///
+    /// Cost: the budget at most, about a thousand instructions, and some hundred for each contact.
+    pub fn contacts<T: Tool, const N: usize, const NEAR: usize>(
+        &mut self,
+        tool: &T,
+        margin: f32,
+        now: Millis,
+        contacts: &mut Contacts<N, NEAR>,
+    ) -> Answer {
+        contacts.clear();
+        let (answer, _) = self.on_latest(
+            tool,
+            now,
+            |tracker, surface, flow, options| {
+                let tracked = tracker.contacts(surface, tool, margin, options, contacts)?;
+                contacts.set_velocities(|corners, weights| Ok(flow.at(corners, weights)))?;
+                Ok(tracked)
+            },
+            |_, _, _| (),
+        );
+        contacts.widen(answer.trust.margin);
+        answer
     }
 
     /// The answer of this tick, and the motion nearest to `command` that keeps the tool out of the tissue until the next one.
@@ -111,25 +157,36 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows>
         now: Millis,
     ) -> (Answer, Result<Admitted, FilterError>) {
         let (period, speed) = (1.0 / self.rate, self.speed * 1_000.0);
-        let (answer, admitted) = self.on_latest(tool, now, |tracker, surface, trust| {
-            if trust.state == State::Safe {
-                let cause = trust.cause.unwrap_or(Unavailable::NoSurface);
-                return Err(FilterError::Untrusted(cause));
-            }
-            let tissue = Uncertainty::new(speed).error(trust.margin);
-            filter.admit(&mut [(tracker, surface, tool)], command, period, &tissue, &[])
-        });
+        let (answer, admitted) = self.on_latest(
+            tool,
+            now,
+            |tracker, surface, _, options| tracker.closest(surface, tool, options),
+            |tracker, surface, trust| {
+                if trust.state == State::Safe {
+                    let cause = trust.cause.unwrap_or(Unavailable::NoSurface);
+                    return Err(FilterError::Untrusted(cause));
+                }
+                let tissue = Uncertainty::new(speed).error(trust.margin);
+                filter.admit(&mut [(tracker, surface, tool)], command, period, &tissue, &[])
+            },
+        );
         let none = Err(FilterError::Untrusted(Unavailable::NoSurface));
         (answer, admitted.unwrap_or(none))
     }
 
-    /// The answer of this tick, and what `then` makes of the surface that was searched and of the trust in it.
+    /// The answer of this tick, by `search`, and what `then` makes of the surface that was searched and of the trust in it.
     #[inline(always)]
     fn on_latest<T: Tool, A>(
         &mut self,
         tool: &T,
         now: Millis,
-        then: impl FnOnce(&mut Tracker<'t, I, STACK, OPENED>, &R::Surface<'_>, &Verdict) -> A,
+        search: impl FnOnce(
+            &mut Tracker<'t, I, STACK, OPENED, RANGE>,
+            &R::Surface<'_>,
+            &Flow<'_, 't, R>,
+            &Options,
+        ) -> Result<TrackerAnswer, QueryError>,
+        then: impl FnOnce(&mut Tracker<'t, I, STACK, OPENED, RANGE>, &R::Surface<'_>, &Verdict) -> A,
     ) -> (Answer, Option<A>) {
         let Self { notes, reader, tree, tracker, failsafe, options, rate, before, rows, .. } = self;
         let latest = reader.latest(now);
@@ -141,7 +198,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows>
         // The fail-safe machine decides how old a surface may be.
         let (searched, tracked) = match (frame, surface) {
             (Some(frame), Ok((blend, surface))) => {
-                let tracked = tracker.closest(surface, tool, options);
+                let flow = Flow { rows, blend };
+                let tracked = search(tracker, surface, &flow, options);
                 let searched = Searched {
                     frame,
                     before: blend.before().epoch().unwrap_or(frame.epoch),
@@ -151,7 +209,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows>
                     lag: blend.lag(),
                     velocity: tracked.map_or(Vec3::ZERO, |tracked| {
                         let closest = tracked.closest;
-                        R::velocity(rows, blend, closest.corners, closest.barycentric)
+                        flow.at(closest.corners, closest.barycentric)
                     }),
                 };
                 (Some(searched), tracked.map_err(Unavailable::Query))
@@ -197,8 +255,21 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows>
 
     /// The tracker.
     #[must_use]
-    pub const fn tracker(&self) -> &Tracker<'t, I, STACK, OPENED> {
+    pub const fn tracker(&self) -> &Tracker<'t, I, STACK, OPENED, RANGE> {
         &self.tracker
+    }
+}
+
+/// The velocity of the surface that is searched.
+struct Flow<'f, 't, R: Rows> {
+    rows: &'f R::Of<'t>,
+    blend: &'f Blend<'f>,
+}
+
+impl<R: Rows> Flow<'_, '_, R> {
+    /// At a point of a triangle (mm/s).
+    fn at(&self, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        R::velocity(self.rows, self.blend, corners, weights)
     }
 }
 

@@ -8,6 +8,7 @@ mod complete;
 mod continuous;
 mod exhaustive;
 mod guard;
+mod guard_contacts;
 mod guard_embedded;
 mod life;
 mod line;

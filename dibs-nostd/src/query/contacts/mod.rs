@@ -10,6 +10,8 @@ mod low;
 use glam::Vec3;
 
 use super::{Options, Proximity, Query, Side};
+#[cfg(all(feature = "bus", feature = "control"))]
+use crate::math::round::sum_up;
 use crate::unavailable::{QueryError, Unavailable};
 use crate::{Index, Tool, TriangleRow, VertexTable};
 use across::Across;
@@ -250,6 +252,14 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
             Ok(velocity)
         };
+        self.set_velocities(velocity)
+    }
+
+    /// Sets each contact's velocity to that of a triangle's point.
+    pub(crate) fn set_velocities(
+        &mut self,
+        velocity: impl Fn([u32; 3], [f32; 3]) -> Result<Vec3, QueryError>,
+    ) -> Result<(), QueryError> {
         for contact in &mut self.found.list {
             contact.velocity = velocity(contact.corners, contact.barycentric)?;
             let across = &mut contact.across;
@@ -258,6 +268,18 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
         }
         Ok(())
+    }
+
+    /// Empties the list, of which nothing is known then.
+    #[cfg(all(feature = "bus", feature = "control"))]
+    pub(crate) fn clear(&mut self) {
+        self.found.clear();
+    }
+
+    /// Widens the accuracy by a further error (mm) of the surface.
+    #[cfg(all(feature = "bus", feature = "control"))]
+    pub(crate) fn widen(&mut self, error: f32) {
+        self.found.accuracy = sum_up(self.found.accuracy, error);
     }
 }
 

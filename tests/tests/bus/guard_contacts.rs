@@ -1,0 +1,174 @@
+//! A guard's contacts: those of a tracker on the same surface, in the guard's one budget.
+
+use dibs_build::{Builder, generate};
+use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface, Vertices};
+use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, NoMac};
+use dibs_nostd::{
+    Advance, Assembler, Budget, Capsule, Contact, Contacts, Frames, Millis, Options, QueryError,
+    SurfaceLimits, Tool, Tracker, Tree, TreeBytes, Unavailable,
+};
+use dibs_tests::bus::collect;
+
+const ROWS: usize = 642;
+
+/// Ticks between two frames.
+const PERIOD: u32 = 33;
+
+/// How far contacts are looked for, in mm.
+const MARGIN: f32 = 6.0;
+
+/// Places for opened nodes of the pair's search, and of the contacts'.
+const OPENED: usize = 128;
+const RANGE: usize = 128;
+
+/// Work that no budget counts: the first root's test, and the triangle of a warm start.
+const BESIDES: u32 = 1 + Budget::TRIANGLE;
+
+type List = Contacts<32, 512>;
+type Ends = (Bus<'static, 'static, u16>, Guard<'static, 'static, u16, 64, OPENED, Vertices, RANGE>);
+
+/// A point inside the generated heart.
+const MIDDLE: Vec3 = Vec3::new(12.0, -4.0, 38.0);
+
+/// What the instrument does at a tick: it dips into the surface, and turns on the way.
+fn tool(tick: u32) -> Capsule {
+    let time = tick as f32 * 1e-3;
+    let out = Vec3::new((0.7 * time).cos(), (0.7 * time).sin(), 0.2 * (1.3 * time).sin());
+    let at = MIDDLE + out * (45.0 + 25.0 * (3.0 * time).sin());
+    let along = (out + 0.8 * out.any_orthonormal_vector()).normalize();
+    Capsule::new(at, at + along * 60.0, 2.5).expect("finite")
+}
+
+/// The numbers of a contact but for its velocity, to the bit.
+fn bits(contact: &Contact) -> (u32, [[f32; 3]; 4], f32, u32) {
+    let points = [
+        contact.normal.to_array(),
+        contact.point_on_surface.to_array(),
+        contact.point_on_tool.to_array(),
+        contact.barycentric,
+    ];
+    (contact.separation.to_bits(), points, contact.axis_parameter, contact.triangle.0)
+}
+
+#[test]
+fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
+    let generate::MovingMesh { mesh, motion } = generate::heart(1_280).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let bytes: &'static [u8] = built.blob().to_vec().leak();
+    let tree: &'static Tree<'static, u16> =
+        Box::leak(Box::new(Tree::from_bytes(bytes).expect("valid")));
+    let frames: Vec<_> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+    let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
+    let proxy = Proxy::new(spring, MARGIN).expect("in range");
+    let (mut listed, mut moving, mut cut, mut most, mut acted, mut opened) = (0, 0, 0, 0, 0, 0);
+    for budget in [100, 200, 300, 600, 1_200, u32::MAX] {
+        let options = Options::new().budget(Budget::new(budget));
+        let limits = GuardLimits::new(200.0, Millis(200)).options(options).automatic();
+        let surface: &'static Surface<ROWS> = Box::leak(Box::new(Surface::new()));
+        let ends: Ends =
+            surface.start_with_contacts(TreeBytes::new(bytes), limits, NoMac).expect("valid");
+        let (mut bus, mut guard) = ends;
+        // The same packets reach a tracker by the layers below.
+        let buffers: &'static Frames<ROWS, 3> = Box::leak(Box::new(Frames::new()));
+        let (writer, mut reader) = buffers.split().expect("once");
+        let reach = SurfaceLimits::reach_mm(1_000.0);
+        let mut assembler = Assembler::continuous(writer, tree, reach).expect("a metric");
+        let mut tracker = Tracker::<u16, 64, OPENED, RANGE>::with_range(tree).expect("deep");
+        let (mut own, mut expected) = (List::new(), List::new());
+        for tick in 0..4_000 {
+            let now = 1_000 + tick;
+            if tick % PERIOD == 0 {
+                let epoch = 1 + tick / PERIOD;
+                let rows = &frames[epoch as usize % frames.len()];
+                let id = FrameId { mesh_id: built.summary().mesh_id, session: 1, epoch };
+                let sender = FrameEncoder::<_, 256>::new(id, Encoding::Float, &rows[..]);
+                let fresh = Freshness { age_ms: 0, echo: Some(now) };
+                for packet in collect(sender.expect("valid").with_freshness(fresh)) {
+                    bus.packet(&packet, Millis(now)).expect("a good packet");
+                    assembler.accept(&packet, Millis(now)).expect("a good packet");
+                }
+                while bus.work(1_000).expect("admitted") == Advance::Pending {}
+                while assembler.advance(1_000).expect("admitted") == Advance::Pending {}
+            }
+            let tool = tool(tick);
+            let answer = guard.contacts(&tool, MARGIN, Millis(now), &mut own);
+            let latest = reader.latest(Millis(now));
+            let frame = latest.of_any_age().expect("published");
+            let blend = frame.extrapolated();
+            let found = tracker.contacts(&blend, &tool, MARGIN, &options, &mut expected);
+            let found = found.expect("an answer");
+            assert_eq!(answer.tracked, Ok(found), "{budget} {tick}");
+            assert_eq!(own.bound().to_bits(), expected.bound().to_bits(), "{budget} {tick}");
+            assert_eq!(own.len(), expected.len(), "{budget} {tick}");
+            for (one, other) in own.iter().zip(expected.iter()) {
+                assert_eq!(bits(one), bits(other), "{budget} {tick}");
+                let flow = blend.velocity(one.corners, one.barycentric);
+                assert_eq!(one.velocity, flow, "{budget} {tick}");
+                moving += usize::from(flow.length() > 1.0);
+            }
+            let margin = answer.trust.margin;
+            assert!(own.accuracy() >= expected.accuracy() + margin * 0.999_999, "{margin}");
+            listed += own.len();
+            cut += usize::from(own.bound() < MARGIN);
+            let work = found.closest.work();
+            if budget < u32::MAX {
+                assert!(work <= budget + BESIDES, "{tick}: {work} of {budget}");
+            }
+            most = most.max(work);
+            acted += u32::from(acts(&proxy, &answer, &own, &tool));
+            opened = opened.max(guard.tracker().opened_in_range());
+        }
+    }
+    println!("{listed} contacts, {moving} that move; {cut} lists cut; a tick of {most} at most");
+    assert!(listed > 5_000 && moving > 3_000 && cut > 500, "{listed} {moving} {cut}");
+    assert!(most > 1_200 && acted > 3_000 && opened > 50, "{most} {acted} {opened}");
+}
+
+/// Whether a proxy pushes, by a guard's contacts.
+fn acts(proxy: &Proxy, answer: &Answer, list: &List, tool: &Capsule) -> bool {
+    let contacts = answer.contacts(list, MARGIN);
+    let wrench = proxy.wrench(contacts, list.accuracy(), tool.axis_start(), Vec3::ZERO, Vec3::ZERO);
+    if let Err(cause) = answer.closest {
+        assert_eq!(wrench.state, ConstraintState::Safe(cause));
+    }
+    wrench.force.length() > 0.1
+}
+
+#[test]
+fn no_contacts_are_acted_on_without_a_surface_or_trust() {
+    let generate::MovingMesh { mesh, .. } = generate::heart(1_280).expect("a valid size");
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let bytes: &'static [u8] = built.blob().to_vec().leak();
+    let rows = built.to_rows(&mesh.positions);
+    let surface: &'static Surface<ROWS> = Box::leak(Box::new(Surface::new()));
+    let limits = GuardLimits::new(20.0, Millis(100)).without_transit();
+    let (mut bus, mut guard): Ends =
+        surface.start_with_contacts(TreeBytes::new(bytes), limits, NoMac).expect("valid");
+    let mut list = List::new();
+    let tool = tool(0);
+    let none = guard.contacts(&tool, 60.0, Millis(1), &mut list);
+    assert_eq!(none.contacts(&list, 60.0).err(), Some(Unavailable::NoSurface));
+    bus.frame(&mesh.positions, Millis(2), Millis(2)).expect("a good frame");
+    while bus.work(1_000).expect("admitted") == Advance::Pending {}
+    assert_eq!(rows.len(), ROWS);
+    let untrusted = guard.contacts(&tool, 60.0, Millis(3), &mut list);
+    assert!(!list.is_empty() && list.within(60.0).is_ok(), "there are some");
+    // Nobody has acknowledged.
+    let cause = untrusted.closest.err();
+    assert!(cause.is_some() && untrusted.contacts(&list, 60.0).err() == cause);
+    // A margin that is none is an error of the query, and its list is empty.
+    let refused = guard.contacts(&tool, f32::NAN, Millis(4), &mut list);
+    let expected = Unavailable::Query(QueryError::Margin { bits: f32::NAN.to_bits() });
+    assert_eq!((refused.tracked.err(), refused.closest.err()), (Some(expected), Some(expected)));
+    assert!(list.is_empty() && list.within(1.0).is_err());
+    // Nor is what an earlier tick found left without a pose or a surface.
+    let other: &'static Surface<ROWS> = Box::leak(Box::new(Surface::new()));
+    let (_, mut blind): Ends =
+        other.start_with_contacts(TreeBytes::new(bytes), limits, NoMac).expect("valid");
+    guard.contacts(&tool, 60.0, Millis(5), &mut list);
+    assert!(!list.is_empty());
+    blind.contacts(&tool, 60.0, Millis(5), &mut list);
+    assert!(list.is_empty());
+}
