@@ -51,6 +51,10 @@
 //!   [`failsafe`]; [`modes`]; [`nodes`].
 //! - `wide`: `Query::closest_wide`, which tests several subtrees at once, for large processors.
 //! - `defmt`: `defmt::Format` for every public value and error.
+//! - `serde`: `Serialize` for answers, limits and states; `Deserialize` for [`Budget`], [`Cost`], [`SurfaceLimits`] and times,
+//!   which are checked where they are used. Other limits are made by calls that check them.
+//! - `mint`: points of other mathematics crates become `glam`'s, so that `Bus::frame` takes them.
+//! - `embedded-io`: `guard`'s `Bus` on any byte stream.
 //! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver takes only packets with a genuine tag.
 #![no_std]
 #![deny(unsafe_code)]

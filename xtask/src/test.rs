@@ -222,7 +222,7 @@ fn oldest_compiler() -> Result<Outcome> {
     run(command.current_dir(workspace::root())).map(|()| Outcome::Passed)
 }
 
-/// The core crate compiles for the board with only `core`: with all layers and defmt, and with every smaller set of
+/// The core crate compiles for the board with only `core`: with all layers and the traits of other crates, and with every smaller set of
 /// layers.
 fn core_crate(cross: &Cross) -> Result<Outcome> {
     // The firmware's profile, whose dependencies are needed anyway.
@@ -231,7 +231,7 @@ fn core_crate(cross: &Cross) -> Result<Outcome> {
         check.args(["--quiet", "--profile", "firmware", "--package", "dibs-nostd"]);
         check
     };
-    run(check().args(["--features", "defmt"]))?;
+    run(check().args(["--features", "defmt,embedded-io,mint,serde"]))?;
     for layer in
         ["", "wide", "bus", "control", "modes", "control,bus", "control,modes", "bus,modes"]
     {

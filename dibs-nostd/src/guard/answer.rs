@@ -9,6 +9,7 @@ use crate::{ContactIter, Contacts, FrameAge, Millis, Proximity, TrackerAnswer, U
 /// The answer of a tick: what a constraint may act on, and how it came about.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Answer {
     /// The closest pair to act on, or why there is none. Its accuracy covers the frame's error, the extrapolation's,
@@ -31,6 +32,7 @@ pub struct Answer {
 /// The surface that a tick searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Searched {
     /// The frame published last, and its age.

@@ -9,8 +9,10 @@ use crate::{Budget, Index, Millis, Options, SurfaceLimits, Tree};
 /// From two numbers, the tissue's largest speed and the largest age, follow the limits of [`Bus`](super::Bus) and
 /// [`Guard`](super::Guard); each can be given on its own.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct GuardLimits {
     /// mm a millisecond.
+    #[cfg_attr(feature = "serde", serde(rename = "speed_mm_per_ms"))]
     pub(super) speed: f32,
     age: Millis,
     trust: Option<Limits>,

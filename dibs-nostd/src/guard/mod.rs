@@ -34,6 +34,8 @@
 mod answer;
 mod bus;
 mod limits;
+#[cfg(feature = "embedded-io")]
+mod line;
 mod rows;
 mod surface;
 mod tick;

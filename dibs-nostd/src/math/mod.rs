@@ -1,5 +1,7 @@
 //! Arithmetic that gives the same bits on host and target.
 
+#[cfg(feature = "serde")]
+pub(crate) mod no_limit;
 pub(crate) mod round;
 pub(crate) mod sqrt;
 pub(crate) mod vec3x4;

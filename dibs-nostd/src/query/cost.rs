@@ -13,6 +13,8 @@ use super::Budget;
 /// and the firmware's profile or an optimised build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Cost {
     /// The cost of every query: setting it up, the root, a warm start's bookkeeping, and the answer. Of a tree over
     /// surfaces that share no vertex, each further root adds about a node test.

@@ -18,6 +18,7 @@ use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 /// frame and pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Budget {
     tests: u32,
 }
@@ -55,9 +56,12 @@ impl Budget {
 /// Prior knowledge for a query, and its budget. Prior knowledge changes an answer's cost, not the answer, except
 /// that a budget may widen the interval.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Options {
     pub(super) budget: Budget,
+    #[cfg_attr(feature = "serde", serde(skip))]
     first: First,
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(super) stretch: Option<MeasuredStretch>,
     pub(super) is_signed: bool,
     pub(super) depth_tolerance: Option<f32>,

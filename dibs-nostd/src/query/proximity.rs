@@ -16,6 +16,7 @@ use crate::{Coverage, TriangleRow, VertexTable};
 /// the radius, too high for a tool that is inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Proximity {
     /// The upper end of the certified interval: the least signed distance of any point of the tool's axis, less the
@@ -150,6 +151,7 @@ impl Proximity {
 /// An interval of separations (mm).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Interval {
     /// No true separation is less.
     pub lower: f32,

@@ -18,6 +18,7 @@ use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 /// clockwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Side {
     /// The axis is outside, of all solids.
@@ -33,6 +34,7 @@ pub enum Side {
 /// Why a tool is on no side of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum NoSide {
     /// [`Options::unsigned`](crate::Options::unsigned): the query left it out.

@@ -9,6 +9,7 @@ use crate::{Index, Step, Tool, VertexTable};
 /// The result of a sweep. Times count in sweeps: 0 is its start, 1 its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SweepAnswer {
     /// Before this time they are certainly not closer than the margin; 1 or more: at no time.

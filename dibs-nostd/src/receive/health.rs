@@ -11,6 +11,7 @@ use crate::wire::{FrameId, Packet, is_newer};
 /// Damage and strays count in [`Counters`](crate::wire::Counters) alone: the frames that they spoil count here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct BusHealth {
     /// Time of the last packet taken; repeated packets and hellos do not count.

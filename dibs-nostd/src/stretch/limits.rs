@@ -7,7 +7,7 @@
 /// first frame that is turned or moved as a whole (the next correct frame would be too far away), a part of a closed
 /// surface that is inside out while the rest encloses more, or a part of a region that shrinks while the rest grows.
 ///
-/// A limit of NaN refuses every frame.
+/// A limit of NaN refuses every frame. With the feature `serde`, an infinite speed or recovery is none (`null`).
 ///
 /// ```
 /// use dibs_nostd::SurfaceLimits;
@@ -17,9 +17,13 @@
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct SurfaceLimits {
     pub(crate) reach: f32,
+    #[cfg_attr(feature = "serde", serde(with = "crate::math::no_limit"))]
     pub(crate) speed: f32,
+    #[cfg_attr(feature = "serde", serde(with = "crate::math::no_limit"))]
     pub(crate) recovery: f32,
     pub(crate) shrinkage: f32,
 }

@@ -9,6 +9,7 @@ use crate::unavailable::Unavailable;
 /// ahead is old. No frame grows younger, if its age is read at least once in 2^31 ms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FrameAge {
     /// Number of the frame; wraps.
     pub epoch: u32,

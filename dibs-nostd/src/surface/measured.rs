@@ -9,6 +9,7 @@ pub const REGIONS: usize = 32;
 /// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Coverage {
     /// The stretch was measured on these positions.

@@ -5,6 +5,7 @@ use core::fmt;
 /// A triangle, by its row in the tree's table, not its number in the mesh's file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct TriangleRow(pub u32);
 
 impl fmt::Display for TriangleRow {
@@ -17,6 +18,7 @@ impl fmt::Display for TriangleRow {
 /// [`Tree::vertex_number`](crate::Tree::vertex_number) finds it from the row in a vertex table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct VertexNumber(pub u32);
 
 impl fmt::Display for VertexNumber {

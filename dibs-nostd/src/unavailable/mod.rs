@@ -11,6 +11,7 @@ use crate::time::Millis;
 /// Why there is no proximity to act on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Unavailable {
     /// No surface was ever published.

@@ -5,6 +5,7 @@ use core::fmt;
 /// Why a query gave no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum QueryError {
     /// The query's stack is smaller than the tree needs.

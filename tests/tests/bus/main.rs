@@ -6,6 +6,7 @@ mod black_channel;
 mod causes;
 mod complete;
 mod continuous;
+mod ecosystem;
 mod exhaustive;
 mod guard;
 mod guard_contacts;

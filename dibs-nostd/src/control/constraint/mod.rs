@@ -96,6 +96,7 @@ impl defmt::Format for ConstraintForce {
 /// The state of a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum ConstraintState {
     /// The constraint does not act: there is no force.

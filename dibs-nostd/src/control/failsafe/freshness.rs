@@ -7,6 +7,7 @@ use crate::unavailable::Unavailable;
 /// The limits. By default transit is watched, with the limits on age, and the rest is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub(super) struct Freshness {
     transit: Transit,
     source_age: Watch,
@@ -44,6 +45,7 @@ impl Freshness {
 /// What becomes of transit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 enum Transit {
     /// In the margin, with the limits on age.
     AsAge,

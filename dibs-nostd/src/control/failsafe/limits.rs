@@ -9,6 +9,7 @@ use crate::surface::Millis;
 /// Two limits on one input, a time or a count: beyond the first the state is degraded, beyond the second safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Watch<T = Millis> {
     degraded: T,
     safe: T,
@@ -111,6 +112,7 @@ const fn check(degraded: u32, safe: u32) -> Result<(), LimitError> {
 /// frame, 1,000 clear steps and an acknowledgement recover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Limits {
     pub(super) age: Watch,
     pub(super) silence: Watch,

@@ -5,6 +5,7 @@ use crate::surface::Millis;
 /// The health of the bus at one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Link {
     /// Time since the last good packet; [`Millis::MAX`] before the first.
     pub silence: Millis,

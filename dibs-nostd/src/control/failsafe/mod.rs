@@ -84,6 +84,7 @@ pub struct Observation {
 /// The trust in the surface, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub enum State {
     /// Every input is within its limits.
     Nominal,
@@ -96,6 +97,7 @@ pub enum State {
 /// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Verdict {
     /// The state after the step.
     pub state: State,

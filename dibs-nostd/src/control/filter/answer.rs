@@ -8,6 +8,7 @@ use crate::unavailable::{QueryError, Unavailable};
 /// The motion that a filter admits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Admitted {
     /// The motion to execute.
@@ -25,6 +26,7 @@ pub struct Admitted {
 /// Why a motion was admitted. All but the last are safe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Reason {
     /// It is the command.

@@ -9,6 +9,7 @@ use crate::math::sqrt::sqrt;
 /// instrument turns about it, by `rotation`, both evenly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Motion {
     /// The reference point before the motion (mm).
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]

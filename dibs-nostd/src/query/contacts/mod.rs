@@ -22,6 +22,7 @@ use list::List;
 /// A pair of points of tool and surface that is closer than any next to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Contact {
     /// Signed separation (mm): the lower end of the pair's interval, as [`Proximity::lower`]. Of a tool that crosses or is inside
@@ -53,8 +54,10 @@ pub struct Contact {
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub velocity: Vec3,
     /// The other triangle that bounds the depth, where the tool crosses or is inside.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) across: Across,
     /// 0 where it begins beside a nearer one, 1 beyond a ridge (see `activation`).
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) activation: f32,
 }
 

@@ -106,6 +106,7 @@ enum Purpose {
 /// The answer of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct TrackerAnswer {
     /// The closest pair; its counts of tests are this tick's.
@@ -129,6 +130,7 @@ pub struct TrackerAnswer {
 /// Why a tick was a whole query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Fallback {
     /// Nothing is remembered: the first tick, or the one after an error or a full front.
