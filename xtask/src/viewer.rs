@@ -31,17 +31,19 @@ pub fn viewer(options: &Options) -> Result<()> {
     let folder = session()?;
     programs(&[("node", "nodejs"), ("npm", "npm")])?;
     let own = workspace::root().join("viewer");
+    say("fetching the page's libraries");
     let mut npm = Command::new("npm");
     run(npm.args(["ci", "--no-audit", "--no-fund"]).current_dir(&own))?;
+    say("bundling the page");
     run(Command::new("node").arg(own.join("build.mjs")).arg(&folder))?;
     let page = workspace::target().join("viewer").join(PAGE);
-    fs::copy(folder.join(PAGE), &page)?;
+    copy_whole(&folder.join(PAGE), &page)?;
     println!("{}", page.display());
     // Beside every `dibs` there is: `dibs view` looks there.
     for profile in ["release", "debug"] {
         let beside = workspace::target().join(profile);
         if beside.is_dir() {
-            fs::copy(&page, beside.join(PAGE))?;
+            copy_whole(&page, &beside.join(PAGE))?;
         }
     }
     if options.test {
@@ -92,6 +94,7 @@ fn session() -> Result<PathBuf> {
         let mut cargo = Command::new("cargo");
         run(cargo.args(arguments).current_dir(workspace::root()))
     };
+    say("compiling the query for WebAssembly, the first time for some minutes");
     let package = ["--quiet", "--package", "dibs-view"];
     let to_wasm = ["build", "--lib", "--release", "--target", TARGET];
     cargo(&[&to_wasm[..], &package].concat())?;
@@ -146,6 +149,18 @@ fn programs(needed: &[(&str, &str)]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// What is done, for the one who waits.
+fn say(what: &str) {
+    eprintln!("{what} ...");
+}
+
+/// Copies a file so that nobody sees a part of it.
+fn copy_whole(from: &Path, to: &Path) -> Result<()> {
+    let part = to.with_extension("part");
+    fs::copy(from, &part)?;
+    fs::rename(&part, to).with_context(|| format!("{}: cannot be written", to.display()))
 }
 
 fn text(path: &Path) -> Result<&str> {

@@ -1,23 +1,20 @@
 //! `dibs view`: one HTML file in which the real query runs.
 
 mod pack;
+mod page;
 
 use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
 use crate::query::rows;
 use crate::tree_file::{self, AnyTree};
 use crate::{overwrite, tool};
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Result, bail};
 use dibs_build::glam::Vec3;
 use dibs_build::{SurfaceRows, write_atomically};
 use dibs_nostd::{Index, Tree};
+use page::Page;
 use serde_json::json;
 use std::path::{Path, PathBuf};
-
-/// The page without data, as `cargo xtask viewer` writes it.
-const PAGE: &str = "dibs-viewer.html";
-/// Where the data belongs in it.
-const MARK: &str = "<!--data-->";
 
 #[derive(clap::Args)]
 #[command(mut_arg("motion_rate", |rate| rate.requires("motion")), after_help = "\
@@ -40,7 +37,8 @@ pub struct Args {
     path: Option<PathBuf>,
     #[command(flatten)]
     motion_rate: MotionRate,
-    /// The page without data; by default dibs-viewer.html beside this program
+    /// The page without data; by default dibs-viewer.html beside this program, which a checkout's program makes where it is
+    /// missing and Node.js is there
     #[arg(long, value_name = "PAGE")]
     page: Option<PathBuf>,
     #[command(flatten)]
@@ -52,15 +50,15 @@ pub struct Args {
 
 pub fn run(args: &Args) -> Result<()> {
     let inputs = [&args.tree].into_iter().chain(args.motion.given()).chain(&args.path);
-    let page = page_path(args.page.as_deref())?;
-    overwrite::check(inputs.chain([&page]), [&args.output])?;
-    let page = read_page(&page)?;
+    let page = Page::new(args.page.as_deref())?;
+    overwrite::check(inputs.chain([&page.path]), [&args.output])?;
     let bytes = tree_file::load(&args.tree)?;
     let data = match tree_file::validate(&bytes, &args.tree)? {
         AnyTree::Narrow(tree) => data(args, &tree, &bytes)?,
         AnyTree::Wide(tree) => data(args, &tree, &bytes)?,
     };
-    let page = page.replacen(MARK, &data, 1);
+    // The page may have to be made first, which takes long: after every error that the inputs can have.
+    let page = page.filled(&data)?;
     write_atomically(&args.output, |out| out.write_all(page.as_bytes()))?;
     let name = args.output.display();
     if args.json {
@@ -69,29 +67,6 @@ pub fn run(args: &Args) -> Result<()> {
         println!("written  {name}: {} bytes", page.len());
     }
     Ok(())
-}
-
-/// The file of the page without data.
-fn page_path(given: Option<&Path>) -> Result<PathBuf> {
-    let beside = || std::env::current_exe().ok()?.parent().map(|folder| folder.join(PAGE));
-    match given {
-        Some(path) => Ok(path.to_path_buf()),
-        None => beside().context("this program's folder is unknown; give the page with --page"),
-    }
-}
-
-fn read_page(path: &Path) -> Result<String> {
-    let name = path.display();
-    let page = std::fs::read_to_string(path).with_context(|| {
-        format!("{name}: cannot be read; `cargo xtask viewer` in the repository writes it, and --page names another")
-    });
-    // One sentence, with the system's reason at its end.
-    let page = page.map_err(|error| anyhow::anyhow!("{error:#}"))?;
-    ensure!(
-        page.contains(MARK),
-        "{name}: no page without data; give the {PAGE} that `cargo xtask viewer` writes"
-    );
-    Ok(page)
 }
 
 /// The elements with the tree, the motion and the facts about them.

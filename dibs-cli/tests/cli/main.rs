@@ -20,3 +20,4 @@ mod stream;
 mod tools;
 mod track;
 mod view;
+mod view_page;

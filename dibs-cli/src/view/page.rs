@@ -1,0 +1,97 @@
+//! The page without data: found beside this program, or made once by the checkout that this program was built in.
+
+use anyhow::{Context, Result, bail, ensure};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The page, as `cargo xtask viewer` writes it.
+const PAGE: &str = "dibs-viewer.html";
+/// Where the data belongs in it.
+const MARK: &str = "<!--data-->";
+
+/// What makes the page.
+const MAKER: &str = "cargo xtask viewer";
+
+/// The page's file: the one given, or the one beside this program.
+pub struct Page {
+    pub path: PathBuf,
+    /// The program that makes the page where it is missing; none for a page that is given.
+    maker: Option<PathBuf>,
+}
+
+impl Page {
+    pub fn new(given: Option<&Path>) -> Result<Self> {
+        if let Some(path) = given {
+            return Ok(Self { path: path.to_path_buf(), maker: None });
+        }
+        let program = std::env::current_exe()
+            .context("this program's folder is unknown; give the page with --page")?;
+        Ok(Self { path: program.with_file_name(PAGE), maker: Some(program) })
+    }
+
+    /// Its text, with this data.
+    pub fn filled(&self, data: &str) -> Result<String> {
+        match &self.maker {
+            Some(program) if !self.path.is_file() => make(program, &self.path)?,
+            _ => (),
+        }
+        Ok(read(&self.path)?.replacen(MARK, data, 1))
+    }
+}
+
+fn read(path: &Path) -> Result<String> {
+    let name = path.display();
+    let page = std::fs::read_to_string(path)
+        .with_context(|| format!("{name}: cannot be read; `{MAKER}` in the repository writes it, and --page names another"));
+    // One sentence, with the system's reason at its end.
+    let page = page.map_err(|error| anyhow::anyhow!("{error:#}"))?;
+    ensure!(
+        page.contains(MARK),
+        "{name}: no page without data; give the {PAGE} that `{MAKER}` writes"
+    );
+    Ok(page)
+}
+
+/// Makes the page in the checkout that holds this program. It appears whole or not at all.
+fn make(program: &Path, page: &Path) -> Result<()> {
+    let name = page.display();
+    // The folder in which a command is run must not decide which program that is.
+    let Some(root) = program.ancestors().find(|folder| is_checkout(folder)) else {
+        bail!(
+            "{name} is missing; `{MAKER}` in a checkout of the repository writes {PAGE}: put it there, or give it with --page"
+        );
+    };
+    for needed in ["node", "npm", "cargo"] {
+        ensure!(
+            starts(needed),
+            "{name} is missing, and making it needs `{needed}`: install Node.js with npm, and Rust, or give a page with --page"
+        );
+    }
+    eprintln!(
+        "making {name}, once: `{MAKER}` compiles the query for WebAssembly, and fetches the page's libraries by npm"
+    );
+    let mut maker = Command::new("cargo");
+    maker.args(["xtask", "viewer"]).current_dir(root);
+    // Standard output is this command's own.
+    let status = maker.stdin(Stdio::null()).stdout(io::stderr()).status();
+    let status = status.with_context(|| format!("`{MAKER}` did not start"))?;
+    ensure!(
+        status.success() && page.is_file(),
+        "`{MAKER}` in {} did not write {name}: see above, or give a page with --page",
+        root.display()
+    );
+    Ok(())
+}
+
+fn is_checkout(folder: &Path) -> bool {
+    ["viewer/build.mjs", "xtask/Cargo.toml", "dibs-nostd/Cargo.toml"]
+        .iter()
+        .all(|file| folder.join(file).is_file())
+}
+
+fn starts(program: &str) -> bool {
+    let mut version = Command::new(program);
+    version.arg("--version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    version.status().is_ok_and(|status| status.success())
+}
