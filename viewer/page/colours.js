@@ -7,6 +7,7 @@ const TOUCHING = new Color("#e69f00");
 const DEEP = new Color("#d55e00");
 export const UNKNOWN = new Color("#666666");
 export const FORCE = new Color("#a3407a");
+export const COMMANDED = new Color("#8a94a0");
 export const SPHERE = new Color("#009e73");
 
 // Blue outside, darker the nearer; orange from contact on, redder the deeper. `range` is a distance in mm, and a quarter of

@@ -37,19 +37,32 @@ function beside(positions) {
   return { extent, pose: [...at(0.34), ...at(0.75), 0.02 * extent] };
 }
 
+// Most (mm) by which an end of an instrument is elsewhere in another pose.
+function apart(one, other) {
+  if (!one || one.length !== other.length) return NaN;
+  const ends = one.length === 7 ? [0, 3] : [0];
+  return Math.max(...ends.map((at) => Math.hypot(...[0, 1, 2].map((axis) => one[at + axis] - other[at + axis]))));
+}
+
 class Viewer {
   constructor({ facts, session }) {
     const positions = session.positions();
     Object.assign(this, { facts, session, tick: -1, last: performance.now(), isPlaying: facts.frames > 1 || facts.path.length > 0 });
     const { extent, pose } = beside(positions);
     this.from = this.to = facts.path[0] ?? pose;
+    // A filter's admitted pose is that at the end of its tick, and its surface the tissue's: an interpolated one is late by a frame.
+    this.ahead = facts.commanded.length > 0 ? 1 / facts.rate + 1 / RATE : 0;
     this.origin = session.origin();
     this.picture = draw(session.triangles(), positions);
-    this.plots = new Plots(element("plots"));
     this.numbers = new Numbers(facts, session);
+    this.plots = new Plots(element("plots"), this.numbers.has);
     const about = {
       limit: session.limit(), levels: session.levels(), extent, hasMotion: facts.frames > 1, hasPath: facts.path.length > 0,
+      hasNodes: session.nodes().length > 0,
     };
+    for (const [name, isThere] of [["commanded", facts.commanded.length > 0], ["node", about.hasNodes]]) {
+      document.querySelector(`#legend .${name}`).hidden = !isThere;
+    }
     this.controls = new Controls(element("controls"), about, () => this.configure());
     this.hand = new Hand(element("view"), this.picture, () => this.to, (moved) => this.take(moved));
     element("play")?.addEventListener("click", () => this.play(!this.isPlaying));
@@ -57,8 +70,15 @@ class Viewer {
       if (event.key === " ") {
         event.preventDefault();
         this.play(!this.isPlaying);
+      } else if (event.key.toLowerCase() === "r" && !event.ctrlKey && !event.metaKey) {
+        this.picture?.reset();
       }
     });
+    element("reset").hidden = !this.picture;
+    element("reset").addEventListener("click", () => this.picture?.reset());
+    const scheme = matchMedia("(prefers-color-scheme: dark)");
+    scheme.addEventListener("change", () => this.dress());
+    this.dress();
     this.play(this.isPlaying);
     this.configure();
   }
@@ -74,6 +94,18 @@ class Viewer {
     if (element("play")) element("play").textContent = isPlaying ? "❚❚ Stop" : "▶ Play";
   }
 
+  // Takes the colours of the browser's light or dark mode.
+  dress() {
+    this.plots.dress();
+    this.picture?.dress(this.plots.colours("--ink"));
+  }
+
+  // The tick's line of the path and of the record, or -1 while a hand has the instrument.
+  get line() {
+    const { path } = this.facts;
+    return this.tick >= 0 && path.length > 0 && this.controls.value("tool") === "path" ? this.tick % path.length : -1;
+  }
+
   configure() {
     const { controls, session } = this;
     session.set(controls.largestStretch, controls.number("margin"), controls.budget, controls.choices);
@@ -85,6 +117,10 @@ class Viewer {
     this.session.restart();
     this.tick = -1;
     this.from = this.to = this.facts.path[0] ?? this.to;
+  }
+
+  seconds(tick) {
+    return Math.max(tick, 0) / RATE + this.ahead;
   }
 
   // So many ticks, during which time goes on unless it is stopped.
@@ -100,11 +136,11 @@ class Viewer {
       for (let tick = start + 1; tick <= end; tick++) {
         this.from = this.to;
         this.to = path[tick % path.length];
-        const one = this.session.advance(this.from, this.to, Math.max(tick - 1, 0) / RATE, tick / RATE, 1);
+        const one = this.session.advance(this.from, this.to, this.seconds(tick - 1), this.seconds(tick), 1);
         counts = counts.map((count, at) => count + one[at]);
       }
     } else {
-      counts = [...this.session.advance(this.from, this.to, Math.max(start, 0) / RATE, Math.max(end, 0) / RATE, ticks)];
+      counts = [...this.session.advance(this.from, this.to, this.seconds(start), this.seconds(end), ticks)];
     }
     const milliseconds = performance.now() - before;
     this.from = this.to;
@@ -137,11 +173,15 @@ class Viewer {
       const { counts, milliseconds } = this.advance(ticks);
       const answer = record(session, this.facts);
       const contacts = (this.touching = touching(session));
-      this.plots.push(answer, counts, milliseconds);
-      this.numbers.show(answer, contacts, session.refused());
+      const { facts, line } = this;
+      const [command, recorded] = [facts.commanded[line], facts.ticks[line]];
+      this.plots.push(answer, counts, milliseconds, recorded);
+      this.numbers.show(answer, contacts, session.refused(), recorded, apart(command, this.to));
       if (picture) {
         picture.move(session.positions());
         picture.tool.pose(this.to);
+        picture.command(command);
+        picture.nodes(this.controls.form.elements.nodes?.checked ? session.nodes() : new Float32Array());
         picture.show(answer, this.origin, contacts);
         picture.spheres.show(this.spheres());
         picture.draw();

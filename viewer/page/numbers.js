@@ -7,14 +7,23 @@ const WORDS = { outside: "outside", inside: "inside", crossing: "crossing", unde
 
 export class Numbers {
   constructor(facts, session) {
-    document.title = `${facts.tree} – dibs view`;
-    element("name").textContent = facts.tree;
+    document.title = `${facts.name} – dibs view`;
+    element("name").textContent = facts.name;
     const count = (number, noun) => `${number.toLocaleString("en")} ${noun}${number === 1 ? "" : "s"}`;
     const frames = facts.frames > 1 ? `, ${count(facts.frames, "frame")} at ${facts.rate} Hz` : "";
-    element("facts-line").textContent = count(session.triangles().length / 3, "triangle") + frames;
+    const nodes = session.nodes().length / 3;
+    const moved = nodes > 0 ? ` moved by ${count(nodes, "node")}` : "";
+    element("facts-line").textContent = count(session.triangles().length / 3, "triangle") + moved + frames;
+    this.has = {
+      filter: facts.ticks.some(({ reason }) => reason !== undefined),
+      energy: facts.ticks.some(({ energy }) => Number.isFinite(energy)),
+      least: facts.ticks.some(({ least }) => Number.isFinite(least)),
+    };
+    for (const id of ["filter", "energy"]) element(id).parentElement.hidden = !this.has[id];
   }
 
-  show(answer, touching, refused) {
+  // `recorded` is the record of this tick, `short` the distance (mm) between the commanded and the admitted pose, where known.
+  show(answer, touching, refused, recorded, short) {
     const { separation, lower, accuracy, side, stretch } = answer;
     const overlaps = side === "outside" && separation <= 0;
     element("separation").querySelector("output").value = separation.toFixed(3);
@@ -29,8 +38,20 @@ export class Numbers {
     const newtons = Math.hypot(...touching.force);
     const state = touching.isSafe ? " (the wall only damps: cut short)" : touching.isSaturated ? " (the largest)" : "";
     element("force").textContent = `${newtons.toFixed(2)} N${state}`;
+    if (this.has.filter) element("filter").textContent = filtered(recorded, short);
+    if (this.has.energy) {
+      const energy = recorded?.energy;
+      element("energy").textContent = Number.isFinite(energy) ? `${energy.toFixed(3)} mJ left` : "no account in this tick";
+    }
     if (element("record-box").open) element("record").textContent = JSON.stringify(answer, null, 1);
   }
+}
+
+function filtered(recorded, short) {
+  if (recorded?.reason === undefined) return "no filter in this tick";
+  const away = short > 0.0005 ? `, ${short.toFixed(2)} mm from the command` : "";
+  const kept = Number.isFinite(recorded.least) ? `; no nearer than ${recorded.least.toFixed(3)} mm` : "";
+  return recorded.reason + away + kept;
 }
 
 // The surface's velocity at a contact: its length, and its part along the normal, which leads out.

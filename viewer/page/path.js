@@ -6,3 +6,6 @@ export function unpack(bytes) {
   for (let at = 0; at < numbers.length; at += 1 + numbers[at]) path.push(numbers.slice(at + 1, at + 1 + numbers[at]));
   return path;
 }
+
+// The record of each tick: a filter's reason, the separation (mm) that its motion keeps, the energy (mJ) left; NaN is unknown.
+export const recorded = (rows, reasons) => rows.map(([reason, least, energy]) => ({ reason: reasons[reason], least, energy }));

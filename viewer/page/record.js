@@ -1,5 +1,7 @@
 // A session's arrays as the record that `dibs query --json` prints.
 
+const COVERAGES = ["measured", "proven"];
+
 export const SIDES = ["outside", "inside", "crossing", "undefined"];
 
 export function record(session, facts) {
@@ -11,6 +13,9 @@ export function record(session, facts) {
     separation: one(),
     lower: one(),
     accuracy: one(),
+    // JSON has no infinity, which an interval has where the instrument may be inside at any depth.
+    interval: [one(), one()].map((end) => (Number.isFinite(end) ? end : null)),
+    coverage: COVERAGES[one()],
     side: SIDES[one()],
     side_reason: session.side_reason() || null,
     axis_distance: one(),

@@ -1,10 +1,11 @@
 // The picture: the surface, the closest pair, contacts and the force.
 import {
   AmbientLight, BufferAttribute, BufferGeometry, ConeGeometry, CylinderGeometry, DirectionalLight, DoubleSide, Group,
-  Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Scene, SphereGeometry, Vector3, WebGLRenderer,
+  Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, Points, PointsMaterial, Scene, SphereGeometry, Vector3,
+  WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { FORCE, ofSeparation, UNKNOWN } from "./colours.js";
+import { COMMANDED, FORCE, ofSeparation, UNKNOWN } from "./colours.js";
 import { Spheres } from "./spheres.js";
 import { Tool } from "./tool.js";
 
@@ -61,6 +62,7 @@ export class Picture {
     this.geometry = new BufferGeometry();
     this.geometry.setIndex(new BufferAttribute(triangles, 1));
     this.geometry.setAttribute("position", new BufferAttribute(positions, 3));
+    this.geometry.computeVertexNormals();
     this.geometry.computeBoundingSphere();
     const { center, radius } = this.geometry.boundingSphere;
     this.radius = radius;
@@ -90,13 +92,20 @@ export class Picture {
     for (const object of over) object.traverse((part) => (part.renderOrder = 10));
     this.spheres = new Spheres();
     this.tool = new Tool(radius);
-    this.scene.add(...over, this.spheres, this.tool);
+    this.commanded = new Tool(radius).ghost(COMMANDED);
+    // Nodes lie below the surface: they are drawn over it.
+    const dot = { size: 0.03 * radius, depthTest: false, transparent: true, opacity: 0.8 };
+    this.dots = new Points(new BufferGeometry(), new PointsMaterial(dot));
+    this.dots.frustumCulled = false;
+    this.dots.renderOrder = 4;
+    this.scene.add(...over, this.spheres, this.tool, this.commanded, this.dots);
 
     this.orbit = new OrbitControls(this.camera, this.renderer.domElement);
     this.orbit.target.copy(center).addScaledVector(new Vector3(0, 0, 1), 0.15 * radius);
     this.orbit.minDistance = 0.3 * radius;
     this.orbit.maxDistance = 20 * radius;
     this.orbit.update();
+    this.orbit.saveState();
     new ResizeObserver(() => this.resize()).observe(parent);
     this.resize();
   }
@@ -139,6 +148,33 @@ export class Picture {
     const newtons = force.length();
     this.force.visible = newtons > 0;
     if (newtons > 0) this.force.along(to, force.divideScalar(newtons), 0.12 * this.radius * (0.7 + newtons));
+  }
+
+  // Shows the commanded pose beside the admitted one; none hides it.
+  command(pose) {
+    this.commanded.visible = pose !== undefined;
+    if (pose) this.commanded.pose(pose);
+  }
+
+  nodes(positions) {
+    const { geometry } = this.dots;
+    this.dots.visible = positions.length > 0;
+    if (geometry.attributes.position?.array.length === positions.length) {
+      geometry.attributes.position.array.set(positions);
+      geometry.attributes.position.needsUpdate = true;
+    } else {
+      geometry.setAttribute("position", new BufferAttribute(positions, 3));
+    }
+  }
+
+  // Back to the view at the start.
+  reset() {
+    this.orbit.reset();
+  }
+
+  // The colour of pair and nodes must be seen on a light and on a dark ground.
+  dress(ink) {
+    for (const material of [this.pairColour, this.dots.material]) material.color.set(ink);
   }
 
   look({ opacity, wire }) {

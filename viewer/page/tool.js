@@ -15,6 +15,14 @@ export class Tool extends Group {
     this.add(...this.balls, this.shaft);
   }
 
+  // A body that is seen through.
+  ghost(colour) {
+    this.colour(colour);
+    Object.assign(this.body, { transparent: true, opacity: 0.45, depthWrite: false });
+    this.visible = false;
+    return this;
+  }
+
   colour(colour) {
     this.body.color.copy(colour);
     this.body.emissive.copy(new Color(colour)).multiplyScalar(0.12);

@@ -59,6 +59,11 @@ impl VertexTable for Frame {
     }
 }
 
+/// The nodes at a part of the way between two frames: 0 is the first, 1 the second, more is beyond it.
+pub fn between(before: &Frame, last: &Frame, part: f32) -> impl Iterator<Item = Vec3> {
+    before.nodes.iter().zip(&last.nodes).map(move |(&a, &b)| a + (b - a) * part)
+}
+
 /// The stretch of a tree's surface beyond two frames, by a part of the step between them.
 ///
 /// # Errors
@@ -70,8 +75,7 @@ pub fn stretch_beyond<I: Index>(
     surface: &impl VertexTable,
 ) -> Result<MeasuredStretch, StretchError> {
     let Ok(nodes) = Nodes::of(tree) else { return measure_stretch(tree, surface) };
-    let pairs = before.nodes.iter().zip(&last.nodes);
-    let beyond: Vec<Vec3> = pairs.map(|(&a, &b)| a + (b - a) * (1.0 + part)).collect();
+    let beyond: Vec<Vec3> = between(before, last, 1.0 + part).collect();
     nodes.measure(beyond.as_slice())
 }
 

@@ -1,7 +1,7 @@
 //! The session as the page's JavaScript sees it. Numbers are f64, which holds every f32.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Contact, Side};
+use dibs_nostd::{Contact, Coverage, Side};
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsError, throw_str};
 
@@ -63,7 +63,8 @@ impl Page {
         self.session.restart();
     }
 
-    /// The last answer, in this order: separation, lower, accuracy, side (0 outside, 1 inside, 2 crossing, 3 undefined),
+    /// The last answer, in this order: separation, lower, accuracy, the interval's ends, coverage (1 proven, 0
+    /// measured: every frame was), side (0 outside, 1 inside, 2 crossing, 3 undefined),
     /// axis distance, point on surface, point on tool, direction, axis parameter, triangle, barycentric, stretch, node
     /// tests, triangle tests.
     #[must_use]
@@ -71,6 +72,9 @@ impl Page {
         let Some(found) = self.session.answer() else { return Vec::new() };
         let mut numbers: Vec<f64> =
             [found.separation, found.lower, found.accuracy].map(f64::from).to_vec();
+        let interval = found.interval();
+        numbers.extend([interval.lower, interval.upper].map(f64::from));
+        numbers.push(f64::from(u8::from(found.coverage == Coverage::Proven)));
         numbers.push(match found.side {
             Side::Outside => 0.0,
             Side::Inside => 1.0,
@@ -161,6 +165,12 @@ impl Page {
     #[must_use]
     pub fn positions(&self) -> Vec<f32> {
         self.session.positions()
+    }
+
+    /// Positions of the nodes that move the surface, as they are now.
+    #[must_use]
+    pub fn nodes(&self) -> Vec<f32> {
+        self.session.nodes()
     }
 
     /// Spheres of a level.

@@ -9,7 +9,7 @@ use dibs_nostd::{
 };
 
 use crate::contacts::{Found, Speeds, Touching, Velocity};
-use crate::motion::{Frame, stretch_beyond};
+use crate::motion::{Frame, between, stretch_beyond};
 use crate::spheres::{self, Recorder};
 use crate::{Between, Instrument, Motion, SessionError};
 
@@ -89,6 +89,8 @@ pub trait Session {
     fn triangles(&self) -> Vec<u32>;
     /// Positions of the surface as it is now.
     fn positions(&self) -> Vec<f32>;
+    /// Positions of the nodes that move the surface, as they are now; empty for a tree without nodes.
+    fn nodes(&self) -> Vec<f32>;
     /// Ticks along the way from one pose and time to another; the last is at the end of it.
     ///
     /// # Errors
@@ -191,6 +193,8 @@ struct Running<I: 'static> {
 /// The last tick.
 struct Now {
     surface: Surface,
+    /// Its place on the way from the frame before to the last, 1 at the last and more beyond.
+    part: f32,
     stretch: MeasuredStretch,
     tool: Option<Instrument>,
     velocity: Velocity,
@@ -207,6 +211,7 @@ impl<I: Index> Running<I> {
         let step = odometer.step(first, first);
         let now = Now {
             surface: Surface::Held(step.after()),
+            part: 1.0,
             stretch: motion.stretches[0],
             tool: None,
             velocity: Velocity::default(),
@@ -259,11 +264,13 @@ impl<I: Index> Running<I> {
         let held = Surface::Held(self.step.after());
         let stretches = &self.motion.stretches;
         let (before, last) = (stretches[self.before], stretches[self.last]);
-        (self.now.surface, self.now.stretch) = match self.settings.between {
-            _ if self.refused.is_some() => (held, last),
-            Between::Held => (held, last),
+        let now = &mut self.now;
+        (now.surface, now.part, now.stretch) = match self.settings.between {
+            _ if self.refused.is_some() => (held, 1.0, last),
+            Between::Held => (held, 1.0, last),
             Between::Interpolated => {
-                (Surface::Moving(self.step.at(share)), before.or_larger(last).unwrap_or(last))
+                let stretch = before.or_larger(last).unwrap_or(last);
+                (Surface::Moving(self.step.at(share)), share, stretch)
             }
             // An extrapolated surface beyond the limit is not searched: the last frame is held.
             Between::Extrapolated => {
@@ -271,9 +278,9 @@ impl<I: Index> Running<I> {
                 let beyond = self.step.beyond(share);
                 match stretch_beyond(&self.tree, frames, share, &beyond) {
                     Ok(stretch) if stretch.sigma() <= self.settings.limit => {
-                        (Surface::Moving(beyond), stretch)
+                        (Surface::Moving(beyond), 1.0 + share, stretch)
                     }
-                    _ => (held, last),
+                    _ => (held, 1.0, last),
                 }
             }
         };
@@ -373,6 +380,11 @@ impl<I: Index> Session for Running<I> {
     fn positions(&self) -> Vec<f32> {
         let rows = (0..self.tree.vertex_count()).map(|row| self.now.surface.position(row));
         rows.flatten().flat_map(|position| position.to_array()).collect()
+    }
+
+    fn nodes(&self) -> Vec<f32> {
+        let [before, last] = [self.before, self.last].map(|frame| &self.motion.frames[frame]);
+        between(before, last, self.now.part).flat_map(|node| node.to_array()).collect()
     }
 
     fn advance(

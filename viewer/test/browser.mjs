@@ -5,7 +5,7 @@ import { readFile, stat, writeFile } from "node:fs/promises";
 import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
 import puppeteer from "puppeteer-core";
-import { answers, contacts, differences, otherContacts, poses, program } from "./poses.mjs";
+import { answers, contacts, differences, otherContacts, poses, program, TREE } from "./poses.mjs";
 import { recordPage } from "./recorded.mjs";
 
 const folder = process.argv[2];
@@ -196,6 +196,58 @@ const checks = {
     assert((await count()) > 10, "a tracker has one");
   },
 
+  async "the page says what it shows"(page) {
+    // The tree was named by its path.
+    assert.equal(await shown(page, "name"), "heart.dibs");
+    assert.match(await page.title(), /^heart\.dibs /);
+    assert.match(await shown(page, "help"), /wheel zooms/);
+    const untold = await page.evaluate(() => {
+      const parts = document.querySelectorAll("aside output, aside dd, aside input, aside summary, #side, .plot, button");
+      return [...parts].filter((part) => !part.closest("[title]")).map((part) => part.outerHTML);
+    });
+    assert.deepEqual(untold, [], "controls and numbers without a tooltip");
+    await page.evaluate(() => viewer.play(false));
+    for (let frame = 0; frame < 3; frame++) await fresh(page);
+    const axes = await page.evaluate(() => [...document.querySelectorAll(".plot")].map((plot) => ({
+      most: Number(plot.querySelector(".most").textContent), least: Number(plot.querySelector(".least").textContent),
+      value: Number.parseFloat(plot.querySelector("b").textContent),
+    })));
+    assert.equal(axes.length, 4, "nothing is recorded, so nothing of it is plotted");
+    for (const { most, least, value } of axes) assert(most > least && least <= value && value <= most, JSON.stringify(axes));
+  },
+
+  async "the wheel zooms, and the view is reset by button and by key"(page) {
+    await page.evaluate(() => viewer.play(false));
+    const eye = () => page.evaluate(() => (viewer.step(1), viewer.picture.camera.position.toArray().map((axis) => axis.toFixed(2))));
+    const start = await eye();
+    for (const reset of [() => page.click("#reset"), async () => (await page.focus("#view"), await page.keyboard.press("r"))]) {
+      await page.mouse.move(30, 150);
+      await page.mouse.wheel({ deltaY: 400 });
+      assert.notDeepEqual(await eye(), start, "the wheel");
+      await reset();
+      assert.deepEqual(await eye(), start, "as at the start");
+    }
+  },
+
+  async "the page is dark where the browser is"(page) {
+    const seen = async (scheme) => {
+      await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
+      // The page hears of it before one of its next frames.
+      await page.waitForFunction(() => viewer.plots.colours("--ink") === getComputedStyle(document.documentElement).getPropertyValue("--ink").trim());
+      await fresh(page);
+      return page.evaluate(() => {
+        const light = (colour) => colour.match(/[\d.]+/g).slice(0, 3).reduce((sum, part) => sum + Number(part) / 765, 0);
+        const { backgroundColor, color } = getComputedStyle(document.querySelector("aside"));
+        const pair = viewer.picture.pairColour.color;
+        return { paper: light(backgroundColor), ink: light(color), pair: (pair.r + pair.g + pair.b) / 3, line: viewer.plots.colours("--time") };
+      });
+    };
+    const [light, dark] = [await seen("light"), await seen("dark")];
+    assert(light.paper > 0.9 && light.ink < 0.3 && light.pair < 0.1, JSON.stringify(light));
+    assert(dark.paper < 0.2 && dark.ink > 0.8 && dark.pair > 0.6, JSON.stringify(dark));
+    assert.notEqual(light.line, dark.line, "the plots' colours");
+  },
+
   async "held, interpolated and extrapolated differ"(page) {
     await page.evaluate(() => viewer.play(false));
     const at = async (between, tick) => {
@@ -265,6 +317,98 @@ async function replay(browser) {
     assert.deepEqual(page.complaints, []);
     await page.close();
   }
+}
+
+// A filter's record beside the path: the instrument goes where it was admitted, and the commanded one is seen.
+async function filtered(browser) {
+  const { admitted, commanded } = await recordedPath();
+  dibs("view", "heart.dibs", "--motion", "heart.pc2", "--path", "commands.csv", "--ticks", "ticks.jsonl", "-o", "filtered.html");
+  const page = await open(browser, "filtered.html", LARGE);
+  const found = await page.evaluate((count) => {
+    viewer.restart();
+    return Array.from({ length: count }, () => {
+      viewer.advance(1);
+      return { pose: [...viewer.to], separation: viewer.session.answer()[0] };
+    });
+  }, admitted.length);
+  found.forEach(({ pose, separation }, tick) => {
+    const { pose: expected, least } = admitted[tick];
+    assert.deepEqual(pose.map(Math.fround), expected.map(Math.fround), `the admitted pose of tick ${tick}`);
+    assert(separation > least - 0.01, `tick ${tick}: ${separation}, but the filter keeps ${least}`);
+  });
+  const short = admitted.findIndex(({ reason }) => reason !== "commanded");
+  assert(short > 0, "the filter held nothing back");
+  await page.evaluate((tick) => {
+    viewer.restart();
+    viewer.tick = tick - 1;
+    viewer.to = viewer.facts.path[tick - 1];
+    viewer.play(true);
+    viewer.step(1);
+    viewer.play(false);
+  }, admitted.length - 1);
+  const { reason, least, energy } = admitted.at(-1);
+  const text = await shown(page, "filter");
+  assert(text.startsWith(reason) && text.includes(`no nearer than ${least.toFixed(3)} mm`) && /[\d.]+ mm from the command/.test(text), text);
+  assert.equal(await shown(page, "energy"), `${energy.toFixed(3)} mJ left`);
+  const ghost = await page.evaluate(() => ({ isSeen: viewer.picture.commanded.visible, at: viewer.picture.commanded.balls[0].position.toArray() }));
+  assert(ghost.isSeen, "the commanded instrument is drawn");
+  assert.deepEqual(ghost.at.map(Math.fround), commanded.at(-1).slice(0, 3).map(Math.fround));
+  const plots = await page.$$eval(".plot span", (titles) => titles.map((title) => title.textContent));
+  assert(plots.includes("kept by the admitted motion") && plots.includes("energy left"), plots.join());
+  await page.evaluate(() => {
+    const { picture } = viewer;
+    viewer.picture = null;
+    viewer.restart();
+    viewer.play(true);
+    for (let tick = 0; tick < viewer.facts.path.length; tick++) viewer.step(1);
+    viewer.play(false);
+    viewer.picture = picture;
+  });
+  await fresh(page);
+  await shot(page, "filtered");
+  await page.evaluate(() => viewer.take([...viewer.to]));
+  await fresh(page);
+  assert(!(await page.evaluate(() => viewer.picture.commanded.visible)), "by hand nothing is commanded");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
+}
+
+// A path into the heart, and what `dibs filter` makes of it, with an energy.
+async function recordedPath() {
+  const commanded = Array.from({ length: 400 }, (_, tick) => {
+    const way = 90 - 0.15 * tick;
+    return [way, -20, 40, way + 70, -50, 70, 3];
+  });
+  await writeFile(join(folder, "commands.csv"), commanded.map((pose) => `capsule:${pose}`).join("\n"));
+  const printed = dibs("filter", "heart.dibs", "--motion", "heart.pc2", "--path", "commands.csv", "--stand-off", "1", "--json");
+  const lines = printed.trim().split("\n").map((line, tick) => ({ ...JSON.parse(line), energy: 1 - tick / 1000 }));
+  await writeFile(join(folder, "ticks.jsonl"), lines.map((line) => JSON.stringify(line)).join("\n"));
+  const admitted = lines.map(({ admitted, reason, least_separation: least, energy }) => (
+    { pose: admitted.replace("capsule:", "").split(",").map(Number), reason, least, energy }
+  ));
+  return { admitted, commanded };
+}
+
+// A tree whose surface nodes move: they are drawn where the session has them.
+async function nodes(browser) {
+  dibs("build", "heart.ply", "-o", "nodes.dibs", "--nodes", "lattice:6,6,7", "--stretch", "1.5");
+  dibs("view", "nodes.dibs", "-o", "nodes.html");
+  const page = await open(browser, "nodes.html", LARGE);
+  await fresh(page);
+  const { drawn, held, isSeen } = await page.evaluate(() => {
+    const { dots } = viewer.picture;
+    return { drawn: [...dots.geometry.attributes.position.array], held: [...viewer.session.nodes()], isSeen: dots.visible };
+  });
+  assert(isSeen && held.length > 300, `${held.length / 3} nodes`);
+  assert.deepEqual(drawn, held);
+  assert.match(await shown(page, "facts-line"), new RegExp(`moved by ${held.length / 3} nodes`));
+  assert(!(await page.$eval("#legend .node", (part) => part.hidden)));
+  await shot(page, "nodes");
+  await page.click("input[name=nodes]");
+  await fresh(page);
+  assert(!(await page.evaluate(() => viewer.picture.dots.visible)), "a box hides them");
+  assert.deepEqual(page.complaints, []);
+  await page.close();
 }
 
 // The page of `cargo xtask demo`, if there is one: it plays the instrument of every tick. Returns a picture of the deepest.
@@ -413,7 +557,7 @@ async function scenes(browser) {
   await page.close();
 }
 
-dibs("view", "heart.dibs", "--motion", "heart.pc2", "-o", "heart.html");
+dibs("view", TREE, "--motion", "heart.pc2", "-o", "heart.html");
 const { size } = await stat(join(folder, "heart.html"));
 assert(size <= 3e6, `heart.html has ${size} bytes`);
 const browser = await launch(SOFTWARE_GL);
@@ -429,6 +573,10 @@ try {
   console.log("passed: a finger");
   await replay(browser);
   console.log("passed: a replay has the separations of `dibs track`");
+  await filtered(browser);
+  console.log("passed: commanded and admitted poses, the separation kept, the energy");
+  await nodes(browser);
+  console.log("passed: nodes");
   const run = await demo(browser);
   console.log(run ? "passed: the demo's run has its instrument at every tick" : "skipped: no run of `cargo xtask demo`");
   await withoutWebGl();

@@ -2,6 +2,7 @@
 
 mod pack;
 mod page;
+mod ticks;
 
 use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
@@ -15,12 +16,15 @@ use dibs_nostd::{Index, Tree};
 use page::Page;
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use ticks::Record;
 
 #[derive(clap::Args)]
 #[command(mut_arg("motion_rate", |rate| rate.requires("motion")), after_help = "\
 Examples:
   dibs view heart.dibs --motion heart.pc2 -o heart.html
   dibs view heart.dibs --motion heart.pc2 --path tools.csv -o replay.html
+  dibs filter heart.dibs --motion heart.pc2 --path commands.csv --stand-off 1 --json > ticks.jsonl
+  dibs view heart.dibs --motion heart.pc2 --path commands.csv --ticks ticks.jsonl -o filtered.html
 
 The file needs nothing else and no network: a browser opens it. The query in it is the one of this program, compiled
 to WebAssembly.")]
@@ -35,6 +39,10 @@ pub struct Args {
     /// The instrument at each millisecond, as `dibs track` takes it: `-` is standard input; otherwise it is in the viewer's hand
     #[arg(long, value_name = "TOOLS")]
     path: Option<PathBuf>,
+    /// What `dibs filter --json` printed for the path: the instrument moves as admitted, and the commanded one is drawn beside
+    /// it. A line may also have `energy`, in mJ
+    #[arg(long, value_name = "TICKS", requires = "path")]
+    ticks: Option<PathBuf>,
     #[command(flatten)]
     motion_rate: MotionRate,
     /// The page without data; by default dibs-viewer.html beside this program, which a checkout's program makes where it is
@@ -49,7 +57,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    let inputs = [&args.tree].into_iter().chain(args.motion.given()).chain(&args.path);
+    let inputs =
+        [&args.tree].into_iter().chain(args.motion.given()).chain(&args.path).chain(&args.ticks);
     let page = Page::new(args.page.as_deref())?;
     overwrite::check(inputs.chain([&page.path]), [&args.output])?;
     let bytes = tree_file::load(&args.tree)?;
@@ -83,8 +92,17 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
         Some(path) => tool::path(path, |tool| tool.numbers(origin))?,
         None => Vec::new(),
     };
+    let record = match &args.ticks {
+        Some(ticks) => Record::read(ticks, path.len(), origin)?,
+        None => Record::default(),
+    };
+    let (path, commanded) =
+        if record.admitted.is_empty() { (path, Vec::new()) } else { (record.admitted, path) };
+    let name = args.tree.file_name().unwrap_or(args.tree.as_os_str()).to_string_lossy();
     let facts = json!({
+        "name": name,
         "tree": args.tree.display().to_string(),
+        "reasons": record.reasons,
         "rate": rate,
         "frames": frames.len().max(1),
     });
@@ -92,8 +110,13 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
     // A `<` in a name must not end the element.
     let facts = facts.to_string().replace('<', "\\u003c");
     data += &format!("<script type=\"application/json\" id=\"facts\">{facts}</script>\n");
-    let elements =
-        [("tree", bytes), ("motion", &pack::words(&frames)), ("path", &pack::path(&path))];
+    let elements = [
+        ("tree", bytes),
+        ("motion", &pack::words(&frames)),
+        ("path", &pack::path(&path)),
+        ("commanded", &pack::path(&commanded)),
+        ("ticks", &pack::path(&record.ticks)),
+    ];
     for (id, bytes) in elements {
         let text = pack::text(bytes)?;
         data += &format!("<script type=\"text/plain\" id=\"{id}\">{text}</script>\n");

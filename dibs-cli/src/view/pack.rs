@@ -27,8 +27,8 @@ pub fn words(frames: &[Vec<Vec3>]) -> Vec<u8> {
     (0..4).flat_map(|plane| codes.iter().map(move |code| code[plane])).collect()
 }
 
-/// The tools of a path as little-endian f32: the count of a tool's numbers, which differs between spheres and capsules,
-/// and the numbers. `viewer/page/path.js` undoes it.
+/// The tools of a path, or the record of its ticks, as little-endian f32: the count of a tool's numbers, which differs between
+/// spheres and capsules, and the numbers. `viewer/page/path.js` undoes it.
 pub fn path(tools: &[Vec<f32>]) -> Vec<u8> {
     let counted = |tool: &Vec<f32>| [&[tool.len() as f32][..], tool].concat();
     tools.iter().flat_map(counted).flat_map(f32::to_le_bytes).collect()

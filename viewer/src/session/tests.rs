@@ -173,6 +173,8 @@ fn nodes_move_the_surface() {
             let [a, b] = [session.before, session.last].map(|frame| &frames[frame]);
             let part = [1.0, session.motion.share(now), 1.0 + session.motion.share(now)][number];
             let at = a.iter().zip(b).map(|(&a, &b)| a + (b - a) * part).collect::<Vec<Vec3>>();
+            let shown: Vec<f32> = at.iter().flat_map(Vec3::to_array).collect();
+            assert_eq!(session.nodes(), shown, "{between:?}, tick {tick}");
             let stretch = nodes.measure(at.as_slice()).unwrap();
             assert!(session.stretch() >= stretch.sigma() - 1e-5);
             let surface = nodes.surface(at.as_slice());

@@ -61,6 +61,12 @@ impl Moment {
         self.push.outcome > 0
     }
 
+    /// What the filter made of the command.
+    pub fn reason(&self) -> Option<&'static str> {
+        let reason = REASONS.get(self.push.outcome as usize).copied();
+        reason.filter(|_| self.is_commanded())
+    }
+
     /// Speeds (mm/s): where nothing resists, and the instrument's.
     pub fn speeds(&self) -> [f32; 2] {
         [self.push.commanded, self.push.moved].map(|velocity| Vec3::from(velocity).length())
@@ -180,8 +186,7 @@ impl Hand {
         let commanded: Vec<&Moment> = moments.iter().filter(|m| m.is_commanded()).collect();
         let mut reasons = BTreeMap::new();
         for moment in &commanded {
-            let name = REASONS.get(moment.push.outcome as usize).copied().unwrap_or("unknown");
-            *reasons.entry(name).or_insert(0) += 1;
+            *reasons.entry(moment.reason().unwrap_or("unknown")).or_insert(0) += 1;
         }
         let instructions = || commanded.iter().map(|moment| moment.push.instructions);
         let sum: f64 = instructions().map(f64::from).sum();

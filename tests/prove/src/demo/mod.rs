@@ -128,7 +128,7 @@ pub fn run(options: &Options) -> Result<()> {
         timeline::draw(&outcome, &folder)?;
     }
     report.write(&folder)?;
-    replay::write(&scene, &outcome.ticks, &folder)?;
+    replay::write(&scene, &outcome.ticks, outcome.hand.as_ref(), &folder)?;
     report.print(&folder);
     report.verdict()
 }

@@ -9,14 +9,16 @@ use anyhow::{Context, Result};
 use controller::telemetry::Tick;
 use dibs_build::glam::DVec3;
 use dibs_build::write_atomically;
+use serde_json::json;
 use xtask::process::quiet;
 use xtask::workspace;
 
+use super::hand::Hand;
 use super::scene::Scene;
 
-/// Writes the page, with the instrument of every tick, and the files that it is made of. Without `dibs` or its page,
+/// Writes the page, with the instrument of every tick, what a hand's filter or wall made of it, and the files that it is made of. Without `dibs` or its page,
 /// says how to make them.
-pub fn write(scene: &Scene, ticks: &[Tick], folder: &Path) -> Result<()> {
+pub fn write(scene: &Scene, ticks: &[Tick], hand: Option<&Hand>, folder: &Path) -> Result<()> {
     let dibs = workspace::target().join("release/dibs");
     let page = workspace::target().join("viewer/dibs-viewer.html");
     if !dibs.exists() || !page.exists() {
@@ -39,10 +41,33 @@ pub fn write(scene: &Scene, ticks: &[Tick], folder: &Path) -> Result<()> {
     let rate = scene.rate.to_string();
     let mut view = Command::new(&dibs);
     view.args(["view", "heart.dibs", "--motion", "heart.pc2", "--path", "tools.csv"]);
-    view.args(["-o", "replay.html", "--motion-rate", &rate, "--page"])
-        .arg(&page)
-        .current_dir(folder);
+    view.args(["-o", "replay.html", "--motion-rate", &rate, "--page"]).arg(&page);
+    if let Some(hand) = hand {
+        let record = record(ticks, hand)?;
+        write_atomically(folder.join("ticks.jsonl"), |out| out.write_all(record.as_bytes()))?;
+        view.args(["--ticks", "ticks.jsonl"]);
+    }
+    view.current_dir(folder);
     let said = quiet(&mut view, Duration::from_mins(1)).context("the replay was not written")?;
     print!("{said}");
     Ok(())
+}
+
+/// A line for each tick: of a push by commands the filter's reason and the separation that it keeps, of one by force the energy
+/// that the wall has left.
+fn record(ticks: &[Tick], hand: &Hand) -> Result<String> {
+    let mut moments = hand.moments.iter().peekable();
+    let mut record = String::new();
+    for (number, tick) in ticks.iter().enumerate() {
+        let moment = moments.next_if(|moment| moment.tick.tick == tick.tick);
+        let line = match moment.map(|moment| (moment.reason(), moment.push)) {
+            None => json!({ "tick": number }),
+            Some((None, push)) => json!({ "tick": number, "energy": push.balance }),
+            Some((reason, push)) => json!({
+                "tick": number, "reason": reason, "least_separation": push.least_separation,
+            }),
+        };
+        writeln!(record, "{line}")?;
+    }
+    Ok(record)
 }
