@@ -15,9 +15,10 @@ pub mod weights;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::modes::{MAX_MODES, Memo, ModalSurface, Modes};
+use dibs_nostd::nodes::{EmbeddedSurface, Nodes};
 use dibs_nostd::{
-    Budget, Capsule, Contacts, MeasuredStretch, NoSide, Options, Proximity, Query, QueryError,
-    Side, Sphere, Tool, Tree, TriangleRow, VertexTable, measure_stretch,
+    Budget, Capsule, Contacts, MeasuredStretch, NoSide, Odometer, Options, Proximity, Query,
+    QueryError, Side, Sphere, SurfaceBlend, Tool, Tree, TriangleRow, VertexTable, measure_stretch,
 };
 
 /// The meanings of the word at the start of a record.
@@ -37,6 +38,11 @@ pub mod command {
     /// weights, then an `f32` each. Answered by the clock's counts for bounding its stretch and the bound's bits; then
     /// by the counts for computing every position, and a hash of their bits.
     pub const WEIGHTS: u32 = 4;
+    /// The rows of the next frame, three `f32` each, then a time: 0 for the frame before, 1 for this one. Not answered. The
+    /// queries that follow are of the surface at that time.
+    pub const MOVE: u32 = 6;
+    /// A frame of nodes, of a tree with such: three `f32` each. Not answered. The queries that follow are of its surface.
+    pub const NODES: u32 = 7;
 }
 
 /// A query's options: the bits of one of its words.
@@ -60,6 +66,8 @@ pub const MARGIN: f32 = 5.0;
 pub const TREE_BYTES: usize = if cfg!(m55) { 368 << 10 } else { 1 << 20 };
 /// Most vertices.
 pub const VERTICES: usize = if cfg!(m55) { 5_400 } else { 1 << 15 };
+/// Most vertices of a surface that moves between two frames, which a Cortex-M55's board does not have.
+const MOVING: usize = if cfg!(m55) { 0 } else { VERTICES };
 
 /// Entries of the query's stack: more than the scripts' trees need.
 const STACK: usize = 128;
@@ -77,6 +85,10 @@ enum Table<'a> {
     Modal(ModalSurface<'a, MAX_MODES>),
     /// From weights, with a cache.
     Remembered(ModalSurface<'a, MAX_MODES>),
+    /// From the rows of two frames.
+    Moving(SurfaceBlend<'a, [Vec3], [Vec3]>),
+    /// From nodes.
+    Embedded(EmbeddedSurface<'a, 'a, [Vec3]>),
 }
 
 /// The machine on which a script runs.
@@ -105,13 +117,14 @@ pub struct Fault;
 pub struct Memory {
     tree: [u8; TREE_BYTES],
     rows: [Vec3; VERTICES],
+    before: [Vec3; MOVING],
 }
 
 impl Memory {
     /// Empty.
     #[must_use]
     pub const fn new() -> Self {
-        Self { tree: [0; TREE_BYTES], rows: [Vec3::ZERO; VERTICES] }
+        Self { tree: [0; TREE_BYTES], rows: [Vec3::ZERO; VERTICES], before: [Vec3::ZERO; MOVING] }
     }
 }
 
@@ -129,11 +142,11 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
     let mut next = word(machine)?;
     while next == command::TREE {
         let length = word(machine)? as usize;
-        let Memory { tree, rows } = memory;
+        let Memory { tree, rows, before } = memory;
         machine.read(tree.get_mut(..length.next_multiple_of(4)).ok_or(Fault)?)?;
         let bytes = tree.get(..length).ok_or(Fault)?;
         let tree = Tree::from_bytes(bytes).map_err(|_| Fault)?;
-        next = queries(&tree, rows, machine)?;
+        next = queries(&tree, rows, before, machine)?;
     }
     if next == command::END { Ok(()) } else { Err(Fault) }
 }
@@ -142,18 +155,18 @@ pub fn run(memory: &mut Memory, machine: &mut impl Machine) -> Result<(), Fault>
 fn queries(
     tree: &Tree<'_, u16>,
     rows: &mut [Vec3],
+    before: &mut [Vec3],
     machine: &mut impl Machine,
 ) -> Result<u32, Fault> {
     let mut query = Query::<_, STACK>::new(tree).map_err(|_| Fault)?;
     let rows = rows.get_mut(..tree.vertex_count() as usize).ok_or(Fault)?;
     let mut measured = None;
     let mut table = Table::Rows;
+    let mut next = word(machine)?;
     loop {
-        match word(machine)? {
+        match next {
             command::FRAME => {
-                for row in rows.iter_mut() {
-                    *row = point(machine)?;
-                }
+                read(rows, machine)?;
                 let start = machine.clock();
                 let stretch = measure_stretch(tree, &*rows).map_err(|_| Fault)?;
                 let took = machine.clock().wrapping_sub(start);
@@ -175,9 +188,53 @@ fn queries(
                 measured = Some(bound);
                 table = if remembers { Table::Remembered(surface) } else { Table::Modal(surface) };
             }
+            command::MOVE => {
+                let before = before.get_mut(..rows.len()).ok_or(Fault)?;
+                before.copy_from_slice(rows);
+                read(rows, machine)?;
+                let mut odometer = Odometer::new(tree);
+                let surface = odometer.step(&*before, &*rows).at(f32::from_bits(word(machine)?));
+                next = all_of(&mut query, &Table::Moving(surface), rows, machine)?;
+                continue;
+            }
+            command::NODES => {
+                let nodes = Nodes::of(tree).map_err(|_| Fault)?;
+                let frame = before.get_mut(..nodes.count() as usize).ok_or(Fault)?;
+                read(frame, machine)?;
+                let surface = nodes.surface(&*frame);
+                next = all_of(&mut query, &Table::Embedded(surface), rows, machine)?;
+                continue;
+            }
+            other => return Ok(other),
+        }
+        next = word(machine)?;
+    }
+}
+
+/// Answers the queries that follow, of one surface. Returns the first other command.
+fn all_of(
+    query: &mut Query<'_, u16, STACK>,
+    table: &Table<'_>,
+    rows: &[Vec3],
+    machine: &mut impl Machine,
+) -> Result<u32, Fault> {
+    loop {
+        match word(machine)? {
+            command::QUERY => {
+                let answer = ask(query, table, rows, None, machine)?;
+                put(machine, &answer)?;
+            }
             other => return Ok(other),
         }
     }
+}
+
+/// Reads the rows of a frame.
+fn read(rows: &mut [Vec3], machine: &mut impl Machine) -> Result<(), Fault> {
+    for row in rows {
+        *row = point(machine)?;
+    }
+    Ok(())
 }
 
 /// The surface of a modal frame, and the bound of its stretch.
@@ -275,6 +332,8 @@ fn timed(
         Table::Remembered(surface) => {
             clocked(machine, || query.closest(&Memo::<_, SLOTS>::new(surface), tool, options))
         }
+        Table::Moving(surface) => clocked(machine, || query.closest(surface, tool, options)),
+        Table::Embedded(surface) => clocked(machine, || query.closest(surface, tool, options)),
     }
 }
 

@@ -97,7 +97,9 @@ pub fn may_write(register: u32, first: u32, second: u32) -> bool {
     let is_field = |half: u32, from: u32| half >> from & 15 == register;
     if first >> 11 < 0b11101 {
         let is_list = matches!(first >> 8, 0xBC | 0xBD) || first >> 12 == 0b1100;
-        return first & 7 == register
+        // Constants, and addresses from pc or sp, have a number of eight bits where others have registers.
+        let has_number = matches!(first >> 11, 0b00100..=0b00111 | 0b01001 | 0b10010..=0b10101);
+        return first & 7 == register && !has_number
             || first >> 8 & 7 == register
             || is_list && first >> register & 1 == 1;
     }

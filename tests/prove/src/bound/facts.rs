@@ -15,7 +15,8 @@ pub enum Count {
     Passes(&'static [Within]),
     /// Of calls, in these frames, of a function whose name has this in it.
     Calls(&'static [Within], &'static str),
-    /// Of the headers of loops in these frames: one each turn.
+    /// Of the headers of loops in these frames: one each turn. Of loops within such a loop, the edges back: the compiler makes
+    /// a loop of its own of the turns that end early.
     Heads(&'static [Within]),
     /// Of entries to these loops.
     Entries(&'static [Within]),
@@ -83,8 +84,15 @@ const NO_TIES: Never = (
 /// Of a plain query: unsigned.
 pub const PLAIN: Facts = Facts { groups: &[ROWS], never: &[NO_SIDE, NO_TIES] };
 
+/// The same on a surface between two frames.
+pub const MOVING: Facts = Facts { groups: &[ROWS, KEPT], never: &[NO_SIDE, NO_TIES] };
+
+/// The same on a surface that nodes carry.
+pub const EMBEDDED: Facts = Facts { groups: &[ROWS, KEPT, NAMED], never: &[NO_SIDE, NO_TIES] };
+
 /// The same on a surface that [`MODES`] modes move.
-pub const MODAL: Facts = Facts { groups: &[ROWS, MOVED], never: &[NO_SIDE, NO_TIES] };
+pub const MODAL: Facts =
+    Facts { groups: &[ROWS, KEPT, NAMED, BLENDED], never: &[NO_SIDE, NO_TIES] };
 
 /// The same with a wrong one, which a trace must find.
 pub const WITHOUT_EDGES: Facts =
@@ -229,27 +237,25 @@ const ROWS: &[Fact] = &[
 /// Modes of a surface that they move.
 pub const MODES: usize = 8;
 
-/// Of a surface that modes move: where a position takes a loop, the compiler keeps others too.
-const MOVED: &[Fact] = &[
-    Fact {
-        name: "modes of a position",
-        terms: &[(1, Count::Heads(BLEND)), (-(MODES as i64 + 1), Count::Entries(BLEND))],
-        most: Most::base(0),
-        because: "one turn for each mode, and one where they end",
-    },
-    Fact {
-        name: "triangles of a plane",
-        terms: &[(1, Count::Heads(SCAN)), (-8, Count::Entries(SCAN))],
-        most: Most::base(0),
-        because: "a leaf has at most eight triangles, of which the first is before the loop; one turn where they end",
-    },
-    Fact {
-        name: "corners that are not finite",
-        terms: &[
-            (1, Count::Heads(&[Function("not_finite")])),
-            (-4, Count::Calls(&[], "not_finite")),
-        ],
-        most: Most::base(0),
-        because: "a triangle has three corners; one turn where they end",
-    },
-];
+const BLENDED: &[Fact] = &[Fact {
+    name: "modes of a position",
+    terms: &[(1, Count::Heads(BLEND)), (-(MODES as i64 + 1), Count::Entries(BLEND))],
+    most: Most::base(0),
+    because: "one turn for each mode, and one where they end",
+}];
+
+/// Where a position takes more than a load, the compiler keeps this loop, which it unrolls for a table.
+const KEPT: &[Fact] = &[Fact {
+    name: "triangles of a plane",
+    terms: &[(1, Count::Heads(SCAN)), (-8, Count::Entries(SCAN))],
+    most: Most::base(0),
+    because: "a leaf has at most eight triangles, of which the first is before the loop; one turn where they end",
+}];
+
+/// And this one, unless the position is short.
+const NAMED: &[Fact] = &[Fact {
+    name: "corners that are not finite",
+    terms: &[(1, Count::Heads(&[Function("not_finite")])), (-4, Count::Calls(&[], "not_finite"))],
+    most: Most::base(0),
+    because: "a triangle has three corners; one turn where they end",
+}];

@@ -7,9 +7,10 @@ use anyhow::{Context, Result, ensure};
 
 use super::analysis::Analysis;
 use super::facts::{PLAIN, WITHOUT_EDGES};
-use super::queries::{Batch, Kind, Proven, Table, to_trace};
+use super::queries::{Kind, Proven, counts, to_trace};
 use super::trace::{Follower, OffGraph, Run};
 use super::walk::UNIT;
+use crate::probe::script::Script;
 use crate::probe::{Answers, traced};
 
 /// Node tests that an answer may have beyond those that were made.
@@ -24,6 +25,8 @@ pub struct Traced {
     pub broken: Vec<(&'static str, usize)>,
     /// Facts that hold with equality in some query that executes what they limit: they can be no tighter.
     pub tight: Vec<&'static str>,
+    /// Facts of which no query executed what they limit: no trace says whether they hold.
+    pub untried: Vec<&'static str>,
     /// Blocks that some query executed, of all that the bound is over.
     pub reached: usize,
     pub blocks: usize,
@@ -31,7 +34,7 @@ pub struct Traced {
 
 /// Follows every instruction of some queries along the graphs of their kinds, and compares them with the facts. A path that is
 /// not in the graph is an error.
-pub fn trace(proven: &[Proven], probe: &Path, batches: &[Batch]) -> Result<Vec<Traced>> {
+pub fn trace(proven: &[Proven], probe: &Path, scripts: &[Script]) -> Result<Vec<Traced>> {
     let mut ranges = BTreeMap::new();
     for Analysis { program, image, .. } in proven.iter().map(|one| &one.analysis) {
         for &at in program.functions.keys() {
@@ -40,15 +43,26 @@ pub fn trace(proven: &[Proven], probe: &Path, batches: &[Batch]) -> Result<Vec<T
     }
     let ranges: Vec<_> = ranges.into_values().collect();
     let mut followed: Vec<Followed<'_>> = proven.iter().map(Followed::new).collect();
-    for batch in batches {
-        let answers = traced(probe, &batch.script, &ranges, |at| {
+    for script in scripts {
+        let answers = traced(probe, script, &ranges, |at| {
             followed.iter_mut().try_for_each(|one| one.follower.step(at as u32))
         })?;
         for one in &mut followed {
-            one.compare(batch, &answers)?;
+            one.compare(&answers)?;
         }
     }
     Ok(followed.into_iter().map(Followed::end).collect())
+}
+
+/// What queries say of a fact.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// Queries that broke it.
+    broken: usize,
+    /// Whether one executed what it limits.
+    is_tried: bool,
+    /// Whether such a one met it with equality.
+    is_tight: bool,
 }
 
 /// A kind of query as it is followed.
@@ -56,30 +70,28 @@ struct Followed<'a> {
     proven: &'a Proven,
     follower: Follower<'a>,
     found: Traced,
-    /// Of each fact, the number of queries that broke it, and whether one met it with equality.
-    state: Vec<(usize, bool)>,
+    /// What the queries say of each fact.
+    state: Vec<Seen>,
 }
 
 impl<'a> Followed<'a> {
     fn new(proven: &'a Proven) -> Self {
         let Analysis { program, system, .. } = &proven.analysis;
         let found = Traced { blocks: program.blocks(), ..Traced::default() };
-        let state = vec![(0, false); system.rows.len()];
+        let state = vec![Seen::default(); system.rows.len()];
         Self { proven, follower: Follower::new(program), found, state }
     }
 
-    /// Compares the runs of a batch with its answers.
-    fn compare(&mut self, batch: &Batch, answers: &Answers) -> Result<()> {
+    /// Compares the runs of a script with its answers.
+    fn compare(&mut self, answers: &Answers) -> Result<()> {
         let runs = self.follower.runs();
-        let mut table = Table::Rows;
         let mut queries = 0;
         for answer in answers.iter() {
-            table = table.after(answer.record);
-            if !self.proven.kind.is_of(answer.record, table) {
+            if !self.proven.kind.is_of(answer.record) {
                 continue;
             }
             let run = runs.get(queries).context("a query without a run")?;
-            compare(self.proven, run, batch.counts(&answer), &mut self.state)?;
+            compare(self.proven, run, counts(&answer), &mut self.state)?;
             self.found.instructions += run.instructions;
             queries += 1;
         }
@@ -90,26 +102,25 @@ impl<'a> Followed<'a> {
 
     fn end(mut self) -> Traced {
         let rows = || self.proven.analysis.system.rows.iter().zip(&self.state);
-        let broken = rows().filter(|(_, (broken, _))| *broken > 0);
-        self.found.broken = broken.map(|(row, (broken, _))| (row.name, *broken)).collect();
-        let tight = rows().filter(|(_, (_, is_tight))| *is_tight);
-        self.found.tight = tight.map(|(row, _)| row.name).collect();
+        let named = |is_it: fn(&Seen) -> bool| {
+            rows().filter(|(_, seen)| is_it(seen)).map(|(row, _)| row.name).collect()
+        };
+        let broken = rows().filter(|(_, seen)| seen.broken > 0);
+        self.found.broken = broken.map(|(row, seen)| (row.name, seen.broken)).collect();
+        self.found.tight = named(|seen| seen.is_tight);
+        self.found.untried = named(|seen| !seen.is_tried);
         self.found.reached = self.follower.reached();
         self.found
     }
 }
 
 /// Compares one query with each fact, and with the bound.
-fn compare(
-    proven: &Proven,
-    run: &Run,
-    counts: [i64; 3],
-    state: &mut [(usize, bool)],
-) -> Result<()> {
-    for (row, (broken, is_tight)) in proven.analysis.system.rows.iter().zip(state) {
+fn compare(proven: &Proven, run: &Run, counts: [i64; 3], state: &mut [Seen]) -> Result<()> {
+    for (row, seen) in proven.analysis.system.rows.iter().zip(state) {
         let (left, right) = (run.left(row), row.most.of(counts));
-        *broken += usize::from(left > right);
-        *is_tight |= left == right && run.is_of(row);
+        seen.broken += usize::from(left > right);
+        seen.is_tried |= run.is_of(row);
+        seen.is_tight |= left == right && run.is_of(row);
     }
     // What a query counted is what it did: no place of these facts is missed, and none is doubled.
     for (name, counted, spare) in
@@ -130,14 +141,14 @@ fn compare(
 
 /// Errors that are planted, and whether a trace finds each: a wrong fact, and a path that the graph does not have.
 pub fn planted(kind: &'static Kind, probe: &Path) -> Result<[bool; 2]> {
-    let batches = to_trace(40)?;
-    let batches = batches.get(..1).context("no batch")?;
+    let scripts = to_trace(40)?;
+    let scripts = scripts.get(..1).context("no script")?;
     let mut wrong = Proven::new(kind, probe, &PLAIN)?;
     wrong.analysis.system.narrow("turns of a leaf");
-    let traced = trace(&[wrong], probe, batches)?;
+    let traced = trace(&[wrong], probe, scripts)?;
     let is_broken = traced.iter().any(|traced| !traced.broken.is_empty());
     let shorter = Proven::new(kind, probe, &WITHOUT_EDGES)?;
-    let left = trace(&[shorter], probe, batches).err();
+    let left = trace(&[shorter], probe, scripts).err();
     let is_left = left.is_some_and(|error| error.downcast_ref::<OffGraph>().is_some());
     Ok([is_broken, is_left])
 }

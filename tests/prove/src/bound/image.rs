@@ -1,6 +1,7 @@
 //! The linked program: its functions by address, and the bytes that are code.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
@@ -62,6 +63,12 @@ impl Image {
             marks: BTreeMap::from([(0, true)]),
             symbols: BTreeMap::from([(0, symbol)]),
         }
+    }
+
+    /// The same with bytes that are no code.
+    pub fn with_data(mut self, bytes: Range<u32>) -> Self {
+        self.marks.extend([(bytes.start, false), (bytes.end, true)]);
+        self
     }
 
     /// Functions, by address.

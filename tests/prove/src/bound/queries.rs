@@ -3,43 +3,21 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use dibs_build::{Mesh, generate};
+use dibs_build::{Mesh, Motion, generate};
 use dibs_nostd::Cost;
+use dibs_tests::motions::trembling;
 use dibs_tests::surfaces::{ball, slivers};
 use glam::Vec3;
 use xtask::workspace;
 
 use super::analysis::Analysis;
-use super::facts::{Facts, MODAL, MODES, Most, PLAIN};
+use super::facts::{EMBEDDED, Facts, MODAL, MODES, MOVING, Most, PLAIN};
 use super::prices::{Bound, least};
 use super::second;
 use super::walk::UNIT;
 use crate::checks::cost::unseen;
-use crate::probe::script::{Draw, Record, Script, Subject};
+use crate::probe::script::{Draw, Record, Script, Subject, Table};
 use crate::probe::{Answer, on_board};
-
-/// Where a query's positions come from.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Table {
-    /// A table of vertices.
-    Rows,
-    /// Modes.
-    Modes,
-    /// Modes, with a memory of positions: without a bound.
-    Memory,
-}
-
-impl Table {
-    /// The table of the queries after a record: a frame of modes is asked about without a memory, then with one.
-    pub fn after(self, record: Record) -> Self {
-        match (record, self) {
-            (Record::Stretch(_), _) => Self::Rows,
-            (Record::Bound, Self::Rows) => Self::Modes,
-            (Record::Bound, _) => Self::Memory,
-            _ => self,
-        }
-    }
-}
 
 /// A kind of query.
 pub struct Kind {
@@ -57,16 +35,15 @@ pub struct Kind {
 }
 
 impl Kind {
-    /// Whether a record is of a query of this kind, on such a table.
-    pub fn is_of(&self, record: Record, table: Table) -> bool {
-        let own = self.is_capsule;
-        table == self.table
-            && matches!(record, Record::Query { is_capsule, .. } if is_capsule == own)
+    /// Whether a record is of a query of this kind.
+    pub fn is_of(&self, record: Record) -> bool {
+        let own = (self.is_capsule, self.table);
+        matches!(record, Record::Query { is_capsule, table, .. } if (is_capsule, table) == own)
     }
 }
 
 /// Plain queries.
-pub const KINDS: [Kind; 4] = [
+pub const KINDS: [Kind; 8] = [
     Kind {
         name: "sphere",
         id: "sphere",
@@ -84,6 +61,42 @@ pub const KINDS: [Kind; 4] = [
         table: Table::Rows,
         facts: &PLAIN,
         fitted: Some(Cost::M7_CAPSULE),
+    },
+    Kind {
+        name: "sphere, a moving surface",
+        id: "moving-sphere",
+        root: "timed::{closure_env#4}<dibs_nostd::tool::sphere::Sphere",
+        is_capsule: false,
+        table: Table::Moving,
+        facts: &MOVING,
+        fitted: None,
+    },
+    Kind {
+        name: "capsule, a moving surface",
+        id: "moving-capsule",
+        root: "timed::{closure_env#4}<dibs_nostd::tool::capsule::Capsule",
+        is_capsule: true,
+        table: Table::Moving,
+        facts: &MOVING,
+        fitted: None,
+    },
+    Kind {
+        name: "sphere, a surface that nodes carry",
+        id: "embedded-sphere",
+        root: "timed::{closure_env#5}<dibs_nostd::tool::sphere::Sphere",
+        is_capsule: false,
+        table: Table::Nodes,
+        facts: &EMBEDDED,
+        fitted: None,
+    },
+    Kind {
+        name: "capsule, a surface that nodes carry",
+        id: "embedded-capsule",
+        root: "timed::{closure_env#5}<dibs_nostd::tool::capsule::Capsule",
+        is_capsule: true,
+        table: Table::Nodes,
+        facts: &EMBEDDED,
+        fitted: None,
     },
     Kind {
         name: "sphere, a surface of eight modes",
@@ -123,7 +136,8 @@ impl Proven {
         let analysis = Analysis::new(probe, &workspace::root(), kind.root, facts)
             .with_context(|| format!("the query of a {}", kind.name))?;
         let Analysis { program, system, lines, .. } = &analysis;
-        let bound = least(program, system, &TYPICAL, |at| lines.describe(at))?;
+        let bound = least(program, system, &TYPICAL, |at| lines.describe(at))
+            .with_context(|| format!("the query of a {}", kind.name))?;
         let constants = bound.constants(system);
         Ok(Self { kind, analysis, bound, constants })
     }
@@ -157,38 +171,30 @@ impl Proven {
     }
 }
 
-/// Queries of trees with so many roots besides the first.
-pub struct Batch {
-    pub script: Script,
-    roots: i64,
-}
-
-impl Batch {
-    /// Further roots and tests of an answered query.
-    pub fn counts(&self, answer: &Answer<'_>) -> [i64; 3] {
-        let [nodes, triangles] = answer.tests().map(i64::from);
-        [self.roots, nodes, triangles]
-    }
+/// Further roots and tests of an answered query.
+pub fn counts(answer: &Answer<'_>) -> [i64; 3] {
+    let roots = match answer.record {
+        Record::Query { roots, .. } => roots,
+        _ => 0,
+    };
+    let [nodes, triangles] = answer.tests();
+    [roots, nodes, triangles].map(i64::from)
 }
 
 /// Queries whose instructions are counted: on surfaces that the typical constants have not seen, and on three surfaces at once;
 /// whole ones and such as are cut short, warm and cold.
-fn counted(queries: usize) -> Result<Vec<Batch>> {
+fn counted(queries: usize) -> Result<Vec<Script>> {
     let one = unseen()?;
     let draws = [(Draw::Exhausting, 51), (Draw::Any, 52), (Draw::Short, 53)];
-    let mut batches: Vec<Batch> = draws
-        .into_iter()
-        .map(|(draw, seed)| Batch {
-            script: Script::about_all(&one, true, queries * 3 / 10, draw, seed),
-            roots: 0,
-        })
-        .collect();
-    batches.extend([several(queries / 10, 54), moved(queries / 10, 57)]);
-    Ok(batches)
+    let about = |(draw, seed)| Script::about_all(&one, true, queries * 3 / 10, draw, seed);
+    let mut scripts: Vec<Script> = draws.into_iter().map(about).collect();
+    scripts.push(several(queries / 10, 54));
+    scripts.extend(moved(queries / 10, 57)?);
+    Ok(scripts)
 }
 
 /// Queries that are traced.
-pub fn to_trace(queries: usize) -> Result<Vec<Batch>> {
+pub fn to_trace(queries: usize) -> Result<Vec<Script>> {
     let one = [
         Subject::new("heart", generate::heart(1_280)?.mesh, 8),
         Subject::new("brain", generate::brain(1_200)?, 4),
@@ -196,11 +202,13 @@ pub fn to_trace(queries: usize) -> Result<Vec<Batch>> {
         Subject::new("slivers", slivers(60), 1),
     ];
     let script = Script::about_all(&one, false, queries * 4 / 5, Draw::Any, 55);
-    Ok(vec![Batch { script, roots: 0 }, several(queries / 5, 56), moved(queries / 2, 58)])
+    let mut scripts = vec![script, several(queries / 5, 56)];
+    scripts.extend(moved(queries / 2, 58)?);
+    Ok(scripts)
 }
 
 /// Queries of three surfaces in one tree.
-fn several(queries: usize, seed: u64) -> Batch {
+fn several(queries: usize, seed: u64) -> Script {
     let mut all = Mesh::default();
     for (part, by) in
         [(ball(2), Vec3::ZERO), (slivers(12), Vec3::X * 150.0), (ball(3), Vec3::Y * 130.0)]
@@ -210,12 +218,40 @@ fn several(queries: usize, seed: u64) -> Batch {
         all.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| v + first)));
     }
     let subjects = [Subject::new("three surfaces", all, 8)];
-    Batch { script: Script::about_all(&subjects, true, queries, Draw::Any, seed), roots: 2 }
+    Script::about_all(&subjects, true, queries, Draw::Any, seed)
 }
 
-/// Queries of a heart that modes move; a third of them have no memory of positions.
-fn moved(queries: usize, seed: u64) -> Batch {
-    Batch { script: Script::modal(MODES, (queries / 16).max(2), seed), roots: 0 }
+/// Queries of a heart that modes, nodes and frames move, and of three hearts, whole and cut short, warm and cold. A third of
+/// those of modes have no memory of positions.
+fn moved(queries: usize, seed: u64) -> Result<Vec<Script>> {
+    let of_frame = (queries / 32).max(2);
+    let waves = MODES.div_ceil(2);
+    let one = trembling(10_272, waves, seed);
+    let three = beside(&trembling(1_280, waves, seed), 3);
+    let mut scripts = Vec::new();
+    for (mesh, motion) in [&one, &three] {
+        scripts.push(Script::modal_of(mesh, motion, MODES, of_frame, Draw::Any, seed));
+        scripts.push(Script::moving_of(mesh, motion, queries / 2, Draw::Any, seed));
+    }
+    let heart = generate::heart(10_272)?.mesh;
+    scripts.push(Script::embedded_of(&heart, 7, queries, Draw::Any, seed));
+    Ok(scripts)
+}
+
+/// So many of a surface beside each other, in the same motion.
+fn beside((mesh, motion): &(Mesh, Motion), count: u32) -> (Mesh, Motion) {
+    let (mut all, mut moved) = (Mesh::default(), motion.clone());
+    moved.frames.iter_mut().for_each(Vec::clear);
+    for number in 0..count {
+        let by = Vec3::X * 150.0 * number as f32;
+        let first = all.positions.len() as u32;
+        let shifted = |positions: &[Vec3]| positions.iter().map(|&at| at + by).collect::<Vec<_>>();
+        all.positions.extend(shifted(&mesh.positions));
+        all.triangles.extend(mesh.triangles.iter().map(|corners| corners.map(|v| v + first)));
+        let frames = moved.frames.iter_mut().zip(&motion.frames);
+        frames.for_each(|(all, own)| all.extend(shifted(own)));
+    }
+    (all, moved)
 }
 
 /// Queries on the board, counted.
@@ -232,14 +268,12 @@ pub struct Counted {
 /// Counts the instructions of many queries, and compares each with its bound.
 pub fn count(proven: &[Proven], probe: &Path, queries: usize) -> Result<Vec<Counted>> {
     let mut found: Vec<Counted> = proven.iter().map(|_| Counted::default()).collect();
-    for batch in counted(queries)? {
-        let mut table = Table::Rows;
-        for answer in on_board(probe, &batch.script, true)?.iter() {
-            table = table.after(answer.record);
+    for script in counted(queries)? {
+        for answer in on_board(probe, &script, true)?.iter() {
             let all = proven.iter().zip(&mut found);
-            for (proven, found) in all.filter(|(one, _)| one.kind.is_of(answer.record, table)) {
+            for (proven, found) in all.filter(|(one, _)| one.kind.is_of(answer.record)) {
                 let took = i128::from(answer.instructions) * UNIT;
-                let bound = proven.at(batch.counts(&answer));
+                let bound = proven.at(counts(&answer));
                 let share = took as f64 / bound as f64;
                 found.queries += 1;
                 found.above += usize::from(took > bound);

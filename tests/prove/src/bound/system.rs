@@ -97,17 +97,22 @@ impl<'a> Finder<'a> {
             Count::Passes(within) => each(self.blocks(within)?),
             Count::Calls(within, callee) => each(self.calls(within, callee)?),
             Count::Heads(within) => {
-                let heads = self.heads(within)?;
-                each(heads.into_iter().map(|(at, own)| Part::Block(at, own.header)))
+                let [outer, inner] = self.heads(within)?;
+                let heads = outer.into_iter().map(|(at, own)| Part::Block(at, own.header));
+                // Turns that the compiler made a loop of their own come besides.
+                let back = inner
+                    .iter()
+                    .flat_map(|(at, own)| own.back.iter().map(|&edge| Part::Edge(*at, edge)));
+                each(heads.chain(back))
             }
             Count::Entries(within) => {
-                let heads = self.heads(within)?;
+                let [heads, _] = self.heads(within)?;
                 let edges = heads.iter().flat_map(|(at, own)| own.enter.iter().map(|&e| (*at, e)));
                 each(edges.map(|(at, edge)| Part::Edge(at, edge)))
             }
             Count::Bytes(callee) => {
                 let calls = self.calls(&[], callee)?;
-                let copied = calls.into_iter().map(|part| Ok((part, self.length(part)?)));
+                let copied = calls.into_iter().map(|part| Ok((part, self.copied(part)?)));
                 copied.collect::<Result<_>>()?
             }
         };
@@ -115,8 +120,8 @@ impl<'a> Finder<'a> {
         Ok(found)
     }
 
-    /// Blocks with an instruction in these frames, in the innermost loop that has such, that no other of them is always
-    /// before.
+    /// Blocks with an instruction in these frames, in the innermost loop that has such, that no other of them in the same
+    /// loop is always before.
     fn blocks(&self, within: &[Within]) -> Result<Vec<Part>> {
         let is_there = self.lines.all(within)?;
         let mut found = Vec::new();
@@ -124,15 +129,19 @@ impl<'a> Finder<'a> {
             let has = |block: &usize| {
                 function.blocks[*block].instructions.iter().any(|&place| is_there(place))
             };
-            let depth = |block: &usize| {
-                self.loops[&at].iter().filter(|own| own.blocks.contains(block)).count()
+            let around = |block: &usize| -> Vec<usize> {
+                let around = self.loops[&at].iter().filter(|own| own.blocks.contains(block));
+                around.map(|own| own.header).collect()
             };
             let mut all: Vec<usize> = (0..function.blocks.len()).filter(has).collect();
-            let Some(deepest) = all.iter().map(depth).max() else { continue };
-            all.retain(|block| depth(block) == deepest);
+            let depths = all.iter().map(|block| around(block).len());
+            let Some(deepest) = depths.max() else { continue };
+            all.retain(|block| around(block).len() == deepest);
             let before = dominators(function);
             let is_first = |&&block: &&usize| {
-                !all.iter().any(|other| *other != block && before[block].contains(other))
+                let is_before = |other: &usize| *other != block && before[block].contains(other);
+                let own = around(&block);
+                !all.iter().any(|other| is_before(other) && around(other) == own)
             };
             found.extend(all.iter().filter(is_first).map(|&block| Part::Block(at, block)));
         }
@@ -162,10 +171,10 @@ impl<'a> Finder<'a> {
         Ok(found)
     }
 
-    /// The loops whose header has an instruction in these frames, without those within another of them.
-    fn heads(&self, within: &[Within]) -> Result<Vec<(u32, &Loop)>> {
+    /// The loops whose header has an instruction in these frames: those that are within no other of them, and the others.
+    fn heads(&self, within: &[Within]) -> Result<[Vec<(u32, &Loop)>; 2]> {
         let is_there = self.lines.all(within)?;
-        let mut found = Vec::new();
+        let mut found = [Vec::new(), Vec::new()];
         for (&at, loops) in &self.loops {
             let function: &Function = &self.program.functions[&at];
             let has = |own: &&Loop| {
@@ -175,35 +184,45 @@ impl<'a> Finder<'a> {
             let is_within = |own: &Loop, other: &Loop| {
                 own.header != other.header && other.blocks.contains(&own.header)
             };
-            let outer = all.iter().filter(|own| !all.iter().any(|other| is_within(own, other)));
-            found.extend(outer.map(|own| (at, *own)));
+            for own in &all {
+                let is_inner = all.iter().any(|other| is_within(own, other));
+                found[usize::from(is_inner)].push((at, *own));
+            }
         }
         Ok(found)
     }
 
-    /// The constant length that a call copies, in r2.
-    fn length(&self, part: Part) -> Result<i64> {
+    /// The bytes that a call copies.
+    fn copied(&self, part: Part) -> Result<i64> {
         let Part::Block(at, number) = part else { anyhow::bail!("copied by a jump") };
-        let block = &self.program.functions[&at].blocks[number];
-        let last = block.instructions.last().copied().unwrap_or_default();
-        for &place in block.instructions.iter().rev() {
-            let first = self.image.code(place)?;
-            let is_wide = first >> 11 >= 0b11101;
-            let second = if is_wide { self.image.code(place + 2)? } else { 0 };
-            let byte = i64::from(second & 0xFF);
-            // MOVS r2, and MOV.W r2 of a byte, and MOVW r2.
-            match (first, second >> 8) {
-                _ if first >> 8 == 0x22 => return Ok(i64::from(first & 0xFF)),
-                (0xF04F, 2) => return Ok(byte),
-                (0xF240, high) if high & 15 == 2 => return Ok(byte | i64::from(high >> 4 & 7) << 8),
-                // The call itself has no register. After IT a length may or may not be loaded.
-                _ if first >> 8 == 0xBF && first & 15 != 0 => break,
-                _ if place != last && may_write(2, first, second) => break,
-                _ => {}
-            }
-        }
-        anyhow::bail!("the length that is copied at {:#x} is no constant", block.instructions[0])
+        length(self.image, &self.program.functions[&at].blocks[number].instructions)
     }
+}
+
+/// The constant in r2 at the end of these instructions, which end in a call.
+///
+/// # Errors
+/// If it is none that they load.
+pub fn length(image: &Image, instructions: &[u32]) -> Result<i64> {
+    let last = instructions.last().copied().unwrap_or_default();
+    for &place in instructions.iter().rev() {
+        let first = image.code(place)?;
+        let is_wide = first >> 11 >= 0b11101;
+        let second = if is_wide { image.code(place + 2)? } else { 0 };
+        let byte = i64::from(second & 0xFF);
+        // MOVS r2, and MOV.W r2 of a byte, and MOVW r2.
+        match (first, second >> 8) {
+            _ if first >> 8 == 0x22 => return Ok(i64::from(first & 0xFF)),
+            (0xF04F, 2) => return Ok(byte),
+            (0xF240, high) if high & 15 == 2 => return Ok(byte | i64::from(high >> 4 & 7) << 8),
+            // The call itself has no register. After IT a length may or may not be loaded.
+            _ if first >> 8 == 0xBF && first & 15 != 0 => break,
+            _ if place != last && may_write(2, first, second) => break,
+            _ => {}
+        }
+    }
+    let start = instructions.first().copied().unwrap_or_default();
+    anyhow::bail!("the length that is copied at {start:#x} is no constant")
 }
 
 fn each(parts: impl IntoIterator<Item = Part>) -> Vec<(Part, i64)> {

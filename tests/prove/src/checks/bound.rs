@@ -26,7 +26,8 @@ pub const CHECK: Check = Check {
             bound: Bound::Is(0.0),
             unit: "of {bound.queries} plain queries on the emulated Cortex-M7, whole and cut short",
             limits: "Of this linked program. The proof trusts the flow facts of `facts.rs`. Unsigned queries of a table of \
-                     vertices, and whole and cold ones of a surface of modes; instructions, not cycles.",
+                     vertices, of a surface between two frames, and of one that nodes or eight modes move; instructions, not \
+                     cycles.",
         },
         Promise {
             id: "bound.broken",
@@ -62,6 +63,40 @@ pub const CHECK: Check = Check {
          {bound.capsule.triangle-test} t",
             limits: "",
         },
+        Promise {
+            id: "bound.moving-capsule.node-test",
+            says: "The proven node test of a capsule on a surface between two frames",
+            criterion: TIMING,
+            bound: Bound::Informs,
+            unit: "instructions, after {bound.moving-capsule.base} and {bound.moving-capsule.root} a, with \
+         {bound.moving-capsule.triangle-test} a triangle test; sphere {bound.moving-sphere.base} + {bound.moving-sphere.root} a \
+         + {bound.moving-sphere.node-test} n + {bound.moving-sphere.triangle-test} t",
+            limits: "",
+        },
+        note("bound.moving-capsule.base"),
+        note("bound.moving-capsule.root"),
+        note("bound.moving-capsule.triangle-test"),
+        note("bound.moving-sphere.base"),
+        note("bound.moving-sphere.root"),
+        note("bound.moving-sphere.node-test"),
+        note("bound.moving-sphere.triangle-test"),
+        Promise {
+            id: "bound.embedded-capsule.node-test",
+            says: "The proven node test of a capsule on a surface that nodes carry",
+            criterion: TIMING,
+            bound: Bound::Informs,
+            unit: "instructions, after {bound.embedded-capsule.base} and {bound.embedded-capsule.root} a, with \
+         {bound.embedded-capsule.triangle-test} a triangle test; sphere {bound.embedded-sphere.base} + {bound.embedded-sphere.root} a \
+         + {bound.embedded-sphere.node-test} n + {bound.embedded-sphere.triangle-test} t",
+            limits: "",
+        },
+        note("bound.embedded-capsule.base"),
+        note("bound.embedded-capsule.root"),
+        note("bound.embedded-capsule.triangle-test"),
+        note("bound.embedded-sphere.base"),
+        note("bound.embedded-sphere.root"),
+        note("bound.embedded-sphere.node-test"),
+        note("bound.embedded-sphere.triangle-test"),
         Promise {
             id: "bound.modal-capsule.node-test",
             says: "The proven node test of a capsule on a surface that eight modes move",

@@ -266,7 +266,7 @@ fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result
         .map(|(draw, seed)| Script::about_all(&subjects, true, queries / 2, draw, seed));
     for answers in machine.all(&scripts)? {
         for answer in answers.iter() {
-            let Record::Query { is_capsule, deadline } = answer.record else { continue };
+            let Record::Query { is_capsule, deadline, .. } = answer.record else { continue };
             let [node_tests, triangle_tests] = answer.tests();
             let bound = costs[usize::from(is_capsule)].instructions(node_tests, triangle_tests);
             let took = answer.instructions;

@@ -1,14 +1,13 @@
 //! Scripts for the probe: surfaces, frames and queries, as words.
 //!
-//! One file, because a script and its words belong together.
+//! One file, because a script and its words belong together; [`moved`] has those of surfaces that are no table of rows.
 
-use dibs_build::modes::ModalFit;
+mod moved;
+
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, generate};
-use dibs_nostd::modes::{MAX_MODES, Modes};
-use dibs_nostd::{Budget, Cost, Options, Query, Tool, VertexTable};
+use dibs_nostd::{Budget, Cost, Options, Query, Tool};
 use dibs_tests::deform::Deformation;
 use dibs_tests::method::Probe;
-use dibs_tests::motions::trembling;
 use dibs_tests::oracle::Instrument;
 use dibs_tests::poses::pose;
 use dibs_tests::streams::Beat;
@@ -23,6 +22,10 @@ pub struct Script {
     words: Vec<u32>,
     /// The options of every query, besides the measured stretch.
     how: u32,
+    /// Roots of the last tree besides the first.
+    roots: u32,
+    /// Of the last frame.
+    table: Table,
     /// The kind of each answer, by its place.
     pub records: Vec<Record>,
 }
@@ -40,9 +43,28 @@ pub enum Record {
     Query {
         /// Whether the tool is a capsule.
         is_capsule: bool,
+        /// Roots of the tree besides the first.
+        roots: u32,
+        table: Table,
         /// Instructions that the budget was made for, if it was.
         deadline: Option<u32>,
     },
+}
+
+/// Where a query's positions come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Table {
+    /// The rows of a frame.
+    #[default]
+    Rows,
+    /// Those of two frames.
+    Moving,
+    /// Nodes.
+    Nodes,
+    /// Modes.
+    Modes,
+    /// Modes, with a memory of positions.
+    Memory,
 }
 
 /// Ticks until the tool of table 3 repeats itself, roughly: 77 s.
@@ -63,6 +85,27 @@ pub enum Draw {
     Short,
     /// With a budget made for a random number of instructions, at these costs of a sphere and a capsule.
     Deadline([Cost; 2]),
+}
+
+impl Draw {
+    /// A warm start, now and then one that the tree does not have.
+    fn warm(triangles: u32, rng: &mut Rng) -> u32 {
+        if rng.bool() { u32::MAX } else { rng.u32(..triangles + 2) }
+    }
+
+    /// A budget, and the instructions that it was made for, if it was.
+    fn budget(self, is_capsule: bool, rng: &mut Rng) -> (Budget, Option<u32>) {
+        match self {
+            Self::Any | Self::EitherWay if rng.bool() => (Budget::new(rng.u32(..780)), None),
+            Self::Short => (Budget::new(rng.u32(..72)), None),
+            Self::Deadline(costs) => {
+                let cost = costs[usize::from(is_capsule)];
+                let instructions = cost.base + rng.u32(..100_000);
+                (Budget::for_instructions(instructions, &cost), Some(instructions))
+            }
+            _ => (Budget::UNLIMITED, None),
+        }
+    }
 }
 
 /// A query's prior knowledge.
@@ -227,44 +270,6 @@ impl Script {
         script
     }
 
-    /// A heart with this many modes: each frame as rows, as weights, and as weights with a cache of positions, and the
-    /// same queries on each.
-    pub fn modal(modes: usize, queries: usize, seed: u64) -> Self {
-        let mut rng = Rng::with_seed(seed);
-        let (mesh, motion) = trembling(10_272, modes.div_ceil(2), seed);
-        let fit = ModalFit::new(&mesh, &motion).expect("a motion");
-        let built = build(&mesh, 8).with_modes(&fit, modes).expect("so many");
-        let tree = built.tree::<u16>().expect("16-bit indices");
-        let shape = Modes::of(&tree).expect("with modes");
-        let triangles = surfaces::triangles(&tree);
-        let mut script = Self::default();
-        script.tree(&built);
-        for weights in built.modal_motion().expect("with modes").weights.iter().step_by(3) {
-            let surface = shape.surface::<MAX_MODES>(weights).expect("recorded");
-            let rows = 0..tree.vertex_count();
-            let rows: Vec<Vec3> = rows.filter_map(|row| surface.position(row)).collect();
-            let tools: Vec<Instrument> =
-                (0..queries).map(|number| about(&rows, &triangles, number, &mut rng)).collect();
-            for table in [None, Some(0), Some(1)] {
-                match table {
-                    None => script.rows(&rows, triangles.len() as u32),
-                    Some(remembers) => {
-                        script.words.extend([command::WEIGHTS, remembers, weights.len() as u32]);
-                        script.words.extend(weights.iter().map(|weight| weight.to_bits()));
-                        script.records.push(Record::Bound);
-                        script.records.push(Record::Positions(rows.len() as u32));
-                    }
-                }
-                for tool in &tools {
-                    let is_capsule = tool.start != tool.end;
-                    script.query(tool, is_capsule, true, u32::MAX, Budget::UNLIMITED, None);
-                }
-            }
-        }
-        script.words.push(command::END);
-        script
-    }
-
     /// Capsules beside a ball, with one coordinate that is subnormal: a processor that flushes those to zero answers with
     /// another point of the axis.
     pub fn subnormal() -> Self {
@@ -297,6 +302,7 @@ impl Script {
 
     fn tree(&mut self, built: &BuiltTree) {
         let blob = built.blob();
+        self.roots = built.tree::<u16>().expect("16-bit indices").roots() - 1;
         self.words.extend([command::TREE, blob.len() as u32]);
         self.words.extend(super::padded(blob));
     }
@@ -322,20 +328,9 @@ impl Script {
             };
             // A capsule of length zero is a capsule too.
             let is_capsule = tool.start != tool.end || rng.u32(..8) == 0;
-            let warm = if rng.bool() { u32::MAX } else { rng.u32(..tree.triangle_count() + 2) };
+            let warm = Draw::warm(tree.triangle_count(), rng);
             let measured = rng.bool();
-            let mut deadline = None;
-            let budget = match draw {
-                Draw::Any | Draw::EitherWay if rng.bool() => Budget::new(rng.u32(..780)),
-                Draw::Short => Budget::new(rng.u32(..72)),
-                Draw::Deadline(costs) => {
-                    let cost = costs[usize::from(is_capsule)];
-                    let instructions = cost.base + rng.u32(..100_000);
-                    deadline = Some(instructions);
-                    Budget::for_instructions(instructions, &cost)
-                }
-                _ => Budget::UNLIMITED,
-            };
+            let (budget, deadline) = draw.budget(is_capsule, rng);
             if matches!(draw, Draw::EitherWay) {
                 self.how = if number % 2 == 1 { how::SIGNED } else { 0 };
             }
@@ -350,8 +345,13 @@ impl Script {
 
     fn rows(&mut self, rows: &[Vec3], triangles: u32) {
         self.words.push(command::FRAME);
-        self.words.extend(rows.iter().flat_map(|row| row.to_array().map(f32::to_bits)));
+        self.positions(rows);
         self.records.push(Record::Stretch(triangles));
+        self.table = Table::Rows;
+    }
+
+    fn positions(&mut self, rows: &[Vec3]) {
+        self.words.extend(rows.iter().flat_map(|row| row.to_array().map(f32::to_bits)));
     }
 
     fn query(
@@ -381,7 +381,8 @@ impl Script {
         self.words.push(tool.radius.to_bits());
         let how = self.how | if measured { how::MEASURED } else { 0 };
         self.words.extend([u32::from(is_capsule), how, warm, budget.tests()]);
-        self.records.push(Record::Query { is_capsule, deadline });
+        let (roots, table) = (self.roots, self.table);
+        self.records.push(Record::Query { is_capsule, roots, table, deadline });
     }
 }
 

@@ -8,8 +8,9 @@ use dibs_prove::bound::facts::{Count, Fact, Most};
 use dibs_prove::bound::graph::Program;
 use dibs_prove::bound::image::Image;
 use dibs_prove::bound::lines::{Lines, Within};
+use dibs_prove::bound::loops::loops;
 use dibs_prove::bound::prices::least;
-use dibs_prove::bound::system::{Part, Row, System};
+use dibs_prove::bound::system::{Part, Row, System, length};
 use dibs_prove::bound::trace::Follower;
 use dibs_prove::bound::walk::{Longest, UNIT, longest};
 use xtask::workspace;
@@ -87,6 +88,64 @@ fn a_branch_to_a_register_and_recursion_are_errors() {
     assert!(error.contains("recursion"), "{error}");
 }
 
+/// A branch into the middle of a loop.
+#[test]
+fn a_loop_of_two_entries_is_an_error() {
+    // CBZ to the second half of the loop; ADDS; ADDS; CMP; BNE to the first ADDS; BX lr.
+    let program = program(&[0xB100, 0x3401, 0x3401, 0x42A0, 0xD1FB, 0x4770]);
+    let function = &program.functions[&0];
+    let error = loops(function).err().expect("no loops").to_string();
+    assert!(error.contains("a loop with several entries"), "{error}");
+}
+
+#[test]
+fn a_table_of_jumps_leads_to_each_of_its_places() {
+    // TBB [pc, r0] with two bytes; BX lr; BX lr.
+    let read = |table: u16| {
+        let image = Image::of_halves(&[0xE8DF, 0xF000, table, 0x4770, 0x4770]).with_data(4..6);
+        Program::read(&image, 0, &BTreeSet::new())
+    };
+    let program = read(0x0201).expect("a program");
+    let blocks = program.functions[&0].blocks.iter().map(|block| block.instructions[0]);
+    assert_eq!(blocks.collect::<Vec<_>>(), [0, 6, 8]);
+    let error = read(0x7F01).err().expect("no program").to_string();
+    assert!(error.contains("leads to 0x102"), "{error}");
+}
+
+#[test]
+fn a_call_that_is_never_made_ends_its_path() {
+    // CBZ to BX lr; BL to 8; BX lr; the function that is called.
+    let image = Image::of_halves(&[0xB108, 0xF000, 0xF801, 0x4770, 0x4770]);
+    let read = |never: &[u32]| Program::read(&image, 0, &never.iter().copied().collect());
+    assert!(read(&[]).is_err(), "no function starts at 8");
+    let program = read(&[2]).expect("a program");
+    let Ok(Longest::Walk(walk, _)) = longest(&program, &System::default(), &[]) else {
+        panic!("no loop")
+    };
+    assert_eq!(walk.instructions, 2);
+}
+
+#[test]
+fn a_copied_length_is_a_constant_or_an_error() {
+    let of = |halves: &[u16], places: &[u32]| length(&Image::of_halves(halves), places);
+    // MOVS r2; MOV.W r2; MOVW r2; then BL.
+    assert_eq!(of(&[0x220C, 0xF7FF, 0xFFFE], &[0, 2]).expect("a constant"), 12);
+    assert_eq!(of(&[0xF04F, 0x0210, 0xF7FF, 0xFFFE], &[0, 4]).expect("a constant"), 16);
+    assert_eq!(of(&[0xF240, 0x2208, 0xF7FF, 0xFFFE], &[0, 4]).expect("a constant"), 0x208);
+    // The last one counts, and another register's does not.
+    assert_eq!(of(&[0x2204, 0x220C, 0x2301, 0xF7FF, 0xFFFE], &[0, 2, 4, 6]).expect("one"), 12);
+    // Under IT; changed by ADDS; loaded from memory; not in the block.
+    for (halves, places) in [
+        (&[0xBF18, 0x220C, 0xF7FF, 0xFFFE][..], &[0, 2, 4][..]),
+        (&[0x220C, 0x3201, 0xF7FF, 0xFFFE], &[0, 2, 4]),
+        (&[0x6802, 0xF7FF, 0xFFFE], &[0, 2]),
+        (&[0xF7FF, 0xFFFE], &[0]),
+    ] {
+        let error = of(halves, places).expect_err("no constant").to_string();
+        assert!(error.contains("is no constant"), "{error}");
+    }
+}
+
 #[test]
 fn a_return_under_a_condition_ends_the_function_or_not() {
     // PUSH; CMP; IT NE; POPNE; NOP; POP.
@@ -138,7 +197,7 @@ fn a_trace_that_leaves_the_graph_or_breaks_a_fact_is_found() {
 #[test]
 fn what_may_write_a_register_is_found() {
     // ADDS r2, #1; LDR r2, [r0]; POP {r2, pc}; MOV r2, r9; MOVW r2; LDRD r4, r2; LDM r0, {r2, r3}; VMOV r2, s0; VMOV r2, r3, d0;
-    // VLDMIA r2!
+    // VLDMIA r2!; LDR r2, [sp]; LDR r2, [pc]; ADD r2, sp; LSLS r2, r0
     let writes = [
         (0x3201, 0),
         (0x6802, 0),
@@ -150,9 +209,23 @@ fn what_may_write_a_register_is_found() {
         (0xEE10, 0x2A10),
         (0xEC53, 0x2B10),
         (0xECB2, 0x0A02),
+        (0x9A1D, 0),
+        (0x4A00, 0),
+        (0xAA00, 0),
+        (0x0042, 0),
     ];
     assert!(writes.iter().all(|&(first, second)| may_write(2, first, second)), "{writes:x?}");
-    // ADDS r3, #1; LDR r4, [r0]; MOVW r3; VADD.F32 s4, s4, s4; VLDR s5, [r2].
-    let others = [(0x3301, 0), (0x6804, 0), (0xF240, 0x0310), (0xEE32, 0x2A02), (0xEDD2, 0x2A00)];
+    // STR r0, [sp, #104]; LDR r0, [pc, #8]; ADD r0, sp, #8; CMP r1, #2; ADDS r3, #1; LDR r4, [r0]; MOVW r3; VADD.F32 s4, s4, s4; VLDR s5, [r2].
+    let others = [
+        (0x901A, 0),
+        (0x4802, 0),
+        (0xA802, 0),
+        (0x2902, 0),
+        (0x3301, 0),
+        (0x6804, 0),
+        (0xF240, 0x0310),
+        (0xEE32, 0x2A02),
+        (0xEDD2, 0x2A00),
+    ];
     assert!(!others.iter().any(|&(first, second)| may_write(2, first, second)), "{others:x?}");
 }
