@@ -111,7 +111,7 @@ impl Records {
     pub fn find(&self, cell: &Cell, method: &str, metric: &str) -> Option<&Record> {
         self.0.iter().find(|r| {
             r.experiment == cell.experiment
-                && r.mesh == cell.mesh
+                && (&r.mesh, r.triangles) == (&cell.mesh, cell.triangles)
                 && r.tool == cell.tool
                 && r.method == method
                 && r.metric == metric
@@ -149,5 +149,22 @@ impl Records {
             }
         }
         methods
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Cell, Record, Records};
+
+    /// A brain of each size has its own.
+    #[test]
+    fn a_record_is_of_its_own_mesh() {
+        let cells = [5_000, 50_000].map(|triangles| Cell::new("embedded", "brain", triangles, ""));
+        let record = |cell: &Cell| Record::number(cell, "", "nodes", cell.triangles as f64, "");
+        let records = Records(cells.iter().map(record).collect());
+        for cell in &cells {
+            let found = records.find(cell, "", "nodes").map(|record| record.mean);
+            assert_eq!(found, Some(cell.triangles as f64));
+        }
     }
 }
