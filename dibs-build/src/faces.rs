@@ -98,6 +98,7 @@ impl Faces {
 #[cfg(test)]
 mod tests {
     use super::first_without_face;
+    use fastrand::Rng;
 
     /// The vertex 3 has two faces: both quads have the corners 0, 1 and 2.
     const TWO_QUADS: [[u32; 4]; 2] = [[0, 1, 2, 3], [0, 1, 2, 4]];
@@ -131,6 +132,45 @@ mod tests {
         // Seven places, of which the last triangle's are full.
         assert_eq!(misses(&[&taken[..], &[[0, 1, 3]]].concat(), &chain), None);
         assert_eq!(misses(&[&taken[..], &[[0, 1, 3], [0, 2, 3]]].concat(), &chain), Some(7));
+    }
+
+    /// Small faces and triangles at random, against every way to give them.
+    #[test]
+    fn what_fits_in_some_way_is_taken() {
+        fn fits(triangles: &[[u32; 3]], faces: &[Vec<u32>], room: &mut [usize]) -> bool {
+            let Some(([a, b, c], rest)) = triangles.split_first() else { return true };
+            (0..faces.len()).any(|face| {
+                let has = [a, b, c].iter().all(|corner| faces[face].contains(corner));
+                if !has || room[face] == 0 {
+                    return false;
+                }
+                room[face] -= 1;
+                let is_fit = fits(rest, faces, room);
+                room[face] += 1;
+                is_fit
+            })
+        }
+        let mut rng = Rng::with_seed(7);
+        let mut corners = |count: usize| rng.choose_multiple(0..6_u32, count);
+        let mut taken = [0; 2];
+        for _ in 0..2_000 {
+            let faces: Vec<Vec<u32>> = (0..5).map(|face| corners(3 + face % 3)).collect();
+            let mut triangles = Vec::new();
+            let mut room: Vec<usize> = faces.iter().map(|face| face.len() - 2).collect();
+            for _ in 0..9 {
+                let three = corners(3);
+                triangles.push([three[0], three[1], three[2]]);
+                let missing = triangles.len() - 1;
+                let found = first_without_face(&triangles, 6, &faces);
+                let is_fit = fits(&triangles, &faces, &mut room);
+                assert_eq!(found, (!is_fit).then_some(missing), "{triangles:?} of {faces:?}");
+                taken[usize::from(is_fit)] += 1;
+                if !is_fit {
+                    triangles.pop();
+                }
+            }
+        }
+        assert!(taken.iter().all(|&count| count > 1_000), "{taken:?}");
     }
 
     #[test]
