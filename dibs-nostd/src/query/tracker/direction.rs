@@ -4,10 +4,13 @@
 //! turn to and fro. So an answer keeps the last tick's triangle while that may be the closest, as far as the accuracy tells.
 //! The direction turns once another triangle is certainly closer.
 
+use glam::Vec3;
+
 use super::Tracker;
 use super::kept::DIRECTED;
 use crate::math::sqrt::sqrt;
 use crate::query::memory::separation::Certain;
+use crate::query::plane::least;
 use crate::query::{Budget, Options, Proximity, Side};
 use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
@@ -65,12 +68,25 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if row == other || !tree.is_closed() || !is_possible || left < Budget::TRIANGLE {
             return Ok(());
         }
-        found.triangle_tests += 1;
         let rows = tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
         let position = |row| vertices.position(row).ok_or(QueryError::Corrupt { row });
         let [a, b, c] = rows;
         let corners = [position(a)?, position(b)?, position(c)?];
         let at = tool.axis_point(found.axis_parameter);
+        let closest = sqrt(at.distance_squared(found.point_on_surface));
+        let tie = 2.0 * (found.accuracy + vertices.position_error());
+        // A plane across the last pair rejects most triangles that do not tie.
+        let (from, across, span) = if is_outside {
+            (tool.axis_start(), -last.direction, tool.axis_span())
+        } else {
+            (at, last.direction, Vec3::ZERO)
+        };
+        let end = across.dot(span);
+        let foremost = if end > 0.0 { end } else { 0.0 };
+        if least(corners.map(|corner| across.dot(corner - from))) - foremost > closest + 2.0 * tie {
+            return Ok(());
+        }
+        found.triangle_tests += 1;
         let pair = if is_outside {
             tool.closest_on_triangle(&corners, f32::INFINITY)
         } else {
@@ -78,9 +94,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         };
         let pair = pair.ok_or(QueryError::Position { vertex: a })?;
         let towards = pair.on_axis - pair.on_surface;
-        let (length, closest) =
-            (sqrt(towards.length_squared()), sqrt(at.distance_squared(found.point_on_surface)));
-        let tie = 2.0 * (found.accuracy + vertices.position_error());
+        let length = sqrt(towards.length_squared());
         if !(length > DIRECTED * found.accuracy && length <= closest + tie) {
             return Ok(());
         }
