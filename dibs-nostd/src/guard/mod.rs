@@ -34,6 +34,8 @@
 mod answer;
 mod bus;
 mod limits;
+mod pose_gate;
+mod posed;
 mod rows;
 mod surface;
 mod tick;
@@ -41,6 +43,7 @@ mod tick;
 pub use answer::{Answer, Searched};
 pub use bus::Bus;
 pub use limits::GuardLimits;
+pub use posed::Posed;
 /// The kinds of rows, for [`Bus`], [`Guard`] and [`Surface`].
 #[doc(hidden)]
 pub use rows::{Rows, Vertices};
