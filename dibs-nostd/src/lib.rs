@@ -110,6 +110,8 @@ pub use surface::{
     OutOfTableError, PublishError, QuantisedVertices, SplitError, Step, SurfaceBlend, Ticks,
     VertexTable,
 };
+#[cfg(feature = "bus")]
+pub use surface::{PoseError, RigidPose};
 #[doc(hidden)]
 pub use tool::{ACCURACY, MAX_COORDINATE};
 pub use tool::{AxisPair, Capsule, Sphere, Tool, ToolError};

@@ -22,6 +22,8 @@ pub mod modal;
 pub mod motions;
 pub mod oracle;
 #[cfg(feature = "builder")]
+pub mod posed;
+#[cfg(feature = "builder")]
 pub mod poses;
 #[cfg(feature = "builder")]
 pub mod side_poses;

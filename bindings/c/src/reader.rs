@@ -169,7 +169,7 @@ pub extern "C" fn dibs_reader_link(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (link, reader) = (link.check()?, reader.open()?);
-        link.set(reader.surface.notes.link.read(Millis(now)).into());
+        link.set(reader.surface.notes.link().read(Millis(now)).into());
         Ok(())
     })
 }

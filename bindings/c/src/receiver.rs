@@ -48,7 +48,7 @@ impl Kind for dibs_receiver {
 impl dibs_receiver {
     /// Tells the reader how the bus is.
     fn note(&self) {
-        self.surface.notes.link.set(&self.assembler.health());
+        self.surface.notes.link().set(&self.assembler.health());
     }
 
     /// The end of a packet.

@@ -59,7 +59,7 @@ struct Pair<'m, I: Index, R: Rows> {
     guard: guard::Guard<'m, 'm, I, STACK, OPENED, R>,
 }
 
-impl<'m, I: Index, R: Rows> Pair<'m, I, R> {
+impl<'m, I: Index, R: Rows<Poses = ()>> Pair<'m, I, R> {
     fn new(
         memory: &'m Memory,
         tree: &dibs_nostd::Tree<'m, I>,

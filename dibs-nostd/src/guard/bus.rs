@@ -1,15 +1,15 @@
 //! The bus's end: bytes in, published frames and statuses out.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
 use super::surface::Notes;
-use super::{GuardLimits, Rows, Vertices};
+use super::{GuardLimits, Posed, Rows, Vertices};
 use crate::surface::FrameView;
 use crate::tree::VertexOrder;
 use crate::wire::{Counters, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use crate::{
-    Advance, Assembler, Error, FrameWriter, Index, Millis, Progress, ReceiveError, Scrub, Tree,
-    TreeBytes,
+    Advance, Assembler, Error, FrameWriter, Index, Millis, Progress, ReceiveError, RigidPose,
+    Scrub, Tree, TreeBytes,
 };
 
 /// Largest packet on a byte stream; a network's packets can be larger.
@@ -24,7 +24,7 @@ const INTERVAL: Millis = Millis(100);
 /// Bytes of the tree that an idle slice checks for each unit of its work.
 const SCRUBBED: u32 = 2;
 
-type Receiver<'s, 't, I, M, R> = Assembler<'s, <R as Rows>::Gate<'t, I>, M>;
+type Receiver<'s, 't, I, M, R> = Assembler<'s, <R as Rows>::Gate<'s, 't, I>, M>;
 
 /// The bus's end of a [`Surface`](super::Surface): it takes packets, checks complete frames in slices, publishes them,
 /// watches the tree's bytes, and makes the statuses that go back.
@@ -33,7 +33,7 @@ type Receiver<'s, 't, I, M, R> = Assembler<'s, <R as Rows>::Gate<'t, I>, M>;
 /// control tick's priority. RAM: less than 3 kB.
 #[derive(Debug)]
 pub struct Bus<'s, 't, I: Index, M: Mac = NoMac, R: Rows = Vertices> {
-    notes: &'s Notes,
+    notes: &'s Notes<R::Poses>,
     deframer: Deframer<MTU>,
     assembler: Receiver<'s, 't, I, M, R>,
     /// The mesh's numbers of the rows, by which a frame of this process is read.
@@ -59,14 +59,14 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
     #[doc(hidden)]
     #[inline(always)]
     pub fn new(
-        notes: &'s Notes,
+        notes: &'s Notes<R::Poses>,
         writer: FrameWriter<'s>,
         (tree, bytes, rows): (&Tree<'t, I>, TreeBytes<'t, I>, &R::Of<'t>),
         limits: &GuardLimits,
         mac: M,
     ) -> Result<Self, Error> {
         let limits = limits.surface::<I, R>(tree, rows)?;
-        let gate = R::gate(tree, rows, limits)?;
+        let gate = R::gate(tree, rows, limits, &notes.poses)?;
         Ok(Self {
             notes,
             deframer: Deframer::new(),
@@ -141,7 +141,7 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
 
     fn note(&mut self, outcome: Option<Progress>) {
         self.has_news |= outcome == Some(Progress::Hello);
-        self.notes.link.set(&self.assembler.health());
+        self.notes.of_all.link.set(&self.assembler.health());
     }
 
     /// Does a slice of the checks: at most `work` rows and triangles of the frame that arrives, and publishes it once
@@ -157,7 +157,7 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
     #[inline(never)]
     pub fn work(&mut self, work: u32) -> Result<Advance, ReceiveError> {
         let outcome = self.assembler.advance(work);
-        self.notes.link.set(&self.assembler.health());
+        self.notes.of_all.link.set(&self.assembler.health());
         match outcome {
             Ok(Advance::Pending | Advance::Held { .. }) => (),
             Ok(Advance::Idle) => self.check_tree(work),
@@ -169,7 +169,7 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
     fn check_tree(&mut self, work: u32) {
         let bytes = work.saturating_mul(SCRUBBED) as usize;
         if self.scrub.step(bytes).is_err() {
-            self.notes.set_tree_corrupt();
+            self.notes.of_all.set_tree_corrupt();
         }
     }
 
@@ -184,7 +184,7 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
             return None;
         }
         (self.reported, self.has_news) = (now, false);
-        let status = self.assembler.status(now, self.notes.safety());
+        let status = self.assembler.status(now, self.notes.of_all.safety());
         let (counters, mac) = (self.assembler.counters(), self.assembler.mac());
         let mesh_id = self.assembler.mesh_id();
         Some(encode_status(mesh_id, &status, counters, mac, packet))
@@ -221,5 +221,35 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
     /// Registers the surface anew, as [`Assembler::register`] does: only an operator decides that.
     pub const fn register(&mut self) {
         self.assembler.register();
+    }
+}
+
+impl<I: Index, M: Mac, R: Rows<Poses = ()>> Bus<'_, '_, I, M, Posed<R>> {
+    /// The same as [`frame`](Self::frame), with the mesh as a whole elsewhere: a position `p` is at `rotation p + shift`.
+    /// Frames without a pose have it where the mesh's own frame is.
+    ///
+    /// # Errors
+    /// Also [`ReceiveError::Pose`] for numbers that are no [`RigidPose`].
+    pub fn frame_at<P: Copy + Into<Vec3>>(
+        &mut self,
+        positions: &[P],
+        (rotation, shift): (Quat, Vec3),
+        captured: Millis,
+        now: Millis,
+    ) -> Result<Progress, ReceiveError> {
+        match RigidPose::new(rotation, shift) {
+            Ok(pose) => {
+                self.assembler.gate_mut().announce(Some(pose));
+                let outcome = self.frame(positions, captured, now);
+                // One that was refused is that of no other frame.
+                self.assembler.gate_mut().announce(None);
+                outcome
+            }
+            Err(error) => {
+                let refused = self.assembler.refuse_frame(ReceiveError::Pose(error), now);
+                self.note(None);
+                Err(refused)
+            }
+        }
     }
 }

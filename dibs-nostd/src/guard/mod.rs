@@ -36,6 +36,8 @@ mod bus;
 mod limits;
 #[cfg(feature = "embedded-io")]
 mod line;
+mod pose_gate;
+mod posed;
 mod rows;
 mod surface;
 mod tick;
@@ -43,6 +45,7 @@ mod tick;
 pub use answer::{Answer, Searched};
 pub use bus::Bus;
 pub use limits::GuardLimits;
+pub use posed::Posed;
 /// The kinds of rows, for [`Bus`], [`Guard`] and [`Surface`].
 #[doc(hidden)]
 pub use rows::{Rows, Vertices};

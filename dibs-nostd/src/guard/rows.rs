@@ -2,9 +2,13 @@
 
 use glam::Vec3;
 
+use super::posed::Placed;
 use crate::surface::FrameView;
 use crate::tree::VertexOrder;
-use crate::{Error, Gate, Index, MovingSurface, StretchMonitor, SurfaceBlend, SurfaceLimits, Tree};
+use crate::{
+    Error, FrameGuard, Gate, Index, MovingSurface, StretchMonitor, SurfaceBlend, SurfaceLimits,
+    Tree,
+};
 
 /// Rows between the last two frames, or beyond.
 pub(super) type Blend<'f> = SurfaceBlend<'f, FrameView<'f>, FrameView<'f>>;
@@ -15,11 +19,13 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     /// What a tree says of its rows.
     type Of<'t>: Copy + core::fmt::Debug;
     /// The check of a frame.
-    type Gate<'t, I: Index>: Gate + core::fmt::Debug;
+    type Gate<'s, 't, I: Index>: Gate + core::fmt::Debug;
     /// The surface that rows make.
     type Surface<'f>: MovingSurface;
     /// Room for it, where the rows are not the surface.
     type Room<'f>: Default;
+    /// What the two ends share of frames besides their rows.
+    type Poses: Shared;
 
     /// Reads a tree.
     #[doc(hidden)]
@@ -37,13 +43,39 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     #[doc(hidden)]
     fn order<'t, I: Index>(tree: &Tree<'t, I>, of: &Self::Of<'t>) -> VertexOrder<'t, I>;
 
+    /// By how many times as far as a row a vertex may be from a point, and may move.
+    #[doc(hidden)]
+    fn amplification(_: &Self::Of<'_>) -> f32 {
+        1.0
+    }
+
     /// The check of frames and of their extrapolations.
     #[doc(hidden)]
-    fn gate<'t, I: Index>(
+    fn gate<'s, 't, I: Index>(
         tree: &Tree<'t, I>,
         of: &Self::Of<'t>,
         limits: SurfaceLimits,
-    ) -> Result<Self::Gate<'t, I>, Error>;
+        poses: &'s Self::Poses,
+    ) -> Result<Self::Gate<'s, 't, I>, Error>;
+
+    /// The rows now.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn now<'f>(_: &Self::Of<'_>, _: &Self::Poses, published: &'f FrameGuard<'f>) -> Blend<'f> {
+        published.extrapolated()
+    }
+
+    /// Where they are, where frames say that.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn placed(
+        _: &Self::Of<'_>,
+        _: &Self::Poses,
+        _: &FrameGuard<'_>,
+        _: &Blend<'_>,
+    ) -> Option<Placed> {
+        None
+    }
 
     /// The surface that rows make.
     #[doc(hidden)]
@@ -58,7 +90,18 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     fn velocity(of: &Self::Of<'_>, rows: &Blend<'_>, corners: [u32; 3], weights: [f32; 3]) -> Vec3;
 }
 
-mod sealed {
+/// What the two ends share of frames besides their rows.
+#[doc(hidden)]
+pub trait Shared: core::fmt::Debug + 'static {
+    /// That of no frame.
+    const NEW: Self;
+}
+
+impl Shared for () {
+    const NEW: Self = ();
+}
+
+pub(super) mod sealed {
     pub trait Sealed {}
 
     impl Sealed for super::Vertices {}
@@ -73,9 +116,10 @@ pub struct Vertices;
 
 impl Rows for Vertices {
     type Of<'t> = ();
-    type Gate<'t, I: Index> = StretchMonitor<'t, I, 2>;
+    type Gate<'s, 't, I: Index> = StretchMonitor<'t, I, 2>;
     type Surface<'f> = Blend<'f>;
     type Room<'f> = ();
+    type Poses = ();
 
     #[inline(always)]
     fn of<'t, I: Index>(_: &Tree<'t, I>) -> Result<(), Error> {
@@ -102,6 +146,7 @@ impl Rows for Vertices {
         tree: &Tree<'t, I>,
         (): &(),
         limits: SurfaceLimits,
+        (): &(),
     ) -> Result<StretchMonitor<'t, I, 2>, Error> {
         Ok(StretchMonitor::continuous(tree)?.limits(limits))
     }
@@ -125,9 +170,10 @@ impl Rows for Vertices {
 #[cfg(feature = "nodes")]
 impl Rows for crate::nodes::Nodes<'static> {
     type Of<'t> = crate::nodes::Nodes<'t>;
-    type Gate<'t, I: Index> = crate::nodes::NodeMonitor<'t, 2>;
+    type Gate<'s, 't, I: Index> = crate::nodes::NodeMonitor<'t, 2>;
     type Surface<'f> = crate::nodes::EmbeddedSurface<'f, 'f, Blend<'f>>;
     type Room<'f> = Option<Self::Surface<'f>>;
+    type Poses = ();
 
     fn of<'t, I: Index>(tree: &Tree<'t, I>) -> Result<Self::Of<'t>, Error> {
         Ok(crate::nodes::Nodes::of(tree)?)
@@ -145,11 +191,16 @@ impl Rows for crate::nodes::Nodes<'static> {
         VertexOrder::of_rows(nodes.count())
     }
 
-    fn gate<'t, I: Index>(
+    fn amplification(nodes: &Self::Of<'_>) -> f32 {
+        nodes.amplification()
+    }
+
+    fn gate<'s, 't, I: Index>(
         _: &Tree<'t, I>,
         nodes: &Self::Of<'t>,
         limits: SurfaceLimits,
-    ) -> Result<Self::Gate<'t, I>, Error> {
+        (): &'s (),
+    ) -> Result<Self::Gate<'s, 't, I>, Error> {
         Ok(crate::nodes::NodeMonitor::continuous(nodes).limits(limits))
     }
 

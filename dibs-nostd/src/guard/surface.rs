@@ -3,6 +3,7 @@
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
+use super::rows::Shared;
 use super::{Bus, Guard, GuardLimits, Rows, Vertices};
 use crate::failsafe::{LinkStatus, State};
 use crate::wire::{Mac, NoMac};
@@ -15,9 +16,9 @@ use crate::{Error, Frames, Index, QueryError, TreeBytes};
 ///
 /// Neither end waits for the other. RAM: 36 bytes a row, and less than 400.
 #[derive(Debug)]
-pub struct Surface<const N: usize, R = Vertices> {
+pub struct Surface<const N: usize, R: Rows = Vertices> {
     frames: Frames<N, 3>,
-    notes: Notes,
+    notes: Notes<R::Poses>,
     rows: PhantomData<R>,
 }
 
@@ -102,7 +103,35 @@ type Ends<'s, 't, I, M, R, const STACK: usize, const OPENED: usize, const RANGE:
 /// [`Buffers`](crate::Buffers).
 #[doc(hidden)]
 #[derive(Debug)]
-pub struct Notes {
+pub struct Notes<P = ()> {
+    pub(super) of_all: Common,
+    /// Of frames besides their rows.
+    pub(super) poses: P,
+}
+
+impl<P: Shared> Notes<P> {
+    /// Nothing is known yet.
+    #[expect(clippy::new_without_default, reason = "as its surface")]
+    #[must_use]
+    pub const fn new() -> Self {
+        let of_all = Common {
+            link: LinkStatus::new(),
+            safety: AtomicU32::new(0),
+            is_tree_corrupt: AtomicBool::new(false),
+        };
+        Self { of_all, poses: P::NEW }
+    }
+
+    /// The health of the bus.
+    #[must_use]
+    pub const fn link(&self) -> &LinkStatus {
+        &self.of_all.link
+    }
+}
+
+/// Those of frames of any kind.
+#[derive(Debug)]
+pub(super) struct Common {
     /// The health of the bus.
     pub link: LinkStatus,
     /// As [`Status::safety`](crate::wire::Status::safety).
@@ -111,31 +140,20 @@ pub struct Notes {
     is_tree_corrupt: AtomicBool,
 }
 
-impl Notes {
-    /// Nothing is known yet.
-    #[expect(clippy::new_without_default, reason = "as its surface")]
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            link: LinkStatus::new(),
-            safety: AtomicU32::new(0),
-            is_tree_corrupt: AtomicBool::new(false),
-        }
-    }
-
-    pub(super) fn safety(&self) -> u8 {
+impl Common {
+    pub fn safety(&self) -> u8 {
         self.safety.load(Ordering::Relaxed) as u8
     }
 
-    pub(super) fn set_state(&self, state: State) {
+    pub fn set_state(&self, state: State) {
         self.safety.store(state as u32 + 1, Ordering::Relaxed);
     }
 
-    pub(super) fn is_tree_corrupt(&self) -> bool {
+    pub fn is_tree_corrupt(&self) -> bool {
         self.is_tree_corrupt.load(Ordering::Relaxed)
     }
 
-    pub(super) fn set_tree_corrupt(&self) {
+    pub fn set_tree_corrupt(&self) {
         self.is_tree_corrupt.store(true, Ordering::Relaxed);
     }
 }

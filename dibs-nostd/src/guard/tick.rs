@@ -2,8 +2,9 @@
 
 use glam::Vec3;
 
+use super::posed::Placed;
 use super::rows::Blend;
-use super::surface::Notes;
+use super::surface::{Common, Notes};
 use super::{Answer, GuardLimits, Rows, Searched, Vertices};
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation, State, Verdict};
 use crate::filter::{Admitted, Filter, FilterError, Motion, Uncertainty};
@@ -27,7 +28,7 @@ pub struct Guard<
     R: Rows = Vertices,
     const RANGE: usize = 0,
 > {
-    notes: &'s Notes,
+    notes: &'s Notes<R::Poses>,
     reader: FrameReader<'s>,
     tree: TreeBytes<'t, I>,
     tracker: Tracker<'t, I, STACK, OPENED, RANGE>,
@@ -75,7 +76,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     #[doc(hidden)]
     #[inline(always)]
     pub fn new(
-        notes: &'s Notes,
+        notes: &'s Notes<R::Poses>,
         reader: FrameReader<'s>,
         (tree, bytes, rows): (&Tree<'t, I>, TreeBytes<'t, I>, R::Of<'t>),
         limits: &GuardLimits,
@@ -105,8 +106,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         self.on_latest(
             tool,
             now,
-            |tracker, surface, _, options| tracker.closest(surface, tool, options),
-            |_, _, _| (),
+            |tracker, surface, tool, _, options| tracker.closest(surface, tool, options),
+            |_, _, _, _| (),
         )
         .0
     }
@@ -118,6 +119,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     /// for others each tick searches anew. The list is empty where there is no surface, or the query failed. Its
     /// [accuracy](Contacts::accuracy) covers what the pair's does.
     ///
+    /// Not for frames with poses yet.
+    ///
     /// Cost: the budget at most, about a thousand instructions, and some hundred for each contact.
     pub fn contacts<T: Tool, const N: usize, const NEAR: usize>(
         &mut self,
@@ -125,17 +128,20 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         margin: f32,
         now: Millis,
         contacts: &mut Contacts<N, NEAR>,
-    ) -> Answer {
+    ) -> Answer
+    where
+        R: Rows<Poses = ()>,
+    {
         contacts.clear();
         let (answer, _) = self.on_latest(
             tool,
             now,
-            |tracker, surface, flow, options| {
+            |tracker, surface, tool, flow, options| {
                 let tracked = tracker.contacts(surface, tool, margin, options, contacts)?;
                 contacts.set_velocities(|corners, weights| Ok(flow.at(corners, weights)))?;
                 Ok(tracked)
             },
-            |_, _, _| (),
+            |_, _, _, _| (),
         );
         contacts.widen(answer.trust.margin);
         answer
@@ -160,14 +166,28 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         let (answer, admitted) = self.on_latest(
             tool,
             now,
-            |tracker, surface, _, options| tracker.closest(surface, tool, options),
-            |tracker, surface, trust| {
+            |tracker, surface, tool, _, options| tracker.closest(surface, tool, options),
+            |tracker, surface, placed, trust| {
                 if trust.state == State::Safe {
                     let cause = trust.cause.unwrap_or(Unavailable::NoSurface);
                     return Err(FilterError::Untrusted(cause));
                 }
                 let tissue = Uncertainty::new(speed).error(trust.margin);
-                filter.admit(&mut [(tracker, surface, tool)], command, period, &tissue, &[])
+                let Some(placed) = placed else {
+                    return filter.admit(
+                        &mut [(tracker, surface, tool)],
+                        command,
+                        period,
+                        &tissue,
+                        &[],
+                    );
+                };
+                // The surface's own motion is that in the world, so the pose stands still for the period.
+                let (own, motion) = (placed.tool(tool), placed.motion(command));
+                let tissue = tissue.error(placed.error(tool));
+                let pairs = &mut [(tracker, surface, &own)];
+                let admitted = filter.admit(pairs, &motion, period, &tissue, &[])?;
+                Ok(placed.admitted(admitted, command))
             },
         );
         let none = Err(FilterError::Untrusted(Unavailable::NoSurface));
@@ -183,23 +203,42 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         search: impl FnOnce(
             &mut Tracker<'t, I, STACK, OPENED, RANGE>,
             &R::Surface<'_>,
+            &T,
             &Flow<'_, 't, R>,
             &Options,
         ) -> Result<TrackerAnswer, QueryError>,
-        then: impl FnOnce(&mut Tracker<'t, I, STACK, OPENED, RANGE>, &R::Surface<'_>, &Verdict) -> A,
+        then: impl FnOnce(
+            &mut Tracker<'t, I, STACK, OPENED, RANGE>,
+            &R::Surface<'_>,
+            Option<&Placed>,
+            &Verdict,
+        ) -> A,
     ) -> (Answer, Option<A>) {
         let Self { notes, reader, tree, tracker, failsafe, options, rate, before, rows, .. } = self;
         let latest = reader.latest(now);
         let frame = latest.frame();
         let published = latest.of_any_age();
-        let blend = published.as_ref().map(|published| published.extrapolated());
+        let blend = published.as_ref().map(|published| R::now(rows, &notes.poses, published));
+        let placed = match (&published, &blend) {
+            (Ok(published), Ok(blend)) => R::placed(rows, &notes.poses, published, blend),
+            _ => None,
+        };
+        let placed = placed.as_ref();
         let room = &mut R::Room::default();
         let surface = blend.as_ref().map(|blend| (blend, R::surface(rows, blend, room)));
+        let moved;
+        let own = match placed {
+            Some(placed) => {
+                moved = placed.tool(tool);
+                &moved
+            }
+            None => tool,
+        };
         // The fail-safe machine decides how old a surface may be.
         let (searched, tracked) = match (frame, surface) {
             (Some(frame), Ok((blend, surface))) => {
                 let flow = Flow { rows, blend };
-                let tracked = search(tracker, surface, &flow, options);
+                let tracked = search(tracker, surface, own, &flow, options);
                 let searched = Searched {
                     frame,
                     before: blend.before().epoch().unwrap_or(frame.epoch),
@@ -212,7 +251,10 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
                         flow.at(closest.corners, closest.barycentric)
                     }),
                 };
-                (Some(searched), tracked.map_err(Unavailable::Query))
+                match placed {
+                    Some(placed) => placed.led_back(tool, tracked, searched),
+                    None => (Some(searched), tracked.map_err(Unavailable::Query)),
+                }
             }
             (_, Err(unavailable)) => (None, Err(**unavailable)),
             (None, Ok(_)) => (None, Err(Unavailable::NoSurface)),
@@ -224,10 +266,14 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
             Some(before) => pose.velocity(&before, *rate, along) - flow,
             None => Vec3::ZERO,
         };
-        let is_corrupt = notes.is_tree_corrupt() || tracker.tree().check(tree.bytes()).is_err();
-        let answer = judge(notes, failsafe, is_corrupt, (frame, searched, tracked), velocity, now);
+        let is_corrupt =
+            notes.of_all.is_tree_corrupt() || tracker.tree().check(tree.bytes()).is_err();
+        let answer =
+            judge(&notes.of_all, failsafe, is_corrupt, (frame, searched, tracked), velocity, now);
         let after = match surface {
-            Ok((_, surface)) if searched.is_some() => Some(then(tracker, surface, &answer.trust)),
+            Ok((_, surface)) if searched.is_some() => {
+                Some(then(tracker, surface, placed, &answer.trust))
+            }
             _ => None,
         };
         (answer, after)
@@ -240,9 +286,10 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         self.before = None;
         let Self { notes, reader, tree, tracker, failsafe, .. } = self;
         let frame = reader.latest(now).frame();
-        let is_corrupt = notes.is_tree_corrupt() || tracker.tree().check(tree.bytes()).is_err();
+        let is_corrupt =
+            notes.of_all.is_tree_corrupt() || tracker.tree().check(tree.bytes()).is_err();
         let found = (frame, None, Err(Unavailable::NoPose));
-        judge(notes, failsafe, is_corrupt, found, Vec3::NAN, now)
+        judge(&notes.of_all, failsafe, is_corrupt, found, Vec3::NAN, now)
     }
 
     /// An operator's acknowledgement, which ends the safe state once every input is good again.
@@ -278,7 +325,7 @@ type Found = (Option<FrameAge>, Option<Searched>, Result<TrackerAnswer, Unavaila
 
 /// The tick's answer, by the trust in what was found.
 fn judge(
-    notes: &Notes,
+    notes: &Common,
     failsafe: &mut FailSafe,
     is_tree_corrupt: bool,
     (frame, searched, tracked): Found,

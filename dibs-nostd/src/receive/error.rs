@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::StretchError;
-use crate::surface::Millis;
+use crate::surface::{Millis, PoseError};
 use crate::tree::SurfaceFacts;
 use crate::wire::{Event, PacketError};
 
@@ -128,6 +128,8 @@ pub enum ReceiveError {
         /// Of the packets that came.
         computed: u32,
     },
+    /// The frame's rotation and shift are no rigid pose.
+    Pose(PoseError),
     /// The gate refused the surface. The frame is abandoned.
     Stretch(StretchError),
 }
@@ -146,7 +148,7 @@ impl ReceiveError {
                 Event::Damaged
             }
             Self::Packet(PacketError::Version { .. }) => Event::Version,
-            Self::Packet(_) => Event::Malformed,
+            Self::Packet(_) | Self::Pose(PoseError::NoRotation { .. }) => Event::Malformed,
             Self::WrongMesh { .. } | Self::OtherSurface { .. } => Event::WrongMesh,
             Self::Forged { .. } => Event::Forged,
             Self::Stale { .. } | Self::Earlier { .. } | Self::TooOld => Event::Stale,
@@ -162,8 +164,8 @@ impl ReceiveError {
             Self::OutOfRange { .. } => Event::OutOfRange,
             Self::Order { .. } => Event::Order,
             Self::Gaps { .. } => Event::Gaps,
-            Self::NotFinite { .. } => Event::NotFinite,
-            Self::TooFar { .. } => Event::TooFar,
+            Self::NotFinite { .. } | Self::Pose(PoseError::NotFinite) => Event::NotFinite,
+            Self::TooFar { .. } | Self::Pose(PoseError::TooFar { .. }) => Event::TooFar,
             Self::Digest { .. } => Event::Digest,
             Self::Throttled { .. } => Event::Throttled,
             Self::Stretch(StretchError::Shrunk { .. } | StretchError::ElementsShrunk { .. }) => {
@@ -241,6 +243,7 @@ impl fmt::Display for ReceiveError {
                     "the commit states digest {stated:#010x}, the packets have {computed:#010x}"
                 )
             }
+            Self::Pose(error) => error.fmt(f),
             Self::Stretch(error) => error.fmt(f),
         }
     }

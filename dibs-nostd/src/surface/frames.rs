@@ -40,7 +40,7 @@ use super::motion::MotionReading;
 use super::reader::{FrameReader, FrameView};
 
 /// State word, bits 0 and 1: number of the front buffer.
-const FRONT: u32 = 3;
+pub(super) const FRONT: u32 = 3;
 /// State word, bit 2: a read is in progress.
 pub(super) const READING: u32 = 4;
 /// State word, bit 3: the front buffer holds a frame.

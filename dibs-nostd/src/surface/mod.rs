@@ -8,6 +8,9 @@ mod latest;
 mod measured;
 pub(crate) mod motion;
 mod moving;
+#[cfg(feature = "bus")]
+#[cfg_attr(not(feature = "control"), allow(dead_code, reason = "only a guard moves a tool"))]
+mod pose;
 mod prediction;
 mod reader;
 mod vertices;
@@ -25,9 +28,13 @@ pub use latest::{FrameAge, LatestSurface};
 pub(crate) use measured::region_sigma;
 pub use measured::{Coverage, MeasuredStretch, REGIONS};
 pub use motion::{MotionReading, MotionUnit, MovingSurface, MovingTable, Odometer};
-#[cfg(feature = "modes")]
+#[cfg(any(feature = "modes", all(feature = "bus", feature = "control")))]
 pub(crate) use moving::{FARTHEST, clamped, grown};
 pub use moving::{Step, SurfaceBlend};
+#[cfg(all(feature = "bus", feature = "control"))]
+pub(crate) use pose::PoseStep;
+#[cfg(feature = "bus")]
+pub use pose::{PoseError, RigidPose};
 #[cfg(feature = "modes")]
 pub(crate) use prediction::Prediction;
 #[cfg(feature = "bus")]

@@ -191,6 +191,12 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
         self.before
     }
 
+    /// Steps from the earlier frame to the later a second; 0 where it stands still, or has no clock.
+    #[cfg(all(feature = "bus", feature = "control"))]
+    pub(crate) const fn rate(&self) -> f32 {
+        self.rate
+    }
+
     /// The velocity (mm/s) of a point, by vertices and their weights: that from one frame to the other; zero for a surface
     /// that is held, one of a [`Step`], and vertices outside of the table.
     #[must_use]

@@ -5,6 +5,8 @@ use glam::Vec3;
 
 use super::atomic::{AtomicU32, Ordering};
 use super::buffer::{Buffer, FrameLabel, Position, PredictionCheck};
+#[cfg(all(feature = "bus", feature = "control"))]
+use super::frames::FRONT;
 use super::frames::{Buffers, READING};
 use super::motion::{MotionReading, MovingSurface};
 use super::moving::SurfaceBlend;
@@ -142,7 +144,14 @@ impl<'f> FrameGuard<'f> {
         &self.before
     }
 
-    fn held(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
+    /// Number of the buffer of this frame: they take turns, and the first frame is in that with the number 1.
+    #[cfg(all(feature = "bus", feature = "control"))]
+    pub(crate) fn number(&self) -> u32 {
+        self.state.load(Ordering::Relaxed) & FRONT
+    }
+
+    /// This frame as it was received.
+    pub(crate) fn held(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
         SurfaceBlend::held(&self.view, self.view.motion()).lagging(self.age)
     }
 

@@ -11,6 +11,8 @@ mod exhaustive;
 mod guard;
 mod guard_contacts;
 mod guard_embedded;
+mod guard_posed;
+mod guard_posed_loop;
 mod life;
 mod line;
 mod local;

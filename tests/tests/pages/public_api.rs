@@ -11,7 +11,7 @@ use syn::{Attribute, Item, UseTree, Visibility};
 const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 /// The core crate must have fewer items than this.
-const MOST: usize = 147;
+const MOST: usize = 150;
 
 #[test]
 fn the_public_items_are_those_that_are_listed() {

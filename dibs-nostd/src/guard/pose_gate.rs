@@ -1,0 +1,188 @@
+//! The check of a frame with a pose: the rows by their own gate, and both together by the limit on speed.
+
+use core::ops::Range;
+
+use glam::Vec3;
+
+use super::posed::Poses;
+use crate::math::sqrt::sqrt;
+use crate::stretch::{Admission, Compared, FrameExtent, Gate, IncomingSurface, StretchError};
+use crate::surface::{FARTHEST, MotionUnit, PoseStep, clamped};
+use crate::tree::SurfaceFacts;
+use crate::{Millis, RigidPose, VertexTable};
+
+/// Buffers of a guard's surface.
+const BUFFERS: u32 = 3;
+
+/// The gate of rows with poses.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct PoseGate<'s, G> {
+    rows: G,
+    poses: &'s Poses,
+    centre: Vec3,
+    /// A vertex is no farther from the centre than so many times the farthest row.
+    amplification: f32,
+    /// That of the next frame that begins.
+    announced: Option<RigidPose>,
+    /// That of the frame in work, its farthest row from the centre, and the next row to be looked at.
+    pose: RigidPose,
+    farthest: (u32, f32),
+    next_row: u32,
+    /// Those published last, and one before, and the time between.
+    last: Option<RigidPose>,
+    before: Option<RigidPose>,
+    interval: Millis,
+    /// The time from the published frame to the one in work.
+    elapsed: Millis,
+    /// The buffer that the frame in work is in: they take turns, and the first frame is in the second.
+    buffer: u32,
+}
+
+impl<'s, G> PoseGate<'s, G> {
+    pub(super) fn new(rows: G, poses: &'s Poses, centre: Vec3, amplification: f32) -> Self {
+        Self {
+            rows,
+            poses,
+            centre,
+            amplification,
+            announced: None,
+            pose: RigidPose::IDENTITY,
+            farthest: (0, 0.0),
+            next_row: 0,
+            last: None,
+            before: None,
+            interval: Millis(0),
+            elapsed: Millis(0),
+            buffer: 1,
+        }
+    }
+
+    /// Announces the pose of the next frame that begins.
+    pub(super) const fn announce(&mut self, pose: Option<RigidPose>) {
+        self.announced = pose;
+    }
+
+    /// Looks for the row farthest from the centre among those that have come. Returns the work left.
+    fn look<V: VertexTable + ?Sized>(&mut self, surface: &V, ready: u32, work: u32) -> u32 {
+        let waiting = ready.saturating_sub(self.next_row);
+        let rows = if waiting < work { waiting } else { work };
+        let end = self.next_row.saturating_add(rows);
+        for row in self.next_row..end {
+            let square =
+                surface.position(row).map_or(f32::NAN, |at| at.distance_squared(self.centre));
+            // Written so that NaN is kept.
+            if !(square <= self.farthest.1) {
+                self.farthest = (row, square);
+            }
+        }
+        self.next_row = end;
+        work.saturating_sub(rows)
+    }
+
+    /// Most (mm) that a vertex of the frame in work is away from the centre.
+    fn lever(&self) -> f32 {
+        let (_, square) = self.farthest;
+        sqrt(square) * (self.amplification * (1.0 + 8.0 * f32::EPSILON))
+    }
+
+    /// The largest distance (mm) of a vertex from the extrapolation of the two poses before, at the time of this frame and
+    /// grown as [`SurfaceBlend::residual`](crate::SurfaceBlend::residual) is; NaN where that is not known.
+    fn shown(&self) -> f32 {
+        let (Some(before), Some(last)) = (&self.before, &self.last) else { return f32::NAN };
+        if self.interval == Millis(0) || self.elapsed == Millis(0) {
+            return f32::NAN;
+        }
+        let t = clamped(self.elapsed.0 as f32 / self.interval.0 as f32, FARTHEST);
+        let growth = 2.0 * t / (1.0 + t);
+        let growth = if growth > 1.0 { growth } else { 1.0 };
+        PoseStep::between(before, last, self.centre).map_or(f32::NAN, |step| {
+            step.beyond(t).step(&self.pose, self.centre, self.lever()) * growth
+        })
+    }
+}
+
+impl<G: Gate> PoseGate<'_, G> {
+    /// A vertex moves by at most its row's step in the mesh and that of the pose at where it is now, turned and shifted.
+    fn check_speed(&self, compared: Option<Compared>, elapsed: Millis) -> Result<(), StretchError> {
+        let (Some(last), Some(compared)) = (&self.last, compared) else { return Ok(()) };
+        let limit = self.rows.farthest(elapsed) * self.amplification;
+        let own = sqrt(compared.largest) * self.amplification;
+        let step = own + last.step(&self.pose, self.centre, self.lever());
+        // False for NaN.
+        if step <= limit {
+            return Ok(());
+        }
+        let (vertex, _) = self.farthest;
+        Err(StretchError::TooFast { vertex, step, limit })
+    }
+}
+
+impl<G: Gate> Gate for PoseGate<'_, G> {
+    fn begin(&mut self, changed: FrameExtent) {
+        let kept = match changed {
+            FrameExtent::Whole => None,
+            FrameExtent::Partial => self.last,
+        };
+        self.pose = self.announced.take().or(kept).unwrap_or(RigidPose::IDENTITY);
+        (self.farthest, self.next_row, self.elapsed) = ((0, 0.0), 0, Millis(0));
+        self.rows.begin(changed);
+    }
+
+    fn moved(&mut self, rows: Range<u32>) {
+        self.rows.moved(rows);
+    }
+
+    fn advance<V: VertexTable + ?Sized>(
+        &mut self,
+        arriving: IncomingSurface<'_, V>,
+        work: u32,
+    ) -> Result<Admission, StretchError> {
+        let IncomingSurface { surface, ready, before, compared } = arriving;
+        let work = self.look(surface, ready, work);
+        let admission = self.rows.advance(arriving, work)?;
+        if admission == Admission::Pending || (self.next_row as usize) < surface.len() {
+            return Ok(Admission::Pending);
+        }
+        // A registration is compared with nothing.
+        let mut shown = f32::NAN;
+        if let Some((_, elapsed)) = before {
+            self.check_speed(compared, elapsed)?;
+            self.elapsed = elapsed;
+            shown = self.shown();
+        }
+        self.poses.set(self.buffer, &self.pose, shown);
+        Ok(admission)
+    }
+
+    fn published(&mut self) {
+        self.before = self.last.replace(self.pose);
+        self.interval = self.elapsed;
+        self.buffer = if self.buffer + 1 < BUFFERS { self.buffer + 1 } else { 0 };
+        self.rows.published();
+    }
+
+    fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
+        self.rows.weight_range(mode)
+    }
+
+    fn farthest(&self, elapsed: Millis) -> f32 {
+        self.rows.farthest(elapsed)
+    }
+
+    fn motion_unit(&self) -> Option<MotionUnit> {
+        self.rows.motion_unit()
+    }
+
+    fn ahead(&self) -> Option<f32> {
+        self.rows.ahead()
+    }
+
+    fn surface_facts(&self) -> SurfaceFacts {
+        self.rows.surface_facts()
+    }
+
+    fn position_error(&self) -> f32 {
+        self.rows.position_error()
+    }
+}

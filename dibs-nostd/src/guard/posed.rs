@@ -1,0 +1,283 @@
+//! Frames with a rigid pose each: the tool is moved by its inverse, and nothing below knows.
+
+use core::marker::PhantomData;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use glam::{Quat, Vec3};
+
+use super::pose_gate::PoseGate;
+use super::rows::{Blend, Rows, Shared, sealed};
+use super::{Searched, Vertices};
+use crate::filter::{Admitted, Motion, Reason};
+use crate::surface::{PoseStep, grown};
+use crate::tree::VertexOrder;
+use crate::{
+    Error, FrameGuard, Index, Proximity, QueryError, RigidPose, SurfaceLimits, Tool, TrackerAnswer,
+    Tree, Unavailable,
+};
+
+/// Frames of rows `R`, each with a rigid pose: where the mesh is as a whole, say by a tracker of the patient, beside what
+/// its deformation is. [`Bus::frame_at`](super::Bus::frame_at) takes them; tools, answers and commands are in the world.
+///
+/// A frame without a pose is where the mesh's own frame is; one that changes a part of another keeps its pose. The receiver
+/// refuses a frame whose vertices, with the pose, move faster than the [limit on speed](crate::SurfaceLimits::speed) allows;
+/// the [reach](crate::SurfaceLimits::reach_mm) is that of the rows alone.
+///
+/// Between frames the mesh goes on by its last step: its centre straight, turning evenly. Where a step turns by more
+/// than half a radian, the surface is held.
+///
+/// ```
+/// use dibs_build::{Builder, generate};
+/// use dibs_nostd::{Advance, Millis, Sphere, TreeBytes, glam::{Quat, Vec3}};
+/// use dibs_nostd::guard::{GuardLimits, Posed, Surface};
+///
+/// # let heart = generate::heart(320)?.mesh;
+/// # let built = Builder::new().stretch(1.5).build(&heart)?;
+/// # let tree = TreeBytes::<u16>::new(built.blob());
+/// static HEART: Surface<162, Posed> = Surface::new();
+/// let (mut bus, mut guard) = HEART.start::<_, 32, 64>(tree, GuardLimits::new(300.0, Millis(80)))?;
+///
+/// // The patient lies 500 mm away.
+/// bus.frame_at(&heart.positions, (Quat::IDENTITY, Vec3::X * 500.0), Millis(5), Millis(8))?;
+/// while bus.work(100)? == Advance::Pending {}
+/// let tool = Sphere::new(Vec3::new(580.0, 0.0, 20.0), 2.5)?;
+/// let found = guard.closest(&tool, Millis(10)).tracked?.closest;
+/// assert!(found.point_on_surface.x > 500.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Posed<R = Vertices>(PhantomData<R>);
+
+impl<R: Rows<Poses = ()>> sealed::Sealed for Posed<R> {}
+
+/// What a tree says of rows with poses.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct PosedOf<T> {
+    of: T,
+    /// The middle of the rest shape, about which the mesh turns between frames.
+    centre: Vec3,
+}
+
+impl<R: Rows<Poses = ()>> Rows for Posed<R> {
+    type Of<'t> = PosedOf<R::Of<'t>>;
+    type Gate<'s, 't, I: Index> = PoseGate<'s, R::Gate<'s, 't, I>>;
+    type Surface<'f> = R::Surface<'f>;
+    type Room<'f> = R::Room<'f>;
+    type Poses = Poses;
+
+    fn of<'t, I: Index>(tree: &Tree<'t, I>) -> Result<Self::Of<'t>, Error> {
+        let of = R::of(tree)?;
+        let rest = (0..R::count(tree, &of)).map_while(|row| R::rest(tree, &of, row));
+        let corners =
+            rest.map(|at| (at, at)).reduce(|(low, high), (at, _)| (low.min(at), high.max(at)));
+        // Any centre will do.
+        let centre = corners.map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5);
+        Ok(PosedOf { of, centre })
+    }
+
+    fn count<I: Index>(tree: &Tree<'_, I>, of: &Self::Of<'_>) -> u32 {
+        R::count(tree, &of.of)
+    }
+
+    fn rest<I: Index>(tree: &Tree<'_, I>, of: &Self::Of<'_>, row: u32) -> Option<Vec3> {
+        R::rest(tree, &of.of, row)
+    }
+
+    fn amplification(of: &Self::Of<'_>) -> f32 {
+        R::amplification(&of.of)
+    }
+
+    fn order<'t, I: Index>(tree: &Tree<'t, I>, of: &Self::Of<'t>) -> VertexOrder<'t, I> {
+        R::order(tree, &of.of)
+    }
+
+    fn gate<'s, 't, I: Index>(
+        tree: &Tree<'t, I>,
+        of: &Self::Of<'t>,
+        limits: SurfaceLimits,
+        poses: &'s Poses,
+    ) -> Result<Self::Gate<'s, 't, I>, Error> {
+        let gate = R::gate(tree, &of.of, limits, &())?;
+        Ok(PoseGate::new(gate, poses, of.centre, R::amplification(&of.of)))
+    }
+
+    fn surface<'s, 'f: 's, 't: 'f>(
+        of: &'f Self::Of<'t>,
+        rows: &'f Blend<'f>,
+        room: &'s mut Self::Room<'f>,
+    ) -> &'s Self::Surface<'f> {
+        R::surface(&of.of, rows, room)
+    }
+
+    fn velocity(of: &Self::Of<'_>, rows: &Blend<'_>, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
+        R::velocity(&of.of, rows, corners, weights)
+    }
+
+    /// Where no pose is known for later, the rows are held as well.
+    fn now<'f>(of: &Self::Of<'_>, poses: &Poses, published: &'f FrameGuard<'f>) -> Blend<'f> {
+        match poses.step(published, of.centre) {
+            Some(_) => published.extrapolated(),
+            None => published.held(),
+        }
+    }
+
+    fn placed(
+        of: &Self::Of<'_>,
+        poses: &Poses,
+        published: &FrameGuard<'_>,
+        rows: &Blend<'_>,
+    ) -> Option<Placed> {
+        Some(match poses.step(published, of.centre) {
+            Some((step, shown)) => Placed::moving(step, shown, rows),
+            None => Placed::at(poses.last(published)),
+        })
+    }
+}
+
+/// Where the surface is at a tick.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    pose: RigidPose,
+    /// The step that goes on, the part of it beyond the last frame, and steps a second.
+    step: Option<(PoseStep, f32, f32)>,
+    /// The error of the extrapolation (mm), and what it grows from.
+    error: f32,
+    shown: f32,
+}
+
+impl Placed {
+    const fn at(pose: RigidPose) -> Self {
+        Self { pose, step: None, error: 0.0, shown: 0.0 }
+    }
+
+    fn moving(step: PoseStep, shown: f32, rows: &Blend<'_>) -> Self {
+        let part = rows.t() - 1.0;
+        Self {
+            pose: step.beyond(part),
+            step: Some((step, part, rows.rate())),
+            error: grown(shown, part),
+            shown,
+        }
+    }
+
+    /// The tool as it is to the mesh.
+    pub(super) fn tool<T: Tool>(&self, tool: &T) -> T {
+        tool.with_axis(self.ends(tool))
+    }
+
+    fn ends(&self, tool: &impl Tool) -> [Vec3; 2] {
+        [tool.axis_start(), tool.axis_point(1.0)].map(|end| self.pose.apply_inverse(end))
+    }
+
+    /// Most (mm) by which a point of the tool's axis is off, beside the rows' own errors. The ends' errors bound that of
+    /// any point between.
+    pub(super) fn error(&self, tool: &impl Tool) -> f32 {
+        let rounding = self.ends(tool).map(|end| match &self.step {
+            Some((step, ..)) => step.rounding(end, &self.pose),
+            None => RigidPose::rounding(end),
+        });
+        let [start, end] = rounding;
+        (if end > start { end } else { start }) + self.error
+    }
+
+    /// What was searched and the answer of the moved tool, as they are in the world.
+    pub(super) fn led_back(
+        &self,
+        tool: &impl Tool,
+        tracked: Result<TrackerAnswer, QueryError>,
+        mut searched: Searched,
+    ) -> (Option<Searched>, Result<TrackerAnswer, Unavailable>) {
+        let error = self.error(tool);
+        searched.position_error += error;
+        searched.residual = searched.residual.map(|shown| shown + self.shown);
+        searched.velocity = self.pose.rotate(searched.velocity);
+        let tracked = tracked.map(|answer| {
+            let closest = answer.closest;
+            let on_surface = self.pose.apply(closest.point_on_surface);
+            if let Some((step, part, rate)) = self.step {
+                searched.velocity += step.velocity(part, on_surface) * rate;
+            }
+            let closest = Proximity {
+                point_on_surface: on_surface,
+                point_on_tool: self.pose.apply(closest.point_on_tool),
+                direction: self.pose.rotate(closest.direction),
+                ..closest.widened(error)
+            };
+            TrackerAnswer { closest, ..answer }
+        });
+        (Some(searched), tracked.map_err(Unavailable::Query))
+    }
+
+    /// The motion as it is to the mesh.
+    pub(super) fn motion(&self, motion: &Motion) -> Motion {
+        Motion {
+            about: self.pose.apply_inverse(motion.about),
+            translation: self.pose.rotate_inverse(motion.translation),
+            rotation: self.pose.rotate_inverse(motion.rotation),
+        }
+    }
+
+    /// The admitted motion in the world; the command where it is that.
+    pub(super) fn admitted(&self, admitted: Admitted, command: &Motion) -> Admitted {
+        let motion = match admitted.reason {
+            Reason::Commanded => *command,
+            _ => Motion {
+                about: command.about,
+                translation: self.pose.rotate(admitted.motion.translation),
+                rotation: self.pose.rotate(admitted.motion.rotation),
+            },
+        };
+        Admitted { motion, ..admitted }
+    }
+}
+
+/// The poses of the three buffers, and the error (mm) that each showed of the extrapolation before it. Their frame's hand-over
+/// is theirs: the writer stores before it publishes, and only for the buffer that nobody reads.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Poses([[AtomicU32; 8]; 3]);
+
+impl Shared for Poses {
+    const NEW: Self = Self([const { [const { AtomicU32::new(0) }; 8] }; 3]);
+}
+
+impl Poses {
+    /// Stores that of the buffer with this number.
+    pub(super) fn set(&self, buffer: u32, pose: &RigidPose, shown: f32) {
+        let ([x, y, z, w], [a, b, c]) = (pose.rotation().to_array(), pose.shift().to_array());
+        let Some(words) = self.0.get(buffer as usize) else { return };
+        for (word, value) in words.iter().zip([x, y, z, w, a, b, c, shown]) {
+            word.store(value.to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    /// The pose of the last frame.
+    fn last(&self, published: &FrameGuard<'_>) -> RigidPose {
+        let [_, (last, _)] = self.of_frames(published.number());
+        last
+    }
+
+    /// The step that goes on, and the larger of the errors that the last two frames showed; `None` where it does not go on.
+    fn step(&self, published: &FrameGuard<'_>, centre: Vec3) -> Option<(PoseStep, f32)> {
+        let [(before, earlier), (last, shown)] = self.of_frames(published.number());
+        let step = PoseStep::between(&before, &last, centre)?;
+        // The change of the motion may have been none by chance. False for NaN.
+        let shown = if earlier > shown { earlier } else { shown };
+        (shown >= 0.0).then_some((step, shown))
+    }
+
+    /// Those of the frame before and of the last one, whose buffer has this number.
+    fn of_frames(&self, last: u32) -> [(RigidPose, f32); 2] {
+        let before = if last == 0 { 2 } else { last - 1 };
+        [before, last].map(|buffer| {
+            let Some(words) = self.0.get(buffer as usize) else {
+                return (RigidPose::IDENTITY, f32::NAN);
+            };
+            let [x, y, z, w, a, b, c, shown] =
+                words.each_ref().map(|word| f32::from_bits(word.load(Ordering::Relaxed)));
+            (RigidPose::kept(Quat::from_xyzw(x, y, z, w), Vec3::new(a, b, c)), shown)
+        })
+    }
+}
