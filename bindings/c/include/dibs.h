@@ -1860,8 +1860,8 @@ typedef struct {
    */
   uint32_t heartbeat;
   /**
-   * Number of this run: the receiver ignores a run whose number is below that of one before. By default the time in
-   * tenths of a second.
+   * Number of this run of the sender. The receiver ignores packets of an earlier run, which is one with a smaller
+   * number, so a program that starts anew needs a larger one. By default the time in tenths of a second.
    */
   uint32_t session;
 } dibs_sender_settings;
