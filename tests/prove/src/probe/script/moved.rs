@@ -88,13 +88,14 @@ impl Script {
         for pair in motion.frames.windows(2).step_by(motion.frames.len().div_ceil(FRAMES)) {
             let [before, after] = [0, 1].map(|frame| built.to_rows(&pair[frame]));
             let t = 3.0 * rng.f32();
-            let between = before.iter().zip(&after).map(|(a, b)| *a + (*b - *a) * t).collect();
+            let between: Vec<Vec3> =
+                before.iter().zip(&after).map(|(a, b)| *a + (*b - *a) * t).collect();
             script.rows(&before, mesh.triangles.len() as u32);
             script.words.push(command::MOVE);
             script.positions(&after);
             script.words.push(t.to_bits());
             script.table = Table::Moving;
-            script.drawn(&built, between, queries.div_ceil(FRAMES), draw, &mut rng);
+            script.drawn(&built, &between, queries.div_ceil(FRAMES), draw, &mut rng);
         }
         script.words.push(command::END);
         script
@@ -114,11 +115,12 @@ impl Script {
         let motion = generate::beat(&at_rest);
         for frame in motion.frames.iter().step_by(motion.frames.len().div_ceil(FRAMES)) {
             let surface = nodes.surface(&frame[..]);
-            let rows = (0..tree.vertex_count()).filter_map(|row| surface.position(row)).collect();
+            let rows = 0..tree.vertex_count();
+            let rows: Vec<Vec3> = rows.filter_map(|row| surface.position(row)).collect();
             script.words.push(command::NODES);
             script.positions(frame);
             script.table = Table::Nodes;
-            script.drawn(&built, rows, queries.div_ceil(FRAMES), draw, &mut rng);
+            script.drawn(&built, &rows, queries.div_ceil(FRAMES), draw, &mut rng);
         }
         script.words.push(command::END);
         script
@@ -128,7 +130,7 @@ impl Script {
     fn drawn(
         &mut self,
         built: &BuiltTree,
-        rows: Vec<Vec3>,
+        rows: &[Vec3],
         queries: usize,
         draw: Draw,
         rng: &mut Rng,
@@ -137,9 +139,9 @@ impl Script {
         let triangles = surfaces::triangles(&tree);
         for number in 0..queries {
             let tool = if rng.bool() {
-                about(&rows, &triangles, number, rng)
+                about(rows, &triangles, number, rng)
             } else {
-                pose(&rows, &triangles, rng)
+                pose(rows, &triangles, rng)
             };
             let is_capsule = tool.start != tool.end || rng.u32(..8) == 0;
             let warm = Draw::warm(tree.triangle_count(), rng);
