@@ -23,7 +23,13 @@ struct Faces {
     given: Vec<Vec<usize>>,
     /// The face that each triangle was given to.
     face_of: Vec<Option<usize>>,
+    /// Triangles that may still be looked at in chains.
+    left: usize,
 }
+
+/// Triangles that are looked at in chains, at most so many times as there are triangles: a mesh has few faces that share three
+/// corners, and a peer must not send hours of work.
+const LOOKS: usize = 64;
 
 impl Faces {
     fn of(faces: &[Vec<u32>], vertices: usize, triangles: usize) -> Self {
@@ -43,7 +49,7 @@ impl Faces {
             }
         }
         let given = vec![Vec::new(); corners.len()];
-        Self { corners, at, given, face_of: vec![None; triangles] }
+        Self { corners, at, given, face_of: vec![None; triangles], left: LOOKS * triangles }
     }
 
     /// Faces that have these three corners, the smallest first.
@@ -66,6 +72,8 @@ impl Faces {
         let mut wanted_by: HashMap<usize, usize> = HashMap::new();
         let mut waiting = VecDeque::from([triangle]);
         while let Some(next) = waiting.pop_front() {
+            let Some(left) = self.left.checked_sub(1) else { return false };
+            self.left = left;
             for face in self.around(triangles[next]) {
                 if wanted_by.contains_key(&face) {
                     continue;

@@ -50,8 +50,6 @@ class Viewer {
     Object.assign(this, { facts, session, tick: -1, last: performance.now(), isPlaying: facts.frames > 1 || facts.path.length > 0 });
     const { extent, pose } = beside(positions);
     this.from = this.to = facts.path[0] ?? pose;
-    // A filter's admitted pose is that at the end of its tick, and its surface the tissue's: an interpolated one is late by a frame.
-    this.ahead = facts.commanded.length > 0 ? 1 / facts.rate + 1 / RATE : 0;
     this.origin = session.origin();
     this.picture = draw(session.triangles(), positions);
     this.numbers = new Numbers(facts, session);
@@ -119,8 +117,11 @@ class Viewer {
     this.from = this.to = this.facts.path[0] ?? this.to;
   }
 
+  // A filter's admitted pose is that at the end of its tick, and its surface the tissue's: an interpolated one is late by a frame.
   seconds(tick) {
-    return Math.max(tick, 0) / RATE + this.ahead;
+    const isLate = (this.controls?.value("between") ?? "1") === "1";
+    const ahead = this.facts.commanded.length > 0 ? 1 / RATE + (isLate ? 1 / this.facts.rate : 0) : 0;
+    return Math.max(tick, 0) / RATE + ahead;
   }
 
   // So many ticks, during which time goes on unless it is stopped.

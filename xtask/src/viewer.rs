@@ -158,7 +158,7 @@ fn say(what: &str) {
 
 /// Copies a file so that nobody sees a part of it.
 fn copy_whole(from: &Path, to: &Path) -> Result<()> {
-    let part = to.with_extension("part");
+    let part = to.with_extension(format!("{}.part", std::process::id()));
     fs::copy(from, &part)?;
     fs::rename(&part, to).with_context(|| format!("{}: cannot be written", to.display()))
 }

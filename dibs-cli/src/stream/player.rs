@@ -80,9 +80,6 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     pub fn run(mut self) -> Result<()> {
         self.await_challenge()?;
         let played = self.play();
-        if let Some(timing) = &mut self.outcome.timing {
-            timing.end();
-        }
         let refused = self.refused();
         let exchange = match &self.source.frames {
             Frames::Live { exchange, .. } => exchange.as_deref(),
@@ -162,6 +159,9 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             let Some(frame) = frame else { break };
             due += interval;
             self.send(&frame)?;
+        }
+        if let Some(timing) = &mut self.outcome.timing {
+            timing.end();
         }
         // Wait for the acknowledgement of frames on their way, if the receiver acknowledges any.
         let end = Instant::now();

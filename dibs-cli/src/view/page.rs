@@ -56,8 +56,9 @@ fn read(path: &Path) -> Result<String> {
 /// Makes the page in the checkout that holds this program. It appears whole or not at all.
 fn make(program: &Path, page: &Path) -> Result<()> {
     let name = page.display();
-    // The folder in which a command is run must not decide which program that is.
-    let Some(root) = program.ancestors().find(|folder| is_checkout(folder)) else {
+    // The folder in which a command is run must not decide which program that is, nor may any folder above this program's.
+    let is_own = |folder: &&Path| is_checkout(folder) && program.starts_with(folder.join("target"));
+    let Some(root) = program.ancestors().find(is_own) else {
         bail!(
             "{name} is missing; `{MAKER}` in a checkout of the repository writes {PAGE}: put it there, or give it with --page"
         );

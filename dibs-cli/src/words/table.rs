@@ -16,6 +16,7 @@ pub const WORDS: &[Row] = &[
     ("tool", "TOOL", "a tool", "query"),
     ("poses", "POSES", "a file of tools or chains, each asked by itself", "query"),
     ("path", "TOOLS", "a file of the tool at each tick", "track filter view"),
+    ("ticks", "TICKS", "what a filter said of each tick", "view"),
     ("vertices", "VERTICES", "the file of the surface at one time", "query"),
     ("frame", "FRAME", "which frame of a motion", "query"),
     ("contacts", "MM", "the margin within which contacts are listed", "query track"),

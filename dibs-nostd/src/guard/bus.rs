@@ -226,7 +226,7 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
 
 impl<I: Index, M: Mac, R: Rows<Poses = ()>> Bus<'_, '_, I, M, Posed<R>> {
     /// The same as [`frame`](Self::frame), with the mesh as a whole elsewhere: a position `p` is at `rotation p + shift`.
-    /// Frames without a pose have it where the mesh's own frame is.
+    /// A frame without a pose is where the mesh's file has it.
     ///
     /// # Errors
     /// Also [`ReceiveError::Pose`] for numbers that are no [`RigidPose`].

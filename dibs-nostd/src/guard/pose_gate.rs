@@ -72,7 +72,7 @@ impl<'s, G> PoseGate<'s, G> {
             let square =
                 surface.position(row).map_or(f32::NAN, |at| at.distance_squared(self.centre));
             // Written so that NaN is kept.
-            if !(square <= self.farthest.1) {
+            if !(square <= self.farthest.1) && !self.farthest.1.is_nan() {
                 self.farthest = (row, square);
             }
         }

@@ -19,9 +19,10 @@ use crate::{
 /// Frames of rows `R`, each with a rigid pose: where the mesh is as a whole, say by a tracker of the patient, beside what
 /// its deformation is. [`Bus::frame_at`](super::Bus::frame_at) takes them; tools, answers and commands are in the world.
 ///
-/// A frame without a pose is where the mesh's own frame is; one that changes a part of another keeps its pose. The receiver
-/// refuses a frame whose vertices, with the pose, move faster than the [limit on speed](crate::SurfaceLimits::speed) allows;
-/// the [reach](crate::SurfaceLimits::reach_mm) is that of the rows alone.
+/// A frame without a pose is where the mesh's own frame is; one that changes a part of another keeps its pose. The limits on
+/// [speed](crate::SurfaceLimits::speed) and [recovery](crate::SurfaceLimits::recovery_mm) hold for the rows' step and the
+/// pose's together, also where one undoes the other: a mesh that moves far in a silence is registered anew. The
+/// [reach](crate::SurfaceLimits::reach_mm) is that of the rows alone. Packets carry no pose.
 ///
 /// Between frames the mesh goes on by its last step: its centre straight, turning evenly. Where a step turns by more
 /// than half a radian, the surface is held.
@@ -71,7 +72,7 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
         let rest = (0..R::count(tree, &of)).map_while(|row| R::rest(tree, &of, row));
         let corners =
             rest.map(|at| (at, at)).reduce(|(low, high), (at, _)| (low.min(at), high.max(at)));
-        // Any centre will do.
+        // Any centre will do: the farther it is from the mesh, the looser the bound on a turn's way.
         let centre = corners.map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5);
         Ok(PosedOf { of, centre })
     }
@@ -233,8 +234,9 @@ impl Placed {
     }
 }
 
-/// The poses of the three buffers, and the error (mm) that each showed of the extrapolation before it. Their frame's hand-over
-/// is theirs: the writer stores before it publishes, and only for the buffer that nobody reads.
+/// The poses of the three buffers, and the error (mm) that each showed of the extrapolation before it. The state
+/// word that hands a frame over hands its pose over as well: the writer stores before it publishes, and only for the buffer that
+/// nobody reads.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Poses([[AtomicU32; 8]; 3]);

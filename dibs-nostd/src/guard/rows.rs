@@ -1,4 +1,4 @@
-//! The two kinds of rows of which a guard's frames may consist.
+//! What a guard's frames may consist of: vertices or nodes, with a pose or without.
 
 use glam::Vec3;
 
@@ -43,7 +43,7 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     #[doc(hidden)]
     fn order<'t, I: Index>(tree: &Tree<'t, I>, of: &Self::Of<'t>) -> VertexOrder<'t, I>;
 
-    /// By how many times as far as a row a vertex may be from a point, and may move.
+    /// A vertex may be so many times as far from a point as the farthest row is, and may move so many times as far.
     #[doc(hidden)]
     fn amplification(_: &Self::Of<'_>) -> f32 {
         1.0

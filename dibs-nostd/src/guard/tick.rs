@@ -8,6 +8,7 @@ use super::surface::{Common, Notes};
 use super::{Answer, GuardLimits, Rows, Searched, Vertices};
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation, State, Verdict};
 use crate::filter::{Admitted, Filter, FilterError, Motion, Uncertainty};
+use crate::math::round::sum_up;
 use crate::{
     Contacts, Error, FrameAge, FrameReader, Index, Millis, Options, QueryError, Tool, Tracker,
     TrackerAnswer, Tree, TreeBytes, Unavailable, VertexTable,
@@ -115,6 +116,9 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     /// The answer of this tick, and all contacts within `margin` (mm): those of [`Tracker::contacts`], in the one budget,
     /// with the velocity of the surface at each. [`Answer::contacts`] gives those that a constraint may act on.
     ///
+    /// They are looked for as much farther as the surface may be off, by its error and its age, so that a constraint with this
+    /// margin has a contact from where it begins to act.
+    ///
     /// A guard of [`start_with_contacts`](super::Surface::start_with_contacts) remembers what a search for contacts opened;
     /// for others each tick searches anew. The list is empty where there is no surface, or the query failed. Its
     /// [accuracy](Contacts::accuracy) covers what the pair's does.
@@ -137,6 +141,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
             tool,
             now,
             |tracker, surface, tool, flow, options| {
+                let off = sum_up(surface.position_error(), flow.margin());
+                let margin = sum_up(margin, off);
                 let tracked = tracker.contacts(surface, tool, margin, options, contacts)?;
                 contacts.set_velocities(|corners, weights| Ok(flow.at(corners, weights)))?;
                 Ok(tracked)
@@ -204,7 +210,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
             &mut Tracker<'t, I, STACK, OPENED, RANGE>,
             &R::Surface<'_>,
             &T,
-            &Flow<'_, 't, R>,
+            &Flow<'_, '_, 't, R>,
             &Options,
         ) -> Result<TrackerAnswer, QueryError>,
         then: impl FnOnce(
@@ -237,7 +243,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         // The fail-safe machine decides how old a surface may be.
         let (searched, tracked) = match (frame, surface) {
             (Some(frame), Ok((blend, surface))) => {
-                let flow = Flow { rows, blend };
+                let notes = &notes.of_all;
+                let flow = Flow { rows, blend, frame, failsafe, notes, now };
                 let tracked = search(tracker, surface, own, &flow, options);
                 let searched = Searched {
                     frame,
@@ -307,13 +314,22 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     }
 }
 
-/// The velocity of the surface that is searched.
-struct Flow<'f, 't, R: Rows> {
+/// How the surface that is searched moves, and how late it is.
+struct Flow<'a, 'f, 't, R: Rows> {
     rows: &'f R::Of<'t>,
     blend: &'f Blend<'f>,
+    frame: FrameAge,
+    failsafe: &'a FailSafe,
+    notes: &'a Common,
+    now: Millis,
 }
 
-impl<R: Rows> Flow<'_, '_, R> {
+impl<R: Rows> Flow<'_, '_, '_, R> {
+    /// The margin (mm) of this tick's trust.
+    fn margin(&self) -> f32 {
+        self.failsafe.margin(self.frame, self.blend.lag(), &self.notes.link.read(self.now))
+    }
+
     /// At a point of a triangle (mm/s).
     fn at(&self, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
         R::velocity(self.rows, self.blend, corners, weights)

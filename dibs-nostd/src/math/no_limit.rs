@@ -4,9 +4,9 @@ use serde::de::{Deserialize, Deserializer};
 use serde::ser::{Error, Serialize, Serializer};
 
 pub fn serialize<S: Serializer>(limit: &f32, serializer: S) -> Result<S::Ok, S::Error> {
-    if limit.is_nan() {
-        // JSON has no NaN either, and none would be no limit in place of one that refuses all.
-        return Err(S::Error::custom("a limit of NaN"));
+    // Of NaN and negative infinity, which JSON has not either, none would make no limit of one that refuses all.
+    if limit.is_nan() || *limit == f32::NEG_INFINITY {
+        return Err(S::Error::custom("a limit that refuses every frame"));
     }
     Some(*limit).filter(|&limit| limit < f32::INFINITY).serialize(serializer)
 }

@@ -14,8 +14,9 @@ use crate::surface::{Millis, VertexTable};
 pub(crate) const fn farthest(speed: f32, recovery: f32, elapsed: Millis) -> f32 {
     // One millisecond more than the time, because the clock counts whole ones.
     let way = speed * (elapsed.0 as f32 + 1.0);
-    // A speed or distance of NaN refuses every frame.
-    if way <= recovery || way.is_nan() { way } else { recovery }
+    // A speed or distance of NaN refuses every frame, and so does one below zero, whose square would be a limit.
+    let most = if way <= recovery || way.is_nan() { way } else { recovery };
+    if most < 0.0 { f32::NAN } else { most }
 }
 
 /// The largest squared distance of these rows from their previous positions, or `largest` if that is larger. NaN where

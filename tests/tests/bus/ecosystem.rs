@@ -202,6 +202,7 @@ fn settings_come_back_as_they_were() {
     }
     // No limit in the place of one that refuses all would be the wrong one.
     assert!(to_string(&limits.speed(f32::NAN)).is_err());
+    assert!(to_string(&limits.speed(f32::NEG_INFINITY)).is_err());
     let misspelt =
         r#"{"reach": 300, "sped": 0.2, "speed": 0.2, "recovery": 30, "shrinkage": 0.25}"#;
     assert!(from_str::<SurfaceLimits>(misspelt).is_err());

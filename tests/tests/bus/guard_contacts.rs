@@ -7,7 +7,7 @@ use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface, Vertices};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, NoMac};
 use dibs_nostd::{
     Advance, Assembler, Budget, Capsule, Contact, Contacts, Frames, Millis, Options, QueryError,
-    SurfaceLimits, Tool, Tracker, Tree, TreeBytes, Unavailable,
+    SurfaceLimits, Tool, Tracker, Tree, TreeBytes, Unavailable, VertexTable,
 };
 use dibs_tests::bus::collect;
 
@@ -28,6 +28,16 @@ const BESIDES: u32 = 1 + Budget::TRIANGLE;
 
 type List = Contacts<32, 512>;
 type Ends = (Bus<'static, 'static, u16>, Guard<'static, 'static, u16, 64, OPENED, Vertices, RANGE>);
+
+/// Of a query's answer (mm), at most.
+const ROUNDING: f32 = 1e-3;
+
+/// A sum, rounded up.
+fn sum_up(a: f32, b: f32) -> f32 {
+    let sum = f64::from(a) + f64::from(b);
+    let nearest = sum as f32;
+    if f64::from(nearest) < sum { nearest.next_up() } else { nearest }
+}
 
 /// A point inside the generated heart.
 const MIDDLE: Vec3 = Vec3::new(12.0, -4.0, 38.0);
@@ -63,6 +73,7 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let proxy = Proxy::new(spring, MARGIN).expect("in range");
     let (mut listed, mut moving, mut cut, mut most, mut acted, mut opened) = (0, 0, 0, 0, 0, 0);
+    let mut widest = 0.0_f32;
     for budget in [100, 200, 300, 600, 1_200, u32::MAX] {
         let options = Options::new().budget(Budget::new(budget));
         let limits = GuardLimits::new(200.0, Millis(200)).options(options).automatic();
@@ -97,7 +108,10 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
             let latest = reader.latest(Millis(now));
             let frame = latest.of_any_age().expect("published");
             let blend = frame.extrapolated();
-            let found = tracker.contacts(&blend, &tool, MARGIN, &options, &mut expected);
+            // As far as a wall with this margin acts.
+            let margin = answer.trust.margin;
+            let wider = sum_up(MARGIN, sum_up(blend.position_error(), margin));
+            let found = tracker.contacts(&blend, &tool, wider, &options, &mut expected);
             let found = found.expect("an answer");
             assert_eq!(answer.tracked, Ok(found), "{budget} {tick}");
             assert_eq!(own.bound().to_bits(), expected.bound().to_bits(), "{budget} {tick}");
@@ -108,8 +122,9 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
                 assert_eq!(one.velocity, flow, "{budget} {tick}");
                 moving += usize::from(flow.length() > 1.0);
             }
-            let margin = answer.trust.margin;
             assert!(own.accuracy() >= expected.accuracy() + margin * 0.999_999, "{margin}");
+            assert!(own.is_empty() || wider > MARGIN + own.accuracy() - ROUNDING, "{wider}");
+            widest = widest.max(wider);
             listed += own.len();
             cut += usize::from(own.bound() < MARGIN);
             let work = found.closest.work();
@@ -123,6 +138,7 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
     }
     println!("{listed} contacts, {moving} that move; {cut} lists cut; a tick of {most} at most");
     assert!(listed > 5_000 && moving > 3_000 && cut > 500, "{listed} {moving} {cut}");
+    assert!(widest > MARGIN + 0.1, "{widest}");
     assert!(most > 1_200 && acted > 3_000 && opened > 50, "{most} {acted} {opened}");
 }
 

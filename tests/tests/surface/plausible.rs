@@ -336,7 +336,12 @@ fn a_limit_that_is_no_number_refuses_frames() {
             .send(&rest, 0, 64)
             .is_err()
     );
-    let mut bus = Bus::new(built, SurfaceLimits::reach_mm(1e3).speed(f32::NAN));
-    assert!(bus.send(&rest, 0, 64).is_ok(), "nothing to compare with");
-    assert!(bus.send(&rest, 5, 64).is_err());
+    let limits = SurfaceLimits::reach_mm(1e3);
+    let below = [-1e-3, -1.0, -1e30, f32::NEG_INFINITY];
+    let speeds = [f32::NAN].into_iter().chain(below).map(|speed| limits.speed(speed));
+    for limits in speeds.chain(below.map(|way| limits.recovery_mm(way))) {
+        let mut bus = Bus::new(built, limits);
+        assert!(bus.send(&rest, 0, 64).is_ok(), "nothing to compare with");
+        assert!(bus.send(&rest, 5, 64).is_err(), "{limits:?}");
+    }
 }

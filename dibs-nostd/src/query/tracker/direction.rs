@@ -1,8 +1,8 @@
 //! The direction where triangles tie.
 //!
 //! On the medial axis the last digits of a pose decide which triangle is the closest, and a force along its direction would
-//! turn to and fro. So an answer keeps the last tick's triangle while that may be the closest, as far as the accuracy tells.
-//! The direction turns once another triangle is certainly closer.
+//! turn to and fro. So an answer keeps the triangle that led the last one while that may be the closest, as far as the rounding
+//! of the two distances tells: not the error of the positions, within which a nearer wall is the nearer one.
 
 use glam::Vec3;
 
@@ -74,7 +74,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let corners = [position(a)?, position(b)?, position(c)?];
         let at = tool.axis_point(found.axis_parameter);
         let closest = sqrt(at.distance_squared(found.point_on_surface));
-        let tie = 2.0 * (found.accuracy + vertices.position_error());
+        // Of rounding alone: the surface's own error moves both triangles, and within it the nearer one is the wall.
+        let tie = 2.0 * found.accuracy;
         // A plane across the last pair rejects most triangles that do not tie.
         let (from, across, span) = if is_outside {
             (tool.axis_start(), -last.direction, tool.axis_span())

@@ -43,8 +43,8 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 ///
 /// Where a pose's last digits decide which of several triangles is the closest, a force along its direction would turn to
 /// and fro. So on a closed surface an answer keeps the last tick's triangle while that is no farther than the closest by more
-/// than the accuracy of both distances: from the axis outside, from the deepest point where the axis crosses or is inside.
-/// Separation, interval and side are the search's. Where the direction would turn by 8 degrees or more, this takes a triangle
+/// than the rounding of both distances, without the error of the positions: from the axis outside, from the deepest point
+/// where the axis crosses or is inside. Separation, interval and side are the search's. Where the direction would turn by 8 degrees or more, this takes a triangle
 /// test.
 ///
 /// RAM: 16 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,944.

@@ -4,7 +4,7 @@
 //! A fact is an inequality. Its places are calls, which a compiler does not move or invent, headers of loops, and the branches
 //! of a line, in the innermost loop that has any of the line: parts of it that are the same at each turn are moved out, the
 //! branch on what is not stays. A place that is there no more is an error; that a fact is true of the program as it was compiled is
-//! checked by traces.
+//! checked by traces, where one executes what the fact limits: the page names the others.
 
 use super::lines::Within::{self, Function, Line};
 

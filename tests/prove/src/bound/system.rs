@@ -205,7 +205,11 @@ impl<'a> Finder<'a> {
 /// If it is none that they load.
 pub fn length(image: &Image, instructions: &[u32]) -> Result<i64> {
     let last = instructions.last().copied().unwrap_or_default();
-    for &place in instructions.iter().rev() {
+    for (number, &place) in instructions.iter().enumerate().rev() {
+        // Under a condition a length may or may not be loaded.
+        if is_under_it(image, &instructions[..number])? {
+            break;
+        }
         let first = image.code(place)?;
         let is_wide = first >> 11 >= 0b11101;
         let second = if is_wide { image.code(place + 2)? } else { 0 };
@@ -215,14 +219,24 @@ pub fn length(image: &Image, instructions: &[u32]) -> Result<i64> {
             _ if first >> 8 == 0x22 => return Ok(i64::from(first & 0xFF)),
             (0xF04F, 2) => return Ok(byte),
             (0xF240, high) if high & 15 == 2 => return Ok(byte | i64::from(high >> 4 & 7) << 8),
-            // The call itself has no register. After IT a length may or may not be loaded.
-            _ if first >> 8 == 0xBF && first & 15 != 0 => break,
+            // The call itself has no register.
             _ if place != last && may_write(2, first, second) => break,
             _ => {}
         }
     }
     let start = instructions.first().copied().unwrap_or_default();
     anyhow::bail!("the length that is copied at {start:#x} is no constant")
+}
+
+/// Whether what follows these instructions is under IT, which one to four have behind it.
+fn is_under_it(image: &Image, before: &[u32]) -> Result<bool> {
+    for (behind, &place) in (1..=4).zip(before.iter().rev()) {
+        let code = image.code(place)?;
+        if code >> 8 == 0xBF && code & 15 != 0 {
+            return Ok(behind <= 4 - (code & 15).trailing_zeros());
+        }
+    }
+    Ok(false)
 }
 
 fn each(parts: impl IntoIterator<Item = Part>) -> Vec<(Part, i64)> {

@@ -88,7 +88,7 @@ pub const CHECK: Check = Check {
             unit: "instructions, after {bound.embedded-capsule.base} and {bound.embedded-capsule.root} a, with \
          {bound.embedded-capsule.triangle-test} a triangle test; sphere {bound.embedded-sphere.base} + {bound.embedded-sphere.root} a \
          + {bound.embedded-sphere.node-test} n + {bound.embedded-sphere.triangle-test} t",
-            limits: "",
+            limits: "Counted and traced in a tree of one root alone: no query has tried the part of a further root.",
         },
         note("bound.embedded-capsule.base"),
         note("bound.embedded-capsule.root"),

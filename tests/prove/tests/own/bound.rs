@@ -132,11 +132,14 @@ fn a_copied_length_is_a_constant_or_an_error() {
     assert_eq!(of(&[0x220C, 0xF7FF, 0xFFFE], &[0, 2]).expect("a constant"), 12);
     assert_eq!(of(&[0xF04F, 0x0210, 0xF7FF, 0xFFFE], &[0, 4]).expect("a constant"), 16);
     assert_eq!(of(&[0xF240, 0x2208, 0xF7FF, 0xFFFE], &[0, 4]).expect("a constant"), 0x208);
-    // The last one counts, and another register's does not.
+    // The last one counts, another register does not, and IT of one instruction ends after it.
+    let ended = [0xBF18, 0x2301, 0x220C, 0xF7FF, 0xFFFE];
+    assert_eq!(of(&ended, &[0, 2, 4, 6]).expect("one"), 12);
     assert_eq!(of(&[0x2204, 0x220C, 0x2301, 0xF7FF, 0xFFFE], &[0, 2, 4, 6]).expect("one"), 12);
-    // Under IT; changed by ADDS; loaded from memory; not in the block.
+    // After IT of one, and of two instructions; changed by ADDS; loaded from memory; not in the block.
     for (halves, places) in [
         (&[0xBF18, 0x220C, 0xF7FF, 0xFFFE][..], &[0, 2, 4][..]),
+        (&[0xBF1C, 0x2301, 0x220C, 0xF7FF, 0xFFFE], &[0, 2, 4, 6]),
         (&[0x220C, 0x3201, 0xF7FF, 0xFFFE], &[0, 2, 4]),
         (&[0x6802, 0xF7FF, 0xFFFE], &[0, 2]),
         (&[0xF7FF, 0xFFFE], &[0]),
