@@ -7,7 +7,7 @@ use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface, Vertices};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, NoMac};
 use dibs_nostd::{
     Advance, Assembler, Budget, Capsule, Contact, Contacts, Frames, Millis, Options, QueryError,
-    SurfaceLimits, Tool, Tracker, Tree, TreeBytes, Unavailable, VertexTable,
+    Side, SurfaceLimits, Tool, Tracker, Tree, TreeBytes, Unavailable, VertexTable,
 };
 use dibs_tests::bus::collect;
 
@@ -123,7 +123,10 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
                 moving += usize::from(flow.length() > 1.0);
             }
             assert!(own.accuracy() >= expected.accuracy() + margin * 0.999_999, "{margin}");
-            assert!(own.is_empty() || wider > MARGIN + own.accuracy() - ROUNDING, "{wider}");
+            // A depth has a tolerance besides, far from where a wall begins to act.
+            let is_outside = found.closest.side == Side::Outside;
+            let reach = MARGIN + own.accuracy() - ROUNDING;
+            assert!(!is_outside || own.is_empty() || wider > reach, "{wider} {reach}");
             widest = widest.max(wider);
             listed += own.len();
             cut += usize::from(own.bound() < MARGIN);
