@@ -89,7 +89,8 @@ impl Faces {
         false
     }
 
-    /// Gives `room` to the triangle that wants it, what that leaves to the one that wants that, and so on to the first.
+    /// Gives `room` to the triangle that wants it. That triangle leaves its old face, which the next one in the chain wants; the
+    /// chain ends at the triangle that had none.
     fn move_along(&mut self, room: usize, wanted_by: &HashMap<usize, usize>) {
         let mut free = Some(room);
         while let Some(face) = free {

@@ -1,7 +1,7 @@
 //! Small surfaces of several kinds, on which exhaustive search is cheap enough for a million cases.
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
-use dibs_nostd::{Index, Tree, TriangleRow};
+use dibs_nostd::{Index, Tree, TriangleRow, VertexTable};
 use glam::Vec3;
 
 /// A mesh and its tree.
@@ -10,6 +10,23 @@ pub struct Surface {
     pub mesh: Mesh,
     /// Its tree, of 16-bit indices.
     pub tree: BuiltTree,
+}
+
+/// Positions, and the error (mm) that they state.
+pub struct Inexact<'s>(pub &'s [Vec3], pub f32);
+
+impl VertexTable for Inexact<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn position(&self, vertex: u32) -> Option<Vec3> {
+        self.0.position(vertex)
+    }
+
+    fn position_error(&self) -> f32 {
+        self.1
+    }
 }
 
 /// A heart with small and with large leaves, a folded brain, a ball whose centre is equally far from all vertices, and

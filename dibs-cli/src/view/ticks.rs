@@ -12,7 +12,7 @@ struct Line {
     tick: Option<usize>,
     /// The pose that was admitted, as a tool in words.
     admitted: Option<String>,
-    /// What its motion keeps (mm).
+    /// The least separation during the admitted motion (mm).
     least_separation: Option<f32>,
     reason: Option<String>,
     /// What the wall may still give to the hand (mJ).

@@ -75,7 +75,7 @@ fn a_record_of_ticks_is_beside_the_path() {
     assert_eq!(numbers("commanded")[10..], [4.0, 0.0, 0.0, 0.0, 2.0]);
     let (path, ticks_shown) = (numbers("path"), numbers("ticks"));
     assert!(path[..5] == [4.0, 0.0, 0.0, 140.0, 2.0] && path[11..14] != [0.0; 3], "{path:?}");
-    // The count of a tick's numbers, its reason, what it keeps, and no energy.
+    // The count of a tick's numbers, its reason, its least separation, and no energy.
     assert!(
         ticks_shown[0] == 3.0 && ticks_shown[1] == 0.0 && ticks_shown[2] > 1.0,
         "{ticks_shown:?}"

@@ -2,6 +2,7 @@
 
 mod chain;
 mod contacts;
+mod corners;
 mod cost;
 mod cost_m7;
 mod cost_x86_64;

@@ -3,10 +3,10 @@
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Capsule, MovingTable, Odometer, Options, Proximity, Query, Side, Tool, Tracker, VertexTable,
-    glam::Vec3,
+    Capsule, MovingTable, Odometer, Options, Proximity, Query, Side, Tool, Tracker, glam::Vec3,
 };
 use dibs_tests::deform::unit;
+use dibs_tests::surfaces::Inexact;
 use fastrand::Rng;
 
 /// Ticks at a tie.
@@ -29,23 +29,6 @@ struct Turns {
     kept: u32,
     /// Ticks beyond a tie.
     beyond: u32,
-}
-
-/// A table that states an error (mm) of its positions.
-struct Inexact<'s>(&'s [Vec3], f32);
-
-impl VertexTable for Inexact<'_> {
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.0.position(vertex)
-    }
-
-    fn position_error(&self) -> f32 {
-        self.1
-    }
 }
 
 /// The cosine of 45 degrees: a smaller product of two directions is a turn.

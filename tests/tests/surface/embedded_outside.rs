@@ -161,26 +161,9 @@ fn limits_are_those_of_vertices() {
     assert!(admitted <= 1.0 && admitted > 0.97 && refused < 1.03, "{admitted} {refused}");
     // A table's error grows as its motion does.
     let surface = nodes.surface(rest.as_slice());
-    let erroneous = Inexact(&rest);
+    let erroneous = surfaces::Inexact(&rest, 0.25);
     let stated = nodes.surface(&erroneous).position_error() - surface.position_error();
     assert!((stated - 0.25 * nodes.amplification()).abs() < 1e-6, "{stated}");
-}
-
-/// Positions that may be a quarter of a millimetre off.
-struct Inexact<'a>(&'a [Vec3]);
-
-impl VertexTable for Inexact<'_> {
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn position(&self, vertex: u32) -> Option<Vec3> {
-        self.0.position(vertex)
-    }
-
-    fn position_error(&self) -> f32 {
-        0.25
-    }
 }
 
 /// Vertices beyond the distance, and at levers that would make too much of the nodes' errors.

@@ -15,6 +15,7 @@ use glam::Vec3;
 use super::Contact;
 use super::add::{NO_DIRECTION, Pair};
 use crate::math::sqrt::sqrt;
+use crate::query::corners::positions;
 use crate::query::made::Tests;
 use crate::query::search::{Search, WHOLE, Waiting};
 use crate::query::{Options, Proximity};
@@ -190,9 +191,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         let Some((far, other)) = far else { return Ok((Across::NONE, look.spent)) };
         let (along, _) = near.meeting(&far);
         let point = on_axis + way * along;
-        let [a, b, c] = other.corners;
-        let position = |row| vertices.position(row).ok_or(QueryError::Corrupt { row });
-        let corners = [position(a)?, position(b)?, position(c)?];
+        let corners = positions(vertices, other.corners)?;
         let pair = AxisPoint(point).closest_on_triangle(&corners, f32::INFINITY);
         let Some(pair) = pair else { return Ok((Across::NONE, look.spent)) };
         let outward = pair.on_surface - point;

@@ -7,6 +7,7 @@ use super::basins::{Basins, Near, Place};
 use super::low::Found;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
+use crate::query::corners::corners;
 use crate::query::made::Tests;
 use crate::query::search::Waiting;
 use crate::query::side::{self, OnAxis, Side};
@@ -318,16 +319,4 @@ impl Proximity {
         self.point_on_tool = on_axis - self.direction * tool.radius();
         Ok(())
     }
-}
-
-/// A triangle's corners: their rows, and their positions.
-fn corners<I: Index, V: VertexTable + ?Sized>(
-    tree: &Tree<'_, I>,
-    vertices: &V,
-    row: u32,
-) -> Result<([u32; 3], [Vec3; 3]), QueryError> {
-    let corners = tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-    let position = |vertex| vertices.position(vertex).ok_or(QueryError::Corrupt { row: vertex });
-    let [a, b, c] = corners;
-    Ok((corners, [position(a)?, position(b)?, position(c)?]))
 }

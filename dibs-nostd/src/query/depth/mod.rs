@@ -22,8 +22,7 @@ mod start;
 mod touches;
 mod walk;
 
-use glam::Vec3;
-
+use super::corners::positions;
 use super::memory::depth::{Point, Points, Remembered};
 use super::search::{Ties, Waiting};
 use super::side::{self, NoSide, Side};
@@ -301,13 +300,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     ) -> Result<Sample, QueryError> {
         let on_axis = self.tool.axis_point(parameter);
         let along = parameter * self.tool.axis_length();
-        let corners = self.corners(corners)?;
+        let corners = positions(self.vertices, corners)?;
         Ok(Sample { parameter, along, on_axis, depth, triangle, corners, fit: Fit::Closest })
-    }
-
-    fn corners(&self, [a, b, c]: [u32; 3]) -> Result<[Vec3; 3], QueryError> {
-        let position = |row| self.vertices.position(row).ok_or(QueryError::Corrupt { row });
-        Ok([position(a)?, position(b)?, position(c)?])
     }
 
     /// The answer, where no point of the axis is deeper than `bound`.

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::{Search, Step, ties};
 use crate::math::sqrt::sqrt;
+use crate::query::corners::corners;
 use crate::query::plane::{Plane, least};
 use crate::tool::{AxisPair, Tool};
 use crate::unavailable::QueryError;
@@ -77,9 +78,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     #[inline(always)]
     pub(super) fn corners(&self, triangle: u32) -> Result<[Vec3; 3], QueryError> {
-        let rows = self.tree.triangle(triangle).ok_or(QueryError::Corrupt { row: triangle })?;
-        let [a, b, c] = rows;
-        Ok([self.position(a)?, self.position(b)?, self.position(c)?])
+        let (_, corners) = corners(self.tree, self.vertices, triangle)?;
+        Ok(corners)
     }
 
     /// The exact test; the caller has counted it.

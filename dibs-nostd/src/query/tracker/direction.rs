@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::Tracker;
 use super::kept::DIRECTED;
 use crate::math::sqrt::sqrt;
+use crate::query::corners::corners;
 use crate::query::memory::separation::Certain;
 use crate::query::plane::least;
 use crate::query::{Budget, Options, Proximity, Side};
@@ -68,10 +69,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if row == other || !tree.is_closed() || !is_possible || left < Budget::TRIANGLE {
             return Ok(());
         }
-        let rows = tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-        let position = |row| vertices.position(row).ok_or(QueryError::Corrupt { row });
-        let [a, b, c] = rows;
-        let corners = [position(a)?, position(b)?, position(c)?];
+        let (rows, corners) = corners(tree, vertices, row)?;
         let at = tool.axis_point(found.axis_parameter);
         let closest = sqrt(at.distance_squared(found.point_on_surface));
         // Of rounding alone: the surface's own error moves both triangles, and within it the nearer one is the wall.
@@ -93,7 +91,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         } else {
             AxisPoint(at).closest_on_triangle(&corners, f32::INFINITY)
         };
-        let pair = pair.ok_or(QueryError::Position { vertex: a })?;
+        let pair = pair.ok_or(QueryError::Position { vertex: rows[0] })?;
         let towards = pair.on_axis - pair.on_surface;
         let length = sqrt(towards.length_squared());
         if !(length > DIRECTED * found.accuracy && length <= closest + tie) {

@@ -12,6 +12,7 @@ use glam::Vec3;
 use super::Tracker;
 use crate::math::round::{sum_down, sum_up};
 use crate::math::sqrt::sqrt;
+use crate::query::corners::corners;
 use crate::query::memory::separation::Certain;
 use crate::query::{Budget, NoSide, Options, Proximity, Side};
 use crate::tool::AxisPoint;
@@ -178,12 +179,9 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             && options.after(found.tests()).budget.tests() >= Budget::TRIANGLE
         {
             found.triangle_tests += 1;
-            let rows = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-            let position = |row| vertices.position(row).ok_or(QueryError::Corrupt { row });
-            let [a, b, c] = rows;
-            let corners = [position(a)?, position(b)?, position(c)?];
+            let (rows, corners) = corners(&self.tree, vertices, row)?;
             let pair = AxisPoint(on_axis).closest_on_triangle(&corners, f32::INFINITY);
-            let pair = pair.ok_or(QueryError::Position { vertex: a })?;
+            let pair = pair.ok_or(QueryError::Position { vertex: rows[0] })?;
             let towards = on_axis - pair.on_surface;
             let outward = if last.side == Side::Outside { towards } else { -towards };
             let length = sqrt(towards.length_squared());

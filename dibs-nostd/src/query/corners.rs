@@ -1,0 +1,28 @@
+//! Corners of a triangle where they are now.
+
+use glam::Vec3;
+
+use crate::tree::Tree;
+use crate::unavailable::QueryError;
+use crate::{Index, VertexTable};
+
+/// A triangle's corners: their rows, and their positions.
+#[inline(always)]
+pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
+    tree: &Tree<'_, I>,
+    vertices: &V,
+    triangle: u32,
+) -> Result<([u32; 3], [Vec3; 3]), QueryError> {
+    let rows = tree.triangle(triangle).ok_or(QueryError::Corrupt { row: triangle })?;
+    Ok((rows, positions(vertices, rows)?))
+}
+
+/// The positions of three rows.
+#[inline(always)]
+pub(super) fn positions<V: VertexTable + ?Sized>(
+    vertices: &V,
+    [a, b, c]: [u32; 3],
+) -> Result<[Vec3; 3], QueryError> {
+    let position = |row| vertices.position(row).ok_or(QueryError::Corrupt { row });
+    Ok([position(a)?, position(b)?, position(c)?])
+}
