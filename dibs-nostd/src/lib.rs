@@ -55,6 +55,8 @@
 //!   which are checked where they are used. Other limits are made by calls that check them.
 //! - `mint`: points of other mathematics crates become `glam`'s, so that `Bus::frame` takes them.
 //! - `embedded-io`: `guard`'s `Bus` on any byte stream.
+//! - `portable-atomic`: processors without compare-and-swap; interrupts are masked for the few instructions of each publication
+//!   and read of a frame, by the program's `critical-section` implementation.
 //! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver takes only packets with a genuine tag.
 #![no_std]
 #![deny(unsafe_code)]

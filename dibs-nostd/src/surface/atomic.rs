@@ -1,7 +1,16 @@
 //! Atomics: the processor's, or with `--cfg loom` those of a model checker that tries every order in which two threads
 //! may see them (`tests/soundness`).
 
-#[cfg(not(loom))]
-pub(crate) use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 #[cfg(loom)]
 pub(crate) use loom::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+#[cfg(not(loom))]
+pub(crate) use unmodelled::{AtomicBool, AtomicU32, Ordering};
+
+/// Those that no model checker follows. With the feature `portable-atomic` on a processor without compare-and-swap, each change
+/// by what was read masks interrupts; a load and a store are the processor's.
+pub(crate) mod unmodelled {
+    #[cfg(not(feature = "portable-atomic"))]
+    pub(crate) use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+    #[cfg(feature = "portable-atomic")]
+    pub(crate) use portable_atomic::{AtomicBool, AtomicU32, Ordering};
+}

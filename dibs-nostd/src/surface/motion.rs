@@ -8,10 +8,9 @@
 
 mod hold;
 
-use core::sync::atomic::{AtomicU32, Ordering};
-
 use glam::Vec3;
 
+use super::atomic::unmodelled::{AtomicU32, Ordering};
 use super::moving::Step;
 use super::prediction::Prediction;
 use crate::math::sqrt::sqrt;

@@ -13,6 +13,9 @@ use xtask::workspace;
 /// Fewer rows than this were not read from the page.
 const LEAST: usize = 10;
 
+/// The feature with which a core crate without compare-and-swap works, as a row names it.
+const PORTABLE: &str = "portable-atomic";
+
 /// The error of a core crate that has no compare-and-swap.
 const NO_SWAP: &str = "no method named `compare_exchange`";
 
@@ -28,7 +31,11 @@ pub fn check() -> Result<Outcome> {
     ensure!(rows.len() >= LEAST, "docs/processors.md has only {} of the rows to check", rows.len());
     for (target, works) in rows {
         match add_target(target) {
-            Ok(()) => row(target, works)?,
+            Ok(()) if works => compiles(target, None)?,
+            Ok(()) => {
+                lacks_swap(target)?;
+                compiles(target, Some(PORTABLE))?;
+            }
             Err(error) => skipped.push(format!("{target} ({error:#})")),
         }
     }
@@ -38,7 +45,7 @@ pub fn check() -> Result<Outcome> {
     Ok(Outcome::Skipped(format!("not to be had: {}", skipped.join(", "))))
 }
 
-/// The targets, and whether they work.
+/// The targets, and whether they work without the feature.
 fn rows(page: &str) -> Result<Vec<(&str, bool)>> {
     let rows = page.lines().filter_map(|line| {
         let mut cells = line.split('|').map(str::trim).skip(2);
@@ -47,32 +54,34 @@ fn rows(page: &str) -> Result<Vec<(&str, bool)>> {
     });
     rows.map(|(target, works)| match works {
         "yes" => Ok((target, true)),
-        "no" => Ok((target, false)),
-        other => bail!("docs/processors.md says `{other}` of {target}: yes or no"),
+        "by `portable-atomic`" => Ok((target, false)),
+        other => bail!("docs/processors.md says `{other}` of {target}: yes or by `{PORTABLE}`"),
     })
     .collect()
 }
 
-/// Compiles where the row says that it works, and fails for want of compare-and-swap where it does not.
-fn row(target: &str, works: bool) -> Result<()> {
+fn check_of(target: &str) -> Command {
     let mut cargo = Command::new("cargo");
-    cargo.args([
-        "check",
-        "--release",
-        "--message-format=short",
-        "--package",
-        "dibs-nostd",
-        "--target",
-        target,
-    ]);
-    cargo.arg("--target-dir").arg(workspace::target().join("processors"));
-    cargo.current_dir(workspace::root());
-    if works {
-        let built = quiet(&mut cargo, LIMIT);
-        return built.map(drop).with_context(|| format!("docs/processors.md says {target} works"));
-    }
-    let output = cargo.output()?;
-    ensure!(!output.status.success(), "docs/processors.md says {target} does not work: it does");
+    cargo.args(["check", "--release", "--message-format=short", "--package", "dibs-nostd"]);
+    cargo.args(["--target", target, "--target-dir"]);
+    cargo.arg(workspace::target().join("processors")).current_dir(workspace::root());
+    cargo
+}
+
+fn compiles(target: &str, feature: Option<&str>) -> Result<()> {
+    let mut cargo = check_of(target);
+    cargo.args(feature.into_iter().flat_map(|feature| ["--features", feature]));
+    let built = quiet(&mut cargo, LIMIT);
+    built.map(drop).with_context(|| format!("docs/processors.md says {target} works"))
+}
+
+/// Fails for want of compare-and-swap, and for nothing else.
+fn lacks_swap(target: &str) -> Result<()> {
+    let output = check_of(target).output()?;
+    ensure!(
+        !output.status.success(),
+        "docs/processors.md says {target} needs `{PORTABLE}`: it works without"
+    );
     let said = String::from_utf8_lossy(&output.stderr);
     ensure!(said.contains(NO_SWAP), "{target} fails for another reason:\n{said}");
     Ok(())
