@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from . import _arrays, _dibs
 from ._arrays import Floats
+from ._pickle import Bound, Remade
 from ._tree import ANSWER, CONTACT, Contacts, Surface, Tree
 
 Fallback = Literal["start", "surface", "jump", "full"]
@@ -22,7 +23,7 @@ _TOOLS = 8
 _ROWS = 8
 
 
-class Tracked:
+class Tracked(Bound):
     """The answer of a tracker's tick."""
 
     closest: np.void
@@ -37,6 +38,8 @@ class Tracked:
     contacts: Optional[Contacts]
     """All locally closest pairs within the margin, deepest first, and how far they are complete, where they were asked for."""
 
+    _instead = "send its `closest`"
+
     def __init__(self, native: _dibs.Tracked, contacts: Optional[tuple[bytearray, float]]) -> None:
         self._native = native
         self.closest = np.frombuffer(native.record(), ANSWER)[0]
@@ -50,7 +53,7 @@ class Tracked:
         return f"Tracked({self.closest['separation']} mm)"
 
 
-class Tracker:
+class Tracker(Remade):
     """The closest pair from tick to tick, at the cost of what has changed: it remembers its last answer's proof."""
 
     def __init__(self, tree: Tree) -> None:
@@ -118,7 +121,7 @@ class Admitted(NamedTuple):
     """Instructions of a Cortex-M7 that they take, by the fitted cost."""
 
 
-class Filter:
+class Filter(Remade):
     """A filter of commands: the motion nearest to a commanded one that keeps a rigid chain of tools out of the tissue.
 
     It keeps every tool `stand_off` (mm) from the tissue, for a robot that moves its reference point with at most `speed`

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from . import _arrays, _dibs
 from ._filter import Admitted, Filter, RigidMotion, Tracked, admitted_of, motion_of, tool_of
+from ._pickle import Bound, Remade
 from ._tree import ANSWER, Tree, _tests
 
 _WRAP = 1 << 32
@@ -45,7 +46,7 @@ class ForceState(IntEnum):
     """There is no pair to act on: the force is the hold."""
 
 
-class Answer:
+class Answer(Bound):
     """The answer of a tick: what a wall may act on, and how it came about."""
 
     closest: Optional[np.void]
@@ -71,6 +72,8 @@ class Answer:
     """Whether the pair's side is the last tick's, because the budget ended or the side is undefined."""
     lag: Optional[int]
     """Time in ms by which the surface that was searched is behind the present, as far as its error does not cover it."""
+
+    _instead = "send its `closest`"
 
     def __init__(self, native: _dibs.Answer) -> None:
         self._native = native
@@ -98,7 +101,7 @@ class Force(NamedTuple):
     """The cause of a hold."""
 
 
-class ForbiddenRegion:
+class ForbiddenRegion(Remade):
     """A wall: a margin around the surface, with a spring and a damper.
 
     `stiffness` in N/mm, `damping` and `hold_damping`, where there is no pair to act on, in N s/mm, `max_force` in N, `margin`
@@ -127,7 +130,7 @@ class ForbiddenRegion:
         return Force(np.array(force, dtype=np.float32), ForceState(state), cause)
 
 
-class Guard:
+class Guard(Remade):
     """A controller's two ends of a moving surface: frames come in, in packets of a `Sender`, and each tick asks.
 
     `speed_mm_per_s` is the largest speed of the tissue; `age_ms` the largest age of a surface, about two periods of the
@@ -138,7 +141,7 @@ class Guard:
     test counts as 8.
 
     Times `now` are whole milliseconds of one clock, which may wrap at 2**32. Any thread may call; calls wait for each
-    other.
+    other. A pickled copy has no surface yet.
     """
 
     def __init__(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from typing import Any, Optional, Union
+from typing import Any, Optional, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,16 @@ from ._motion import Motion, frames_of
 from ._tree import Tree
 
 Path = Union[str, "os.PathLike[str]"]
+
+
+class HasFaces(Protocol):
+    """A mesh of another library, such as trimesh's. Its vertices are taken in its own order, which is the file's only where it
+    was read without merging (trimesh: `process=False`)."""
+
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
 
 
 class MeshWarning(UserWarning):
@@ -81,8 +91,26 @@ class Mesh:
         """The point that a tree's coordinates count from: zero, unless the mesh is far from it."""
         return np.array(self._native.origin())
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        native = self._native
+        found = native.groups()
+        groups = None if found is None else (bytes(found[0]), found[1])
+        arrays = [bytes(each) for each in (native.positions(), native.triangles(), native.faces())]
+        return _restored, (*arrays, native.report(), groups, native.turned())
+
     def __repr__(self) -> str:
         return f"Mesh({len(self.vertices)} vertices, {len(self.triangles)} triangles)"
+
+
+def _restored(
+    positions: bytes,
+    triangles: bytes,
+    faces: bytes,
+    report: str,
+    groups: Optional[tuple[bytes, str]],
+    turned: Optional[int],
+) -> Mesh:
+    return Mesh._of(_dibs.Mesh.restored(positions, triangles, report, groups, faces, turned))
 
 
 def _reading(
@@ -127,7 +155,7 @@ def read(
 
 
 def build(
-    source: Union[Path, Mesh, npt.ArrayLike],
+    source: Union[Path, Mesh, HasFaces, npt.ArrayLike],
     triangles: Optional[npt.ArrayLike] = None,
     *,
     stretch: float = 1.5,
@@ -136,26 +164,45 @@ def build(
     nodes: Optional[npt.ArrayLike] = None,
     tetrahedra: Optional[npt.ArrayLike] = None,
     bind_within: float = 0.0,
-    **reading: Any,
+    unit: Optional[str] = None,
+    weld: Optional[float] = None,
+    strict: bool = False,
+    largest_component: bool = False,
+    origin: Optional[npt.ArrayLike] = None,
+    orient: bool = False,
+    groups: bool = False,
 ) -> Tree:
-    """Builds the tree of a mesh: of a file, a `Mesh`, or arrays of vertices and triangles.
+    """Builds the tree of a mesh: of a file, a `Mesh`, arrays of vertices and triangles, or an object of `vertices` and `faces`
+    (trimesh).
 
     `stretch` is the largest factor by which the surface may be stretched along itself; `limits` are one for each
     triangle, or tetrahedron, instead (`MotionStretch.limits`). `labels` are numbers from 0 to 255, one for each triangle, which answers
     then carry. With `nodes` and `tetrahedra` of them, a volume around the surface, a surface's positions are those of the
     nodes, and `stretch` limits each tetrahedron; vertices outside are bound to the nearest one within `bind_within` (mm).
-    Other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
+    The other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
     """
+    reading: dict[str, Any] = {
+        "unit": unit,
+        "weld": weld,
+        "strict": strict,
+        "largest_component": largest_component,
+        "origin": origin,
+        "orient": orient,
+    }
     if isinstance(source, Mesh):
-        if triangles is not None or reading:
+        # An array has no truth value.
+        given = groups or any(value is not None and value is not False for value in reading.values())
+        if triangles is not None or given:
             raise TypeError("a Mesh has its triangles, and was read with its options")
         mesh = source
-    elif triangles is not None:
-        mesh = Mesh(source, triangles, **reading)  # type: ignore[arg-type]
+    elif (arrays := _arrays_of(source, triangles)) is not None:
+        if groups:
+            raise TypeError("groups are of a file; give labels")
+        mesh = Mesh(*arrays, **reading)
     elif isinstance(source, (str, os.PathLike)):
-        mesh = read(source, **reading)
+        mesh = read(source, groups=groups, **reading)
     else:
-        raise TypeError("build: give a file, a Mesh, or vertices and triangles")
+        raise TypeError("build: give a file, a Mesh, vertices and triangles, or an object that has vertices and faces")
     count = len(mesh.triangles)
     each = None
     if limits is not None:
@@ -178,6 +225,14 @@ def build(
     for sentence in mesh.warnings + native.warnings():
         warnings.warn(sentence, MeshWarning, stacklevel=2)
     return tree
+
+
+def _arrays_of(source: Any, triangles: Optional[npt.ArrayLike]) -> Optional[tuple[Any, Any]]:
+    if triangles is not None:
+        return source, triangles
+    if hasattr(source, "vertices") and hasattr(source, "faces"):
+        return source.vertices, source.faces
+    return None
 
 
 def _tetrahedra(tetrahedra: npt.ArrayLike, nodes: int) -> bytes:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from . import _arrays, _dibs
 from ._arrays import Floats
+from ._pickle import Bound
 
 if TYPE_CHECKING:
     from ._mesh import Mesh
@@ -35,13 +36,15 @@ def read_motion(path: Union[str, os.PathLike[str]], mesh: Union[Mesh, Tree], *, 
     return frames_of(_dibs.read_motion(os.fspath(path), unit, mesh.origin.tolist()))
 
 
-class MotionStretch:
+class MotionStretch(Bound):
     """The largest stretch of each triangle of a mesh in the frames of a motion."""
 
     stretch: Floats
     """A factor for each triangle."""
     frame: npt.NDArray[np.uint32]
     """The first frame with that stretch."""
+
+    _instead = "send its `limits`"
 
     def __init__(self, mesh: Mesh, frames: npt.ArrayLike) -> None:
         points = _arrays.points("frames", frames, 3)

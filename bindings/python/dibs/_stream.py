@@ -8,6 +8,7 @@ from typing import NamedTuple, Optional
 import numpy.typing as npt
 
 from . import _arrays, _dibs
+from ._pickle import Bound
 from ._tree import Tree
 
 _GLANCE = 0.002
@@ -37,7 +38,7 @@ class Totals(NamedTuple):
     statuses: int
 
 
-class Sender:
+class Sender(Bound):
     """Sends the frames of a moving surface to a controller that has its tree.
 
     `to` is `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`; without it `packets` collects what would
@@ -48,6 +49,8 @@ class Sender:
     `key`, 16 bytes, puts a tag on every packet, for the receiver with the id `receiver`. Frames can then be sent once the
     receiver has reported its challenge: `wait`. For one without a way back give its `challenge`.
     """
+
+    _instead = "make one where frames are sent from"
 
     def __init__(
         self,

@@ -128,6 +128,9 @@ class Scene:
         found, bound = native
         return Contacts(np.frombuffer(found, CONTACT), np.frombuffer(bound, "<f4"))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Scene, (self.surfaces,)
+
 
 class Surface:
     """The surface of a tree at one moment, measured once for any number of queries: `Tree.surface`."""
@@ -138,8 +141,11 @@ class Surface:
         positions: Optional[npt.ArrayLike] = None,
         velocities: Optional[npt.ArrayLike] = None,
     ) -> None:
-        self.tree = tree
         given = [_of_vertices(tree, *each) for each in [("surface", positions), ("velocities", velocities)]]
+        self._take(tree, given)
+
+    def _take(self, tree: Tree, given: list[Optional[bytes]]) -> None:
+        self.tree, self._given = tree, given
         self._native = tree._native.surface(*given)
 
     @property
@@ -156,6 +162,15 @@ class Surface:
     ) -> Contacts:
         """All locally closest pairs of each pose and the surface: as `Tree.contacts`."""
         return Scene([self]).contacts(tools, margin, budget=budget, label=label)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _measured, (self.tree, self._given)
+
+
+def _measured(tree: Tree, given: list[Optional[bytes]]) -> Surface:
+    surface = Surface.__new__(Surface)
+    surface._take(tree, given)
+    return surface
 
 
 def _of_vertices(tree: Tree, name: str, value: Optional[npt.ArrayLike]) -> Optional[bytes]:

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use dibs_build::glam::DVec3;
 use dibs_build::{
-    Builder, Import, ReadOptions, Unit, Volume, check_winding, crossing_parts, orient,
+    Builder, Groups, Import, ReadOptions, Report, Unit, Volume, check_winding, crossing_parts,
+    orient,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
@@ -38,6 +39,31 @@ impl Mesh {
         Self::new(py.detach(check).map_err(invalid)?, is_to_turn)
     }
 
+    /// The mesh of which another one's methods said this, in this process or another.
+    #[staticmethod]
+    fn restored(
+        positions: &[u8],
+        triangles: &[u8],
+        report: &str,
+        groups: Option<(Vec<u8>, String)>,
+        faces: &[u8],
+        turned: Option<usize>,
+    ) -> PyResult<Self> {
+        let report: Report = serde_json::from_str(report).map_err(invalid)?;
+        let mut mesh = dibs_build::Mesh {
+            origin: DVec3::from_array(report.origin),
+            triangles: bytes::cells(triangles),
+            ..dibs_build::Mesh::default()
+        };
+        mesh.positions = mesh.local(&bytes::points(positions));
+        let groups = groups.map(|(labels, groups)| {
+            serde_json::from_str(&groups).map(|groups| Groups { labels, groups })
+        });
+        let groups = groups.transpose().map_err(invalid)?;
+        let faces = bytes::cells(faces).into_iter().map(|[face]| face).collect();
+        Ok(Self { import: Import { mesh, report, groups, faces }, turned })
+    }
+
     /// Positions in the coordinates of the file.
     fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
         let mesh = &self.import.mesh;
@@ -65,6 +91,12 @@ impl Mesh {
         let Some(groups) = &self.import.groups else { return Ok(None) };
         let named = serde_json::to_string(&groups.groups).map_err(invalid)?;
         Ok(Some((PyByteArray::new(py, &groups.labels), named)))
+    }
+
+    /// The face of the file that each triangle comes from.
+    fn faces<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
+        let faces = self.import.faces.iter();
+        PyByteArray::new(py, &faces.flat_map(|face| face.to_le_bytes()).collect::<Vec<u8>>())
     }
 
     fn turned(&self) -> Option<usize> {

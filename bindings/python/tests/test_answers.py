@@ -10,6 +10,7 @@ import unittest
 import numpy as np
 import scipy.optimize
 import scipy.spatial
+import trimesh
 
 import dibs
 from oracle import distances, winding
@@ -144,6 +145,13 @@ class Answers(unittest.TestCase):
         found, bound = TREE.contacts(tools[:0], 5)
         self.assertEqual((len(found), len(bound)), (0, 0))
         answers["separation"] = 0
+
+    def test_another_librarys_mesh_is_taken_as_it_is(self):
+        other = trimesh.Trimesh(HEART.vertices, HEART.triangles, process=False)
+        self.assertEqual(dibs.build(other).blob, dibs.build(HEART.vertices, HEART.triangles).blob)
+        self.assertEqual(dibs.build(other, unit="m").summary["unit"], "m")
+        with self.assertRaisesRegex(TypeError, "groups are of a file"):
+            dibs.build(other, groups=True)
 
     def test_a_tree_survives_pickle_and_file(self):
         again = pickle.loads(pickle.dumps(TREE))

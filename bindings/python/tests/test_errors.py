@@ -43,7 +43,7 @@ CASES = [
     (ValueError, "weld tolerance is -1", lambda: dibs.build(VERTICES, TRIANGLES, weld=-1)),
     (ValueError, "origin: the shape is (1, 2)", lambda: dibs.build(VERTICES, TRIANGLES, origin=[0, 0])),
     (TypeError, "a Mesh has its triangles", lambda: dibs.build(HEART, TRIANGLES)),
-    (TypeError, "give a file, a Mesh, or vertices and triangles", lambda: dibs.build(VERTICES)),
+    (TypeError, "give a file, a Mesh, vertices and triangles, or an object", lambda: dibs.build(VERTICES)),
     (ValueError, "a generated heart cannot have 7 triangles", lambda: dibs.generate("heart", 7)),
     (ValueError, "kind is 'liver'", lambda: dibs.generate("liver", 100)),
     # Trees.

@@ -1,7 +1,7 @@
 //! A file's groups of faces, as labels of triangles.
 
 use super::{Format, ReadErrorKind};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The labels of a mesh's triangles, from the groups of its file: [`ReadOptions::groups`](super::ReadOptions::groups).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub struct Groups {
 }
 
 /// The triangles of a label.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Group {
     /// The label.
     pub label: u8,

@@ -2,12 +2,13 @@
 
 use super::ReadErrorKind;
 use dibs_nostd::format::Unit;
-use serde::{Serialize, Serializer};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::path::Path;
 
 /// The format of a mesh: of a file, or none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Format {
@@ -91,12 +92,12 @@ impl fmt::Display for Format {
 }
 
 /// Counts of the elements read, welded, dropped and found.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// The content's format.
     pub format: Format,
     /// The unit of the file's lengths, which became millimetres.
-    #[serde(serialize_with = "symbol")]
+    #[serde(serialize_with = "symbol", deserialize_with = "unit")]
     pub unit: Unit,
     /// Whether the file name's extension disagrees.
     pub extension_disagrees: bool,
@@ -145,6 +146,12 @@ pub struct Report {
 
 fn symbol<S: Serializer>(unit: &Unit, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(unit.symbol())
+}
+
+fn unit<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Unit, D::Error> {
+    let symbol = String::deserialize(deserializer)?;
+    let unit = Unit::ALL.into_iter().find(|unit| unit.symbol() == symbol);
+    unit.ok_or_else(|| D::Error::custom(format_args!("'{symbol}' is no unit")))
 }
 
 impl Report {

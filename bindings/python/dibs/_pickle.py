@@ -1,0 +1,32 @@
+"""What `pickle` makes of objects that hold the library's own."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, Callable, TypeVar
+
+_Made = TypeVar("_Made", bound="Remade")
+
+
+class Remade:
+    """Is pickled as the call that made it: a copy begins anew."""
+
+    _call: tuple[tuple[Any, ...], dict[str, Any]]
+
+    def __new__(cls: type[_Made], *arguments: Any, **options: Any) -> _Made:
+        made = super().__new__(cls)
+        made._call = (arguments, options)
+        return made
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        arguments, options = self._call
+        return partial(type(self), **options), arguments
+
+
+class Bound:
+    """Is of one process, and says what to send to another instead."""
+
+    _instead: str
+
+    def __reduce__(self) -> str:
+        raise TypeError(f"a {type(self).__name__} cannot be pickled: {self._instead}")
