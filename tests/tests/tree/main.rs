@@ -1,5 +1,6 @@
 //! From mesh files to the bytes of a tree: reading, building, the format, and refusals.
 
+mod bounds;
 mod construction;
 mod coverage;
 mod far;

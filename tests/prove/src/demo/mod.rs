@@ -1,7 +1,7 @@
 //! `cargo xtask demo`: a beating heart streamed to the controller, while a simulated hand pushes the instrument against it.
 
 mod bus;
-mod check;
+pub mod check;
 mod contacts;
 pub mod debugger;
 mod faults;

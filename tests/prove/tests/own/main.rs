@@ -1,9 +1,11 @@
 //! The program's own tests: it is compiled once, for them and for its user.
 
+mod accuracy;
 mod boards;
 mod bound;
 mod path;
 mod processors;
 mod proofs;
 mod records;
+mod root;
 mod words;
