@@ -7,6 +7,7 @@ pub mod c_interface;
 pub mod firmware;
 pub mod nightly;
 pub mod process;
+pub mod python;
 pub mod qemu;
 pub mod steps;
 pub mod toolchain;

@@ -1,5 +1,6 @@
 //! `cargo xtask`: tasks that need more than cargo.
 
+mod peers;
 mod prove;
 mod test;
 mod viewer;
@@ -28,6 +29,9 @@ enum Task {
     /// Runs the paper's experiments.
     #[command(disable_help_flag = true)]
     Bench(Passed),
+    /// Asks other libraries by their Python packages, and writes docs/evidence/peers.json and docs/evidence/peers.md.
+    #[command(disable_help_flag = true)]
+    Peers(Passed),
     /// Measures every promise, and writes docs/evidence/guarantees.json and docs/evidence/guarantees.md.
     #[command(disable_help_flag = true)]
     Guarantees(Passed),
@@ -56,6 +60,7 @@ fn main() -> ExitCode {
         Task::Demo(passed) => prove::run("demo", &passed),
         Task::Test(options) => test::test(&options),
         Task::Bench(passed) => prove::bench(&passed),
+        Task::Peers(passed) => peers::peers(&passed.arguments),
         Task::Guarantees(passed) => prove::run("guarantees", &passed),
         Task::Profile(passed) => prove::run("profile", &passed),
         Task::Bound(passed) => prove::run("bound", &passed),

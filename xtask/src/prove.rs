@@ -12,7 +12,7 @@ const BENCH: &str = "dibs-bench";
 #[derive(clap::Args)]
 pub struct Passed {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
-    arguments: Vec<String>,
+    pub arguments: Vec<String>,
 }
 
 /// `cargo run` of a program, without its arguments. It runs in the user's folder, because arguments may be paths.
