@@ -1,7 +1,8 @@
-//! `dibs bridge` beside another program's messages, on request: `DIBS_PYIGTL` is a Python that has `pyigtl`.
+//! `dibs bridge` beside other programs' messages, on request: of `pyigtl`, and of the C++ library OpenIGTLink.
 
 use std::io::Write;
 use std::net::TcpListener;
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use dibs_build::glam::Vec3;
@@ -36,21 +37,39 @@ time.sleep(60)
 fn frames_of_pyigtl_arrive() {
     let python = std::env::var("DIBS_PYIGTL").expect("DIBS_PYIGTL: a Python with pyigtl");
     for kind in ["POLYDATA", "POINT"] {
-        let folder = heart();
-        let folder = folder.path();
-        let (frames, triangles) = organ(folder);
-        let mut data: Vec<u8> = triangles.iter().flatten().flat_map(|x| x.to_be_bytes()).collect();
-        data.extend(frames.iter().flatten().flat_map(Vec3::to_array).flat_map(f32::to_be_bytes));
-        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let (count, corners) = (FRAMES.to_string(), triangles.len().to_string());
-        let mut server = Command::new(&python);
-        server.args(["-c", SERVER, &port.to_string(), &count, &corners, kind]);
-        let mut server = server.stdin(Stdio::piped()).spawn().unwrap();
-        server.stdin.take().unwrap().write_all(&data).unwrap();
-        let (seen, output, ()) = bridged(folder, &format!("--from igtl:127.0.0.1:{port}"), || ());
-        server.kill().unwrap();
-        server.wait().unwrap();
-        assert_all(&seen, &totals(&output));
-        assert_eq!(seen.error, 0.0, "{kind}");
+        arrive(Command::new(&python).args(["-c", SERVER]), kind);
     }
+}
+
+#[test]
+#[ignore = "needs g++ and Debian's libopenigtlink-dev 1.11"]
+fn frames_of_the_cpp_library_arrive() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/stream/igtl_server.cpp");
+    let folder = tempfile::tempdir().unwrap();
+    let server = folder.path().join("server");
+    let mut compiler = Command::new("g++");
+    compiler.args(["-std=c++17", "-I/usr/include/openigtlink", "-o"]).args([&server, &source]);
+    assert!(compiler.arg("-lOpenIGTLink").status().unwrap().success());
+    for kind in ["POLYDATA", "POINT", "NDARRAY"] {
+        arrive(&mut Command::new(&server), kind);
+    }
+}
+
+/// Every frame of a server's messages reaches the receiver as it was.
+fn arrive(server: &mut Command, kind: &str) {
+    let folder = heart();
+    let folder = folder.path();
+    let (frames, triangles) = organ(folder);
+    let mut data: Vec<u8> = triangles.iter().flatten().flat_map(|x| x.to_be_bytes()).collect();
+    data.extend(frames.iter().flatten().flat_map(Vec3::to_array).flat_map(f32::to_be_bytes));
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let (count, corners) = (FRAMES.to_string(), triangles.len().to_string());
+    server.args([&port.to_string(), &count, &corners, kind]);
+    let mut server = server.stdin(Stdio::piped()).spawn().unwrap();
+    server.stdin.take().unwrap().write_all(&data).unwrap();
+    let (seen, output, ()) = bridged(folder, &format!("--from igtl:127.0.0.1:{port}"), || ());
+    server.kill().unwrap();
+    server.wait().unwrap();
+    assert_all(&seen, &totals(&output));
+    assert_eq!(seen.error, 0.0, "{kind}");
 }
