@@ -33,6 +33,11 @@ TIMES = """In microseconds: the median of an update; median and slowest thousand
 of a batch of 200; and a question about a tetrahedron, which is hardly more than the call. The generated heart beats.
 """
 
+NO_TIMES = """## Times
+
+Not measured in these records: `cargo xtask peers --only times` on an idle computer adds them.
+"""
+
 NOT_COMPARABLE = """## What is not comparable
 
 - DIBS refuses to guess: a side is undefined where both are nearer than its accuracy, or where the closest parts of a
@@ -60,8 +65,7 @@ def page(known: dict[str, Any]) -> str:
     parts = [OPENING]
     if "answers" in known:
         parts += _answers(known["answers"])
-    if "times" in known:
-        parts += _times(known["times"])
+    parts += _times(known["times"]) if "times" in known else [NO_TIMES]
     return "\n".join([*parts, NOT_COMPARABLE])
 
 
