@@ -128,8 +128,17 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
         captured: Millis,
         now: Millis,
     ) -> Result<Progress, ReceiveError> {
+        self.take(positions, None, [captured, now])
+    }
+
+    fn take<P: Copy + Into<Vec3>>(
+        &mut self,
+        positions: &[P],
+        pose: Option<RigidPose>,
+        [captured, now]: [Millis; 2],
+    ) -> Result<Progress, ReceiveError> {
         let outcome = match self.order.rows(positions) {
-            Some(rows) => self.assembler.frame(rows, captured, now),
+            Some(rows) => self.assembler.frame_at(rows, pose, captured, now),
             None => {
                 let rows = u32::try_from(positions.len()).unwrap_or(u32::MAX);
                 Err(self.assembler.refuse_frame(ReceiveError::RowCount { rows }, now))
@@ -238,13 +247,7 @@ impl<I: Index, M: Mac, R: Rows<Poses = ()>> Bus<'_, '_, I, M, Posed<R>> {
         now: Millis,
     ) -> Result<Progress, ReceiveError> {
         match RigidPose::new(rotation, shift) {
-            Ok(pose) => {
-                self.assembler.gate_mut().announce(Some(pose));
-                let outcome = self.frame(positions, captured, now);
-                // One that was refused is that of no other frame.
-                self.assembler.gate_mut().announce(None);
-                outcome
-            }
+            Ok(pose) => self.take(positions, Some(pose), [captured, now]),
             Err(error) => {
                 let refused = self.assembler.refuse_frame(ReceiveError::Pose(error), now);
                 self.note(None);

@@ -38,6 +38,7 @@ mod limits;
 mod line;
 mod pose_gate;
 mod posed;
+mod poses;
 mod rows;
 mod surface;
 mod tick;
@@ -46,6 +47,13 @@ pub use answer::{Answer, Searched};
 pub use bus::Bus;
 pub use limits::GuardLimits;
 pub use posed::Posed;
+/// For a model checker.
+#[cfg(loom)]
+#[doc(hidden)]
+pub use poses::Poses;
+#[cfg(loom)]
+#[doc(hidden)]
+pub use rows::Shared;
 /// The kinds of rows, for [`Bus`], [`Guard`] and [`Surface`].
 #[doc(hidden)]
 pub use rows::{Rows, Vertices};

@@ -4,10 +4,10 @@ use core::ops::Range;
 
 use glam::Vec3;
 
-use super::posed::Poses;
+use super::poses::Poses;
 use crate::math::sqrt::sqrt;
 use crate::stretch::{Admission, Compared, FrameExtent, Gate, IncomingSurface, StretchError};
-use crate::surface::{FARTHEST, MotionUnit, PoseStep, clamped};
+use crate::surface::{MotionUnit, PoseStep};
 use crate::tree::SurfaceFacts;
 use crate::{Millis, RigidPose, VertexTable};
 
@@ -23,18 +23,13 @@ pub struct PoseGate<'s, G> {
     centre: Vec3,
     /// A vertex is no farther from the centre than so many times the farthest row.
     amplification: f32,
-    /// That of the next frame that begins.
-    announced: Option<RigidPose>,
     /// That of the frame in work, its farthest row from the centre, and the next row to be looked at.
     pose: RigidPose,
     farthest: (u32, f32),
     next_row: u32,
-    /// Those published last, and one before, and the time between.
+    /// Those of the last two frames published.
     last: Option<RigidPose>,
     before: Option<RigidPose>,
-    interval: Millis,
-    /// The time from the published frame to the one in work.
-    elapsed: Millis,
     /// The buffer that the frame in work is in: they take turns, and the first frame is in the second.
     buffer: u32,
 }
@@ -46,21 +41,13 @@ impl<'s, G> PoseGate<'s, G> {
             poses,
             centre,
             amplification,
-            announced: None,
             pose: RigidPose::IDENTITY,
             farthest: (0, 0.0),
             next_row: 0,
             last: None,
             before: None,
-            interval: Millis(0),
-            elapsed: Millis(0),
             buffer: 1,
         }
-    }
-
-    /// Announces the pose of the next frame that begins.
-    pub(super) const fn announce(&mut self, pose: Option<RigidPose>) {
-        self.announced = pose;
     }
 
     /// Looks for the row farthest from the centre among those that have come. Returns the work left.
@@ -86,26 +73,21 @@ impl<'s, G> PoseGate<'s, G> {
         sqrt(square) * (self.amplification * (1.0 + 8.0 * f32::EPSILON))
     }
 
-    /// The largest distance (mm) of a vertex from the extrapolation of the two poses before, at the time of this frame and
-    /// grown as [`SurfaceBlend::residual`](crate::SurfaceBlend::residual) is; NaN where that is not known.
-    fn shown(&self) -> f32 {
+    /// The largest distance (mm) of a vertex from the extrapolation of the two poses before, by the part of their step that the
+    /// rows' own extrapolation added, and grown as that; NaN where the rows were not extrapolated.
+    fn shown(&self, compared: &Compared) -> f32 {
         let (Some(before), Some(last)) = (&self.before, &self.last) else { return f32::NAN };
-        if self.interval == Millis(0) || self.elapsed == Millis(0) {
-            return f32::NAN;
-        }
-        let t = clamped(self.elapsed.0 as f32 / self.interval.0 as f32, FARTHEST);
-        let growth = 2.0 * t / (1.0 + t);
-        let growth = if growth > 1.0 { growth } else { 1.0 };
         PoseStep::between(before, last, self.centre).map_or(f32::NAN, |step| {
-            step.beyond(t).step(&self.pose, self.centre, self.lever()) * growth
+            let off = step.beyond(compared.t).step(&self.pose, self.centre, self.lever());
+            off * compared.growth()
         })
     }
 }
 
 impl<G: Gate> PoseGate<'_, G> {
     /// A vertex moves by at most its row's step in the mesh and that of the pose at where it is now, turned and shifted.
-    fn check_speed(&self, compared: Option<Compared>, elapsed: Millis) -> Result<(), StretchError> {
-        let (Some(last), Some(compared)) = (&self.last, compared) else { return Ok(()) };
+    fn check_speed(&self, compared: &Compared, elapsed: Millis) -> Result<(), StretchError> {
+        let Some(last) = &self.last else { return Ok(()) };
         let limit = self.rows.farthest(elapsed) * self.amplification;
         let own = sqrt(compared.largest) * self.amplification;
         let step = own + last.step(&self.pose, self.centre, self.lever());
@@ -124,9 +106,13 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
             FrameExtent::Whole => None,
             FrameExtent::Partial => self.last,
         };
-        self.pose = self.announced.take().or(kept).unwrap_or(RigidPose::IDENTITY);
-        (self.farthest, self.next_row, self.elapsed) = ((0, 0.0), 0, Millis(0));
+        self.pose = kept.unwrap_or(RigidPose::IDENTITY);
+        (self.farthest, self.next_row) = ((0, 0.0), 0);
         self.rows.begin(changed);
+    }
+
+    fn place(&mut self, pose: RigidPose) {
+        self.pose = pose;
     }
 
     fn moved(&mut self, rows: Range<u32>) {
@@ -146,10 +132,9 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
         }
         // A registration is compared with nothing.
         let mut shown = f32::NAN;
-        if let Some((_, elapsed)) = before {
+        if let (Some((_, elapsed)), Some(compared)) = (before, &compared) {
             self.check_speed(compared, elapsed)?;
-            self.elapsed = elapsed;
-            shown = self.shown();
+            shown = self.shown(compared);
         }
         self.poses.set(self.buffer, &self.pose, shown);
         Ok(admission)
@@ -157,17 +142,8 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
 
     fn published(&mut self) {
         self.before = self.last.replace(self.pose);
-        self.interval = self.elapsed;
         self.buffer = if self.buffer + 1 < BUFFERS { self.buffer + 1 } else { 0 };
         self.rows.published();
-    }
-
-    fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
-        self.rows.weight_range(mode)
-    }
-
-    fn farthest(&self, elapsed: Millis) -> f32 {
-        self.rows.farthest(elapsed)
     }
 
     fn motion_unit(&self) -> Option<MotionUnit> {

@@ -1,14 +1,15 @@
 //! Frames with a rigid pose each: the tool is moved by its inverse, and nothing below knows.
 
 use core::marker::PhantomData;
-use core::sync::atomic::{AtomicU32, Ordering};
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
 
 use super::pose_gate::PoseGate;
-use super::rows::{Blend, Rows, Shared, sealed};
+use super::poses::Poses;
+use super::rows::{Blend, Rows, sealed};
 use super::{Searched, Vertices};
-use crate::filter::{Admitted, Motion, Reason};
+use crate::filter::{Admitted, Filter, Motion, Reason};
+use crate::math::sqrt::sqrt;
 use crate::surface::{PoseStep, grown};
 use crate::tree::VertexOrder;
 use crate::{
@@ -168,19 +169,62 @@ impl Placed {
         tool.with_axis(self.ends(tool))
     }
 
+    /// Its end is where its span leads from its start: so the rounding does not grow with the way to the world's origin.
     fn ends(&self, tool: &impl Tool) -> [Vec3; 2] {
-        [tool.axis_start(), tool.axis_point(1.0)].map(|end| self.pose.apply_inverse(end))
+        let start = self.pose.apply_inverse(tool.axis_start());
+        [start, start + self.pose.rotate_inverse(tool.axis_span())]
     }
 
-    /// Most (mm) by which a point of the tool's axis is off, beside the rows' own errors. The ends' errors bound that of
-    /// any point between.
+    /// Most (mm) by which a point of the tool's axis is off, beside the rows' own errors.
+    ///
+    /// The end is off by as much as the start, and by the turned span. Besides, in halves of a unit: by 1 of its coordinates, a
+    /// sum, and by 6 of the span, for what the tool keeps of it (a difference, a division, and a product as often as it is
+    /// read). Points between are off by no more than both ends.
     pub(super) fn error(&self, tool: &impl Tool) -> f32 {
-        let rounding = self.ends(tool).map(|end| match &self.step {
-            Some((step, ..)) => step.rounding(end, &self.pose),
-            None => RigidPose::rounding(end),
-        });
-        let [start, end] = rounding;
-        (if end > start { end } else { start }) + self.error
+        let [start, end] = self.ends(tool);
+        let span = end - start;
+        let kept = (end.abs() + span.abs() * 6.0).element_sum() * (0.5 * f32::EPSILON);
+        self.rounding(start) + self.rounding_of_vector(span) + kept + self.error
+    }
+
+    /// Most (mm) by which a point that was led to the mesh is off.
+    fn rounding(&self, local: Vec3) -> f32 {
+        match &self.step {
+            Some((step, ..)) => step.rounding(local, &self.pose),
+            None => RigidPose::rounding(local),
+        }
+    }
+
+    /// The same of a vector.
+    fn rounding_of_vector(&self, local: Vec3) -> f32 {
+        match &self.step {
+            Some((step, ..)) => step.rounding_of_vector(local, &self.pose),
+            None => RigidPose::rounding(local),
+        }
+    }
+
+    /// Most (mm) by which a point of a tool on the mesh is off besides while a motion goes on there that a filter admits for a
+    /// period: the robot executes it in the world.
+    ///
+    /// A translation is off by its rounding as it is turned. A rotation moves a point by as much as its vector is off, times
+    /// the arm; where the reference point is off, by that times the angle.
+    pub(super) fn error_of_motion<T: Tool>(
+        &self,
+        tool: &T,
+        motion: &Motion,
+        (filter, period): (&Filter, f32),
+    ) -> f32 {
+        let (shift, turn) = filter.most(tool, motion, period);
+        let mut arm = 0.0;
+        for end in [tool.axis_start(), tool.axis_point(1.0)] {
+            let far = sqrt(end.distance_squared(motion.about));
+            if far > arm {
+                arm = far;
+            }
+        }
+        // The sum of a vector's coordinates is at most the square root of three times its length.
+        let turned = self.rounding_of_vector(Vec3::X * (1.75 * (shift + turn * arm)));
+        turned + turn * self.rounding(motion.about)
     }
 
     /// What was searched and the answer of the moved tool, as they are in the world.
@@ -234,52 +278,5 @@ impl Placed {
     }
 }
 
-/// The poses of the three buffers, and the error (mm) that each showed of the extrapolation before it. The state
-/// word that hands a frame over hands its pose over as well: the writer stores before it publishes, and only for the buffer that
-/// nobody reads.
-#[doc(hidden)]
-#[derive(Debug)]
-pub struct Poses([[AtomicU32; 8]; 3]);
-
-impl Shared for Poses {
-    const NEW: Self = Self([const { [const { AtomicU32::new(0) }; 8] }; 3]);
-}
-
-impl Poses {
-    /// Stores that of the buffer with this number.
-    pub(super) fn set(&self, buffer: u32, pose: &RigidPose, shown: f32) {
-        let ([x, y, z, w], [a, b, c]) = (pose.rotation().to_array(), pose.shift().to_array());
-        let Some(words) = self.0.get(buffer as usize) else { return };
-        for (word, value) in words.iter().zip([x, y, z, w, a, b, c, shown]) {
-            word.store(value.to_bits(), Ordering::Relaxed);
-        }
-    }
-
-    /// The pose of the last frame.
-    fn last(&self, published: &FrameGuard<'_>) -> RigidPose {
-        let [_, (last, _)] = self.of_frames(published.number());
-        last
-    }
-
-    /// The step that goes on, and the larger of the errors that the last two frames showed; `None` where it does not go on.
-    fn step(&self, published: &FrameGuard<'_>, centre: Vec3) -> Option<(PoseStep, f32)> {
-        let [(before, earlier), (last, shown)] = self.of_frames(published.number());
-        let step = PoseStep::between(&before, &last, centre)?;
-        // The change of the motion may have been none by chance. False for NaN.
-        let shown = if earlier > shown { earlier } else { shown };
-        (shown >= 0.0).then_some((step, shown))
-    }
-
-    /// Those of the frame before and of the last one, whose buffer has this number.
-    fn of_frames(&self, last: u32) -> [(RigidPose, f32); 2] {
-        let before = if last == 0 { 2 } else { last - 1 };
-        [before, last].map(|buffer| {
-            let Some(words) = self.0.get(buffer as usize) else {
-                return (RigidPose::IDENTITY, f32::NAN);
-            };
-            let [x, y, z, w, a, b, c, shown] =
-                words.each_ref().map(|word| f32::from_bits(word.load(Ordering::Relaxed)));
-            (RigidPose::kept(Quat::from_xyzw(x, y, z, w), Vec3::new(a, b, c)), shown)
-        })
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -94,11 +94,20 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
 #[doc(hidden)]
 pub trait Shared: core::fmt::Debug + 'static {
     /// That of no frame.
+    #[cfg(not(loom))]
     const NEW: Self;
+
+    /// That of no frame.
+    #[cfg(loom)]
+    fn new() -> Self;
 }
 
 impl Shared for () {
+    #[cfg(not(loom))]
     const NEW: Self = ();
+
+    #[cfg(loom)]
+    fn new() {}
 }
 
 pub(super) mod sealed {

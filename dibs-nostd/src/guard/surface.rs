@@ -111,6 +111,7 @@ pub struct Notes<P = ()> {
 
 impl<P: Shared> Notes<P> {
     /// Nothing is known yet.
+    #[cfg(not(loom))]
     #[expect(clippy::new_without_default, reason = "as its surface")]
     #[must_use]
     pub const fn new() -> Self {

@@ -190,7 +190,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
                 };
                 // The surface's own motion is that in the world, so the pose stands still for the period.
                 let (own, motion) = (placed.tool(tool), placed.motion(command));
-                let tissue = tissue.error(placed.error(tool));
+                let moved = placed.error_of_motion(&own, &motion, (filter, period));
+                let tissue = tissue.error(placed.error(tool) + moved);
                 let pairs = &mut [(tracker, surface, &own)];
                 let admitted = filter.admit(pairs, &motion, period, &tissue, &[])?;
                 Ok(placed.admitted(admitted, command))

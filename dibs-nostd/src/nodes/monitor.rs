@@ -96,7 +96,7 @@ impl<'a, const SURFACES: usize> NodeMonitor<'a, SURFACES> {
         if limit == f32::INFINITY {
             return Ok((work, true));
         }
-        if let Some(Compared { largest, rows: [first, end] }) = compared {
+        if let Some(Compared { largest, rows: [first, end], .. }) = compared {
             if !(largest <= limit * limit) {
                 return Err(too_fast(surface, before, first..end, limit));
             }

@@ -6,7 +6,7 @@ use super::health::FrameName;
 use super::packets::check;
 use super::{Assembler, Progress, ReceiveError};
 use crate::stretch::Gate;
-use crate::surface::{Millis, Position, elapsed};
+use crate::surface::{Millis, Position, RigidPose, elapsed};
 use crate::wire::{Begin, Content, Encoding, FrameId, Freshness, Mac};
 
 impl<G: Gate, M: Mac> Assembler<'_, G, M> {
@@ -29,6 +29,17 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         captured: Millis,
         now: Millis,
     ) -> Result<Progress, ReceiveError> {
+        self.frame_at(positions, None, captured, now)
+    }
+
+    /// The same, at a pose.
+    pub(crate) fn frame_at(
+        &mut self,
+        positions: impl ExactSizeIterator<Item = Vec3> + Clone,
+        pose: Option<RigidPose>,
+        captured: Millis,
+        now: Millis,
+    ) -> Result<Progress, ReceiveError> {
         let (limit, rows, checked) = (self.max_coordinate, positions.len(), positions.clone());
         let source = move |_: &Self| check(checked, 0, limit);
         let store = move |slots: &[Position]| {
@@ -36,7 +47,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
                 slot.set(position);
             }
         };
-        self.local(Content::Whole, rows, source, store, [captured, now])
+        self.local((Content::Whole, rows), pose, source, store, [captured, now])
     }
 
     /// The same, of weights of displacement modes.
@@ -57,7 +68,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
                 slot.set(Vec3::new(weight, 0.0, 0.0));
             }
         };
-        self.local(Content::Modal, weights.len(), source, store, [captured, now])
+        self.local((Content::Modal, weights.len()), None, source, store, [captured, now])
     }
 
     /// Refuses, and counts, a frame of this process.
@@ -77,8 +88,8 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     /// Takes a frame whose rows `check` finds good and `store` stores.
     fn local(
         &mut self,
-        content: Content,
-        rows: usize,
+        (content, rows): (Content, usize),
+        pose: Option<RigidPose>,
         check: impl FnOnce(&Self) -> Result<(), ReceiveError>,
         store: impl FnOnce(&[Position]),
         [captured, now]: [Millis; 2],
@@ -95,7 +106,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             surface: self.surface_facts(),
             freshness: Freshness { age_ms, echo: Some(now.0) },
         };
-        let outcome = self.local_rows(id, begin, check, store);
+        let outcome = self.local_rows(id, begin, pose, check, store);
         let outcome = outcome.map_err(|rejection| self.refuse_local(&id, rejection));
         if outcome.is_ok() {
             self.collector.note_local();
@@ -107,6 +118,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         &mut self,
         id: FrameId,
         begin: Begin,
+        pose: Option<RigidPose>,
         check: impl FnOnce(&Self) -> Result<(), ReceiveError>,
         store: impl FnOnce(&[Position]),
     ) -> Result<Progress, ReceiveError> {
@@ -120,6 +132,9 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         check(self)?;
         // A frame of one packet, whose parts add up to 0.
         self.begin_frame(id.epoch, begin, [0; 2])?;
+        if let Some(pose) = pose {
+            self.gate.place(pose);
+        }
         let misplaced = ReceiveError::OutOfRange { first: 0, count: rows };
         let place = self.collector.place_whole(rows).ok_or(misplaced)?;
         store(self.writer.rows(0..rows).ok_or(misplaced)?);

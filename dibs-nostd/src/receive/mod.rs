@@ -354,12 +354,6 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         &self.gate
     }
 
-    /// The gate, to be told of the next frame.
-    #[cfg(feature = "control")]
-    pub(crate) const fn gate_mut(&mut self) -> &mut G {
-        &mut self.gate
-    }
-
     /// The authenticator.
     #[must_use]
     pub const fn mac(&self) -> &M {

@@ -33,7 +33,7 @@ pub(super) struct Earlier<'f, V: ?Sized> {
 
 impl Step {
     pub const fn new() -> Self {
-        Self { rows: 0, fastest: [0; 2], largest: 0.0, off: 0.0, units: 0, t: 0.0 }
+        Self { rows: 0, fastest: [0; 2], largest: 0.0, off: 0.0, units: 0, t: f32::NAN }
     }
 
     /// Compares at most `work` of the rows below `ready` with those before, and with the extrapolation of these from an
@@ -70,7 +70,7 @@ impl Step {
     }
 
     pub const fn compared(&self) -> Compared {
-        Compared { largest: self.largest, rows: self.fastest }
+        Compared { largest: self.largest, rows: self.fastest, t: self.t }
     }
 
     /// The distance of the frame from the extrapolation, where there was one; its stretch is not known here.
@@ -85,12 +85,8 @@ impl Step {
             _ => None,
         };
         let (passed, off) = known.unwrap_or((0, PredictionCheck::UNKNOWN.off));
-        // With a steady acceleration the error, after a time `b` beyond a step that took `a`, grows as `b (a + b)`. That
-        // seen had the last step's time for `b`; the next one is taken to have it for both. With `t = b / a` of the one
-        // seen the ratio is `2 t / (1 + t)`.
-        let growth = 2.0 * self.t / (1.0 + self.t);
-        let growth = if growth > 1.0 { growth } else { 1.0 };
-        PredictionCheck { shown: sqrt(self.off) * growth, passed, off, ..PredictionCheck::UNKNOWN }
+        let shown = sqrt(self.off) * self.compared().growth();
+        PredictionCheck { shown, passed, off, ..PredictionCheck::UNKNOWN }
     }
 
     /// The odometer's reading after the step from a frame with the reading `before`; a start where that is unknown, or

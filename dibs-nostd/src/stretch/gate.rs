@@ -3,6 +3,8 @@
 use core::ops::Range;
 
 use super::{StretchError, measure_stretch};
+#[cfg(feature = "bus")]
+use crate::surface::RigidPose;
 use crate::surface::{MeasuredStretch, Millis, MotionUnit, VertexTable};
 use crate::tree::{Index, SurfaceFacts, Tree};
 
@@ -48,6 +50,18 @@ pub struct Compared {
     pub largest: f32,
     /// First and end of the rows that have it among them.
     pub rows: [u32; 2],
+    /// The part of the step before by which the rows were moved on to be compared with these; NaN where they were not.
+    pub t: f32,
+}
+
+impl Compared {
+    /// What the distance from that extrapolation grows to. With a steady acceleration the error, after a time `b` beyond a
+    /// step that took `a`, grows as `b (a + b)`. That seen had the last step's time for `b`; the next one is taken to have
+    /// it for both. With `t = b / a` of the one seen the ratio is `2 t / (1 + t)`.
+    pub(crate) fn growth(&self) -> f32 {
+        let growth = 2.0 * self.t / (1.0 + self.t);
+        if growth > 1.0 { growth } else { 1.0 }
+    }
 }
 
 impl<'a, V: ?Sized> IncomingSurface<'a, V> {
@@ -121,6 +135,13 @@ pub trait Gate {
     /// These rows of the frame have come: each row at most once, in any order of packets. O(1).
     fn moved(&mut self, rows: Range<u32>) {
         let _ = rows;
+    }
+
+    /// The frame that has begun is at this pose.
+    #[doc(hidden)]
+    #[cfg(feature = "bus")]
+    fn place(&mut self, pose: RigidPose) {
+        let _ = pose;
     }
 
     /// Checks at most `work` rows and triangles that have arrived. Admission before the frame is complete has no

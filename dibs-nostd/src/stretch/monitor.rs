@@ -189,7 +189,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         let limit = farthest(self.speed, self.recovery, elapsed);
         if limit == f32::INFINITY {
             self.blocks_left = 0;
-        } else if let Some(Compared { largest, rows: [first, end] }) = compared {
+        } else if let Some(Compared { largest, rows: [first, end], .. }) = compared {
             self.blocks_left = 0;
             if !(largest <= limit * limit) {
                 return Err(too_fast(surface, before, first..end, limit));

@@ -9,7 +9,6 @@ mod measured;
 pub(crate) mod motion;
 mod moving;
 #[cfg(feature = "bus")]
-#[cfg_attr(not(feature = "control"), allow(dead_code, reason = "only a guard moves a tool"))]
 mod pose;
 mod prediction;
 mod reader;
@@ -19,6 +18,8 @@ pub(crate) use crate::time::Ageing;
 #[cfg(feature = "bus")]
 pub(crate) use crate::time::{AHEAD, elapsed};
 pub use crate::time::{Millis, Ticks};
+#[cfg(all(feature = "bus", feature = "control"))]
+pub(crate) use atomic::{AtomicU32, Ordering};
 #[cfg(any(feature = "bus", feature = "modes"))]
 pub(crate) use buffer::PredictionCheck;
 pub use buffer::{Buffer, FrameLabel, Head, Position};

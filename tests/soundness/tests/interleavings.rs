@@ -2,8 +2,9 @@
 //! last published frame is read, and neither end waits.
 #![cfg(loom)]
 
-use dibs_nostd::glam::Vec3;
-use dibs_nostd::{FrameLabel, Frames, Millis, PublishError, VertexTable};
+use dibs_nostd::glam::{Quat, Vec3};
+use dibs_nostd::guard::{Poses, Shared};
+use dibs_nostd::{FrameLabel, Frames, Millis, PublishError, RigidPose, VertexTable};
 use loom::cell::UnsafeCell;
 use loom::thread;
 
@@ -117,6 +118,56 @@ fn no_order_of_steps_tears_the_frame_before() {
                 // Before the second frame there is none.
                 let (epoch, row) = (before.epoch().expect("a label"), before.position(0));
                 assert!(epoch == 0 || row == Some(position(epoch)), "the frame before: {row:?}");
+            }
+        }
+        sender.join().expect("no panic");
+    });
+    let orders = orders.load(std::sync::atomic::Ordering::Relaxed);
+    println!("interleavings: {orders}");
+    assert!(orders > 100, "{orders}");
+}
+
+/// The same with a pose in each frame: that of the published frame and that of the frame before are whole while they are
+/// read.
+#[test]
+fn no_order_of_steps_tears_a_pose() {
+    let orders = std::sync::Arc::new(std::sync::atomic::AtomicU32::new(0));
+    let counter = orders.clone();
+    loom::model(move || {
+        counter.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let frames: &'static Frames<VERTICES, 3> = Box::leak(Box::new(Frames::new()));
+        let poses: &'static Poses = Box::leak(Box::new(Poses::new()));
+        let beside: &'static [UnsafeCell<()>; 3] =
+            Box::leak(Box::new([(); 3].map(|()| UnsafeCell::new(()))));
+        let pose = |epoch: u32| {
+            let turn = if epoch % 2 == 0 { Quat::IDENTITY } else { -Quat::IDENTITY };
+            RigidPose::new(turn, position(epoch)).expect("a rotation")
+        };
+        let (mut writer, mut reader) = frames.split().expect("split once");
+        let sender = thread::spawn(move || {
+            let mut buffer = 1;
+            for epoch in 1..=3 {
+                writer.begin();
+                writer.push(position(epoch)).expect("inside the table");
+                beside[buffer].with_mut(|_| ());
+                poses.set(buffer as u32, &pose(epoch), epoch as f32);
+                match writer.publish(label(epoch, buffer)) {
+                    Ok(()) => buffer = (buffer + 1) % 3,
+                    Err(PublishError::Busy) => {}
+                    Err(other) => panic!("{other}"),
+                }
+            }
+        });
+        for _ in 0..2 {
+            if let Some(frame) = reader.read() {
+                let FrameLabel { epoch, position_error, .. } = frame.label();
+                let buffer = position_error as usize;
+                beside[buffer].with(|_| ());
+                beside[(buffer + 2) % 3].with(|_| ());
+                let [(earlier, shown), last] = poses.of_frames(&frame);
+                assert_eq!(last, (pose(epoch), epoch as f32), "the pose of the frame");
+                let before = frame.before().epoch().expect("a label");
+                assert!(before == 0 || (earlier, shown) == (pose(before), before as f32));
             }
         }
         sender.join().expect("no panic");

@@ -190,19 +190,34 @@ impl Filter {
         if pairs.is_empty() || pairs.len() > MOST_PAIRS {
             return Err(FilterError::Pairs { found: pairs.len(), most: MOST_PAIRS });
         }
-        let lever = self.lever.unwrap_or_else(|| {
-            let tools = pairs.iter().map(|(_, _, tool)| *tool);
-            let ends = tools.flat_map(|tool| [tool.axis_start(), tool.axis_point(1.0)]);
+        let lever = self.lever_of(pairs.iter().map(|(_, _, tool)| *tool), command);
+        Session::new(self, command, period, uncertainty, (rows, lever))?.run(pairs)
+    }
+
+    /// The lever, for these tools and the reference point of a motion.
+    fn lever_of<'a, T: Tool + 'a>(
+        &self,
+        tools: impl Iterator<Item = &'a T>,
+        motion: &Motion,
+    ) -> f32 {
+        self.lever.unwrap_or_else(|| {
             let mut longest = LEAST_LEVER;
-            for end in ends {
-                let arm = sqrt(end.distance_squared(command.about));
+            for end in tools.flat_map(|tool| [tool.axis_start(), tool.axis_point(1.0)]) {
+                let arm = sqrt(end.distance_squared(motion.about));
                 if arm > longest {
                     longest = arm;
                 }
             }
             longest
-        });
-        Session::new(self, command, period, uncertainty, (rows, lever))?.run(pairs)
+        })
+    }
+
+    /// Most that a motion moves the reference point in a period (mm), and that it turns.
+    #[cfg(feature = "bus")]
+    pub(crate) fn most<T: Tool>(&self, tool: &T, motion: &Motion, period: f32) -> (f32, f32) {
+        let most = self.speed * period;
+        let lever = self.lever_of(core::iter::once(tool), motion);
+        (most, session::most_turn(most, lever))
     }
 }
 

@@ -359,7 +359,7 @@ impl<'f> Session<'f> {
 }
 
 /// Most angle (rad) of a period.
-fn most_turn(most: f32, lever: f32) -> f32 {
+pub(super) fn most_turn(most: f32, lever: f32) -> f32 {
     smaller(most / lever, MOST_TURN)
 }
 

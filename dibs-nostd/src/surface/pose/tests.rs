@@ -8,7 +8,8 @@ use std::println;
 use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat, Vec3};
 
-use super::{MOST_SINE, PoseError, PoseStep, RigidPose};
+use super::step::{MOST_SINE, PoseStep};
+use super::{PoseError, RigidPose};
 
 fn vector(rng: &mut Rng, size: f32) -> Vec3 {
     let mut draw = || (rng.f32() - 0.5) * 2.0 * size;
@@ -67,7 +68,7 @@ impl Case {
         next
     }
 
-    /// The exact pose that part of the step beyond its end: the rotation, and the way of the mesh's origin.
+    /// The exact pose after the last frame, at the case's part of the step: the rotation, and where the mesh's origin is.
     fn exact(&self) -> (DQuat, DVec3) {
         let ((a, s), (b, t)) = (exact(&self.before), exact(&self.after));
         let turn = b * a.inverse();

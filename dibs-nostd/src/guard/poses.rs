@@ -1,0 +1,70 @@
+//! The poses of the buffers' frames, from the bus to the control tick.
+//!
+//! The state word that hands a frame over hands its pose over as well: the writer stores a pose before it publishes, and only
+//! for the buffer that nobody reads. (`tests/soundness` tries every order.)
+
+use glam::{Quat, Vec3};
+
+use super::rows::Shared;
+use crate::surface::PoseStep;
+use crate::surface::{AtomicU32, Ordering};
+use crate::{FrameGuard, RigidPose};
+
+/// The poses of the three buffers, and the error (mm) that each showed of the extrapolation before it.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct Poses([[AtomicU32; 8]; 3]);
+
+#[cfg(not(loom))]
+impl Shared for Poses {
+    const NEW: Self = Self([const { [const { AtomicU32::new(0) }; 8] }; 3]);
+}
+
+/// For a model checker, whose atomics are no constants.
+#[cfg(loom)]
+impl Shared for Poses {
+    fn new() -> Self {
+        use core::array::from_fn;
+        Self(from_fn(|_| from_fn(|_| AtomicU32::new(0))))
+    }
+}
+
+impl Poses {
+    /// Stores that of the buffer with this number.
+    pub fn set(&self, buffer: u32, pose: &RigidPose, shown: f32) {
+        let ([x, y, z, w], [a, b, c]) = (pose.rotation().to_array(), pose.shift().to_array());
+        let Some(words) = self.0.get(buffer as usize) else { return };
+        for (word, value) in words.iter().zip([x, y, z, w, a, b, c, shown]) {
+            word.store(value.to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    /// The pose of the last frame.
+    pub(super) fn last(&self, published: &FrameGuard<'_>) -> RigidPose {
+        let [_, (last, _)] = self.of_frames(published);
+        last
+    }
+
+    /// The step that goes on, and the larger of the errors that the last two frames showed; `None` where it does not go on.
+    pub(super) fn step(&self, published: &FrameGuard<'_>, centre: Vec3) -> Option<(PoseStep, f32)> {
+        let [(before, earlier), (last, shown)] = self.of_frames(published);
+        let step = PoseStep::between(&before, &last, centre)?;
+        // The change of the motion may have been none by chance. False for NaN.
+        let shown = if earlier > shown { earlier } else { shown };
+        (shown >= 0.0).then_some((step, shown))
+    }
+
+    /// Those of the frame before and of the published one.
+    pub fn of_frames(&self, published: &FrameGuard<'_>) -> [(RigidPose, f32); 2] {
+        let last = published.number();
+        let before = if last == 0 { 2 } else { last - 1 };
+        [before, last].map(|buffer| {
+            let Some(words) = self.0.get(buffer as usize) else {
+                return (RigidPose::IDENTITY, f32::NAN);
+            };
+            let [x, y, z, w, a, b, c, shown] =
+                words.each_ref().map(|word| f32::from_bits(word.load(Ordering::Relaxed)));
+            (RigidPose::kept(Quat::from_xyzw(x, y, z, w), Vec3::new(a, b, c)), shown)
+        })
+    }
+}
