@@ -111,6 +111,10 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
         self.rows.begin(changed);
     }
 
+    fn takes_poses(&self) -> bool {
+        true
+    }
+
     fn place(&mut self, pose: RigidPose) {
         self.pose = pose;
     }

@@ -23,7 +23,7 @@ use crate::{
 /// A frame without a pose is where the mesh's own frame is; one that changes a part of another keeps its pose. The limits on
 /// [speed](crate::SurfaceLimits::speed) and [recovery](crate::SurfaceLimits::recovery_mm) hold for the rows' step and the
 /// pose's together, also where one undoes the other: a mesh that moves far in a silence is registered anew. The
-/// [reach](crate::SurfaceLimits::reach_mm) is that of the rows alone. Packets carry no pose.
+/// [reach](crate::SurfaceLimits::reach_mm) is that of the rows alone. [`FrameEncoder::with_pose`](crate::wire::FrameEncoder::with_pose) makes packets of a frame with its pose.
 ///
 /// Between frames the mesh goes on by its last step: its centre straight, turning evenly. Where a step turns by more
 /// than half a radian, the surface is held.

@@ -12,8 +12,8 @@ use super::health::{BusHealth, FrameName, Trouble};
 use crate::surface::{AHEAD, Millis, elapsed};
 use crate::tree::SurfaceFacts;
 use crate::wire::{
-    Answer, Begin, Commit, Content, Counters, Event, FrameId, Hello, Mac, Packet, PublishedStatus,
-    Status, is_newer,
+    Answer, Begin, Commit, Content, Counters, Event, FrameId, Hello, Mac, POSE_SEQUENCE, Packet,
+    PublishedStatus, Status, is_newer,
 };
 
 pub use heartbeats::LastHeartbeat;
@@ -486,6 +486,10 @@ impl Frame {
         rows: core::ops::Range<u32>,
     ) -> Result<Option<Place>, ReceiveError> {
         if self.commit.is_some_and(|(commit, _)| sequence >= commit) {
+            return Err(ReceiveError::Order { sequence });
+        }
+        // A posed frame has its pose there, which has no rows.
+        if self.begin.is_posed && sequence == POSE_SEQUENCE && !rows.is_empty() {
             return Err(ReceiveError::Order { sequence });
         }
         match self.arrivals.locate(sequence, rows) {

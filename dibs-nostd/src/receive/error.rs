@@ -92,7 +92,8 @@ pub enum ReceiveError {
         /// Rows that the begin packet announces, or that the frame came to.
         rows: u32,
     },
-    /// A frame with a content that this receiver does not take, or rows in another encoding than their frame's.
+    /// A frame with a content that this receiver does not take, a pose among them, rows in another encoding than their
+    /// frame's, or a pose of a frame without.
     Encoding,
     /// Rows outside the surface.
     OutOfRange {

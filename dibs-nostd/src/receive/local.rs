@@ -105,6 +105,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             rows,
             surface: self.surface_facts(),
             freshness: Freshness { age_ms, echo: Some(now.0) },
+            is_posed: false,
         };
         let outcome = self.local_rows(id, begin, pose, check, store);
         let outcome = outcome.map_err(|rejection| self.refuse_local(&id, rejection));

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::step::Step;
 use super::{Assembler, Progress, ReceiveError, arrivals};
 use crate::stretch::{FrameExtent, Gate};
-use crate::surface::Position;
+use crate::surface::{PoseError, Position, RigidPose};
 use crate::wire::{
     Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
     quantised_row,
@@ -35,6 +35,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
                 self.collector.heartbeat(packet, heartbeat, &self.mac)?;
                 Ok(Progress::Heartbeat)
             }
+            Body::Pose(pose) => self.pose(packet, pose),
             Body::Hello(_) | Body::Status(_) => Err(ReceiveError::ForSenders),
         }
     }
@@ -58,11 +59,14 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             self.publish();
         }
         let takes_weights = self.gate.weight_range(0).is_some();
+        let takes_poses = self.gate.takes_poses();
         let here = self.surface_facts();
         let check_begin = |begin: &Begin| {
             if begin.rows != self.writer.len() {
                 Err(ReceiveError::RowCount { rows: begin.rows })
-            } else if (begin.content == Content::Modal) != takes_weights {
+            } else if (begin.content == Content::Modal) != takes_weights
+                || begin.is_posed && !takes_poses
+            {
                 Err(ReceiveError::Encoding)
             } else if !here.agrees_with(&begin.surface) {
                 Err(ReceiveError::OtherSurface { sent: begin.surface, here })
@@ -87,6 +91,25 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         self.step = Step::new();
         self.gate.begin(if is_partial { FrameExtent::Partial } else { FrameExtent::Whole });
         Ok(Progress::Begun { epoch: frame.id.epoch })
+    }
+
+    /// Takes the pose of a frame: in its sequence a packet of no rows, so that none is published without.
+    #[cold]
+    #[inline(never)]
+    fn pose(
+        &mut self,
+        packet: &Packet<'_>,
+        pose: Result<RigidPose, PoseError>,
+    ) -> Result<Progress, ReceiveError> {
+        let (frame, contribution) = self.collector.frame_of(packet, &self.mac)?;
+        if !frame.begin.is_posed {
+            return Err(ReceiveError::Encoding);
+        }
+        let Some(at) = frame.locate(packet.sequence, 0..0)? else {
+            return Ok(Progress::Duplicate);
+        };
+        self.gate.place(pose.map_err(ReceiveError::Pose)?);
+        Ok(stored(self.collector.take_rows(contribution, at)?, packet.epoch))
     }
 
     #[inline]

@@ -137,6 +137,12 @@ pub trait Gate {
         let _ = rows;
     }
 
+    /// Whether frames may come with a pose.
+    #[doc(hidden)]
+    fn takes_poses(&self) -> bool {
+        false
+    }
+
     /// The frame that has begun is at this pose.
     #[doc(hidden)]
     #[cfg(feature = "bus")]

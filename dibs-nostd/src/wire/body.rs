@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::{QuantisedBox, StatusReport};
+use crate::surface::{PoseError, RigidPose};
 use crate::tree::SurfaceFacts;
 
 /// The contents of a packet.
@@ -17,6 +18,8 @@ pub enum Body<'a> {
     Weights(Weights<'a>),
     /// A frame ends: all of it was sent.
     Commit(Commit),
+    /// Where the surface of a frame is as a whole.
+    Pose(Result<RigidPose, PoseError>),
     /// A sign of life from the sender.
     Heartbeat(Heartbeat),
     /// The receiver's state, with its counters or as the answer to a hello: all that comes back.
@@ -40,6 +43,8 @@ pub struct Begin {
     pub surface: SurfaceFacts,
     /// The frame's freshness when this packet was made.
     pub freshness: Freshness,
+    /// The frame comes with a pose.
+    pub is_posed: bool,
 }
 
 /// The freshness of a frame when its sender made the begin packet.

@@ -1,7 +1,7 @@
 //! The wire protocol: surfaces as packets of at most one transport unit, and statuses on the way back.
 //!
 //! The byte layout is specified in `docs/wire.md`. A frame is one [`Begin`] packet, packets of [`Vertices`] or
-//! [`Weights`], and one [`Commit`]. [`FrameEncoder`] and [`WeightsEncoder`] make the packets on the sender's side,
+//! [`Weights`], and one [`Commit`]; a pose may come between. [`FrameEncoder`] and [`WeightsEncoder`] make the packets on the sender's side,
 //! [`Packet::decode`] reads one in place on the receiver's, and the [`Assembler`](crate::Assembler) makes frames of
 //! them. A [`Heartbeat`] is the sender's sign of life, a [`Status`] reports the published frame to the sender, a
 //! [`Hello`] asks for an [`Answer`].
@@ -82,11 +82,14 @@ pub const MAX_ROWS: u32 = (1 << 24) - 1;
 #[doc(hidden)]
 pub const MAX_CONTENT_PACKETS: u32 = 65_534;
 
+/// The place of a posed frame's pose.
+pub(crate) const POSE_SEQUENCE: u16 = 1;
+
 /// Most weights that a modal frame can have.
 #[doc(hidden)]
 pub const MAX_WEIGHTS: u32 = 64;
 
-/// The packet kinds: the second byte. Others are reserved: 10 for poses, 11 for coarse nodes.
+/// The packet kinds: the second byte. Others are reserved.
 mod kind {
     pub const BEGIN: u8 = 1;
     pub const FLOAT_VERTICES: u8 = 2;
@@ -98,6 +101,7 @@ mod kind {
     pub const HELLO: u8 = 8;
     /// A status that answers a hello.
     pub const ANSWER: u8 = 9;
+    pub const POSE: u8 = 10;
     /// Set in the kind of a packet that carries a tag.
     pub const TAGGED: u8 = 0x80;
 }

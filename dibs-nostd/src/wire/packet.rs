@@ -1,13 +1,16 @@
 //! One packet, decoded in place.
 
+use glam::{Quat, Vec3};
+
 use super::checksum::{checksum, scrambled};
 use super::fields::Fields;
 use super::{
     Answer, Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Direction, Encoding, Freshness,
-    HEADER_BYTES, Heartbeat, Hello, MAX_ROWS, MAX_WEIGHTS, Mac, PacketError, PublishedStatus,
-    QuantisedBox, Rows, Status, StatusReport, TAG_BYTES, VERSION, Vertices, Weights,
-    float_position, kind, padded,
+    HEADER_BYTES, Heartbeat, Hello, MAX_ROWS, MAX_WEIGHTS, Mac, POSE_SEQUENCE, PacketError,
+    PublishedStatus, QuantisedBox, Rows, Status, StatusReport, TAG_BYTES, VERSION, Vertices,
+    Weights, float_position, kind, padded,
 };
+use crate::surface::{PoseError, RigidPose};
 use crate::tree::{SurfaceFacts, Unit};
 
 /// A packet whose checksum and form are right. It borrows the bytes that it was decoded from.
@@ -72,6 +75,7 @@ impl<'a> Packet<'a> {
             kind::STATUS => STATUS_BYTES + usize::from(count) * 4,
             kind::HELLO => 12,
             kind::ANSWER => 36,
+            kind::POSE => 28,
             _ => return Err(PacketError::Kind { kind: tagged_kind }),
         };
         let tag_bytes = if is_tagged { TAG_BYTES } else { 0 };
@@ -104,9 +108,14 @@ impl<'a> Packet<'a> {
         // Only the packets after a frame's begin have a place in it.
         let is_placed = matches!(
             kind,
-            kind::FLOAT_VERTICES | kind::QUANTISED_VERTICES | kind::WEIGHTS | kind::COMMIT
+            kind::FLOAT_VERTICES
+                | kind::QUANTISED_VERTICES
+                | kind::WEIGHTS
+                | kind::COMMIT
+                | kind::POSE
         );
-        if kind != kind::BEGIN && is_placed != (sequence != 0) {
+        let is_misplaced = kind == kind::POSE && sequence != POSE_SEQUENCE;
+        if is_misplaced || kind != kind::BEGIN && is_placed != (sequence != 0) {
             return Err(PacketError::Sequence { sequence });
         }
         // Some kinds have a time of the receiver's clock in place of count and first row.
@@ -128,6 +137,7 @@ impl<'a> Packet<'a> {
                 zero(&fields.take::<2>(), HEADER_BYTES + 2)?;
                 Body::Hello(Hello { session, nonce: fields.u64() })
             }
+            kind::POSE => Body::Pose(pose(Fields(body))),
             kind::ANSWER => Body::Status(answer(Fields(body), session_low, epoch, clock)?),
             _ => Body::Status(status(Fields(body), session_low, epoch, first)?),
         };
@@ -176,6 +186,9 @@ pub(super) const STATUS_BYTES: usize = 20;
 /// Bit of a begin's form, and of a heartbeat's: the word before the body is an echo.
 pub(super) const HAS_ECHO: u8 = 0x80;
 
+/// Bit of a begin's form: the frame comes with a pose.
+pub(super) const HAS_POSE: u8 = 0x40;
+
 /// The session, whose lower half is in the header.
 fn session_of(high: u16, low: u16) -> u32 {
     u32::from(high) << 16 | u32::from(low)
@@ -191,7 +204,7 @@ fn begin(
     let (age_ms, form) = (fields.u16(), fields.u8());
     let surface = facts(&mut fields)?;
     let (content, encoding) = (form & 7, form >> 3 & 7);
-    zero(&[form & 0x40], HEADER_BYTES + 4)?;
+    let is_posed = form & HAS_POSE != 0;
     let freshness = Freshness { age_ms, echo: echo_of(form, echo)? };
     let (content, limit) = match content {
         0 => (Content::Whole, MAX_ROWS),
@@ -205,7 +218,10 @@ fn begin(
     // A modal frame's weights are counted where others have their box.
     let offset = HEADER_BYTES + 12;
     let (rows, offset) = match content {
-        Content::Modal => (fields.u24(), offset + 3),
+        Content::Modal => {
+            zero(&[u8::from(is_posed)], HEADER_BYTES + 4)?;
+            (fields.u24(), offset + 3)
+        }
         _ => (surface.vertices, offset),
     };
     if rows == 0 || rows > limit {
@@ -225,7 +241,16 @@ fn begin(
         }
         encoding => return Err(PacketError::Encoding { encoding }),
     };
-    Ok(Begin { session, content, encoding, rows, surface, freshness })
+    Ok(Begin { session, content, encoding, rows, surface, freshness, is_posed })
+}
+
+/// The pose that a packet states.
+#[cold]
+#[inline(never)]
+fn pose(mut fields: Fields<'_>) -> Result<RigidPose, PoseError> {
+    let mut float = || f32::from_bits(fields.u32());
+    let rotation = Quat::from_xyzw(float(), float(), float(), float());
+    RigidPose::new(rotation, Vec3::new(float(), float(), float()))
 }
 
 /// The echo of a packet with these flags.

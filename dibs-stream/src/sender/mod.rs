@@ -21,6 +21,7 @@ pub use totals::Totals;
 use std::fmt;
 use std::time::Duration;
 
+use dibs_nostd::RigidPose;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     Content, Counters, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac, QuantisedBox,
@@ -196,6 +197,21 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.transmit(frame)
     }
 
+    /// Sends a frame that was captured some time ago, with the pose at which its surface is as a whole: the positions are
+    /// those of the mesh's own frame. For a receiver of [`Posed`](dibs_nostd::guard::Posed) frames.
+    ///
+    /// # Errors
+    /// As [`send`](Self::send).
+    pub fn send_at(
+        &mut self,
+        positions: &[Vec3],
+        pose: RigidPose,
+        ago: Duration,
+    ) -> Result<Sent, SendError> {
+        let frame = self.prepare_at(positions, pose, ago)?;
+        self.transmit(frame)
+    }
+
     /// The first half of [`send`](Self::send): makes the packets. From here on [`held`](Self::held) includes this
     /// frame, which must be transmitted next.
     ///
@@ -215,10 +231,32 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         positions: &[Vec3],
         ago: Duration,
     ) -> Result<Prepared, SendError> {
+        self.prepare_frame(positions, None, ago)
+    }
+
+    /// The first half of [`send_at`](Self::send_at).
+    ///
+    /// # Errors
+    /// [`SendError`] names the vertex that cannot be sent.
+    pub fn prepare_at(
+        &mut self,
+        positions: &[Vec3],
+        pose: RigidPose,
+        ago: Duration,
+    ) -> Result<Prepared, SendError> {
+        self.prepare_frame(positions, Some(pose), ago)
+    }
+
+    fn prepare_frame(
+        &mut self,
+        positions: &[Vec3],
+        pose: Option<RigidPose>,
+        ago: Duration,
+    ) -> Result<Prepared, SendError> {
         self.check()?;
         let freshness = self.freshness(ago);
         let (mut memory, mut held) = (std::mem::take(&mut self.memory), self.held.take());
-        match self.make_packets(positions, freshness, &mut memory, &mut held) {
+        match self.make_packets(positions, (freshness, pose), &mut memory, &mut held) {
             Ok((sent, held)) => {
                 let (rows, packets) = memory;
                 (self.memory.0, self.held) = (rows, Some((sent.epoch, held)));
@@ -243,7 +281,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     fn make_packets(
         &mut self,
         positions: &[Vec3],
-        freshness: Freshness,
+        (freshness, pose): (Freshness, Option<RigidPose>),
         (rows, packets): &mut (Vec<Vec3>, Packets),
         held: &mut Option<(u32, Vec<Vec3>)>,
     ) -> Result<(Sent, Vec<Vec3>), SendError> {
@@ -263,6 +301,10 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         };
         let mac = self.mac.as_ref().ok_or(SendError::NoChallenge)?;
         let facts = self.surface.facts;
+        let frame = frame.and_then(|frame| match pose {
+            Some(pose) => frame.with_pose(pose),
+            None => Ok(frame),
+        });
         let frame = frame
             .and_then(|frame| frame.with_freshness(freshness).with_surface(facts).with_mac(mac));
         packets.fill::<_, MTU>(frame.map_err(SendError::Frame)?);

@@ -59,11 +59,11 @@ fn what_is_no_packet() {
         assert_eq!(rejection_of(&fault), packet(PacketError::Version { version }));
     }
     for (fault, expected) in [
-        // Kinds of later versions: poses and coarse nodes.
-        (edit(vertices, 1, &[10]), PacketError::Kind { kind: 10 }),
+        // A kind of later versions, and others.
         (edit(vertices, 1, &[11]), PacketError::Kind { kind: 11 }),
+        (edit(vertices, 1, &[12]), PacketError::Kind { kind: 12 }),
         (edit(vertices, 1, &[0]), PacketError::Kind { kind: 0 }),
-        (edit(vertices, 1, &[0x8A]), PacketError::Kind { kind: 0x8A }),
+        (edit(vertices, 1, &[0x8C]), PacketError::Kind { kind: 0x8C }),
         // Length, count and padding.
         (edit(vertices, 14, &[2]), PacketError::Length { bytes: 64, expected: 48 }),
         (edit(vertices, 14, &[4]), PacketError::Length { bytes: 64, expected: 70 }),
@@ -91,7 +91,7 @@ fn what_is_no_packet() {
         (edit(begin, 23, &[6]), PacketError::Unit { unit: 6 }),
         (edit(begin, 23, &[255]), PacketError::Unit { unit: 255 }),
         (edit(begin, 22, &[7 << 3]), PacketError::Encoding { encoding: 7 }),
-        (edit(begin, 22, &[0x40]), PacketError::Reserved { offset: 22 }),
+        (edit(&raw_begin(1, 1, 2, 6, 0), 22, &[0x42]), PacketError::Reserved { offset: 22 }),
         (edit(begin, 24, &[0; 3]), PacketError::Rows { rows: 0 }),
         (edit(begin, 30, &[1]), PacketError::Reserved { offset: 30 }),
         (edit(begin, 53, &[1]), PacketError::Reserved { offset: 30 }),
@@ -100,6 +100,12 @@ fn what_is_no_packet() {
         (raw_begin(1, 1, 2, 0, 0), PacketError::Rows { rows: 0 }),
         (edit(&raw_begin(1, 1, 2, 6, 0), 33, &[1]), PacketError::Reserved { offset: 33 }),
         (edit(&raw_begin(1, 1, 2, 6, 0), 22, &[2 | 1 << 3]), PacketError::Encoding { encoding: 1 }),
+        // A pose's.
+        (raw(10, 1, 1, [0, 0], 0, &[0; 28]), PacketError::Sequence { sequence: 0 }),
+        (raw(10, 1, 1, [2, 0], 0, &[0; 28]), PacketError::Sequence { sequence: 2 }),
+        (raw(10, 1, 1, [1, 1], 0, &[0; 28]), PacketError::Reserved { offset: 14 }),
+        (raw(10, 1, 1, [1, 0], 1, &[0; 28]), PacketError::Reserved { offset: 15 }),
+        (raw(10, 1, 1, [1, 0], 0, &with(29, 28, 1)), PacketError::Reserved { offset: 46 }),
         // A heartbeat's and a status's.
         (raw(6, 1, 1, [0, 0], 0, &[0, 0, 1, 0, 0, 0, 0, 0]), PacketError::Reserved { offset: 20 }),
         (raw(6, 1, 1, [0, 1], 0, &[0; 8]), PacketError::Reserved { offset: 14 }),

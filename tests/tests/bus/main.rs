@@ -18,6 +18,7 @@ mod line;
 mod local;
 mod order;
 mod partial;
+mod posed_packets;
 mod properties;
 mod published_motion;
 mod specification;

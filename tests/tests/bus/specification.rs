@@ -1,13 +1,13 @@
 //! `docs/wire.md` against the code: the encoders write its test vectors, and the decoder reads them.
 
-use dibs_nostd::SurfaceFacts;
 use dibs_nostd::format::Unit;
-use dibs_nostd::glam::Vec3;
+use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{
     AesCmac, Answer, Body, Counters, Encoding, FrameEncoder, FrameId, Freshness, NoMac, Packet,
     PublishedStatus, QuantisedBox, Status, StatusReport, WeightsEncoder, encode_heartbeat,
     encode_hello, encode_status, enframe, framed_bytes,
 };
+use dibs_nostd::{RigidPose, SurfaceFacts};
 
 const ID: FrameId = FrameId { mesh_id: 0xD1B5_0001, session: 0x0003_0002, epoch: 258 };
 
@@ -81,7 +81,27 @@ fn vectors() -> Vec<(&'static str, Vec<u8>)> {
     all.push(("status", status.into()));
     let answer = encode_status(ID.mesh_id, &answer(), &counters(), &mac, &mut buffer);
     all.push(("answer", answer.into()));
+
+    let posed = |epoch| {
+        let id = FrameId { epoch, ..ID };
+        let frame = FrameEncoder::<_, 64>::new(id, encoding, &positions[..]).unwrap();
+        frame.with_pose(pose()).unwrap()
+    };
+    let mut frame = posed(262);
+    for name in ["begin", "pose", "vertices", "commit"] {
+        all.push((name, frame.next_packet(&mut buffer).unwrap().to_vec()));
+    }
+    let mut frame = posed(263).with_mac(&mac).unwrap();
+    for name in ["begin", "pose"] {
+        all.push((name, frame.next_packet(&mut buffer).unwrap().to_vec()));
+    }
     all
+}
+
+/// That of the last frames.
+fn pose() -> RigidPose {
+    let turn = Quat::from_xyzw(0.0, 0.0, 0.6, 0.8);
+    RigidPose::new(turn, Vec3::new(1.0, -2.0, 3.0)).unwrap()
 }
 
 /// The status that answers the hello.
@@ -142,12 +162,13 @@ fn every_vector_is_read_as_what_it_was_written_from() {
         match (*name, packet.body) {
             ("begin", Body::Begin(begin)) => {
                 assert_eq!(begin.session, ID.session);
+                assert_eq!(begin.is_posed, packet.epoch > 261);
                 let is_first = packet.epoch == 258;
                 let freshness = if is_first { FRESHNESS } else { Freshness::default() };
                 assert_eq!(begin.freshness, freshness);
                 let surface = match packet.epoch {
                     258 => SURFACE,
-                    259 => SurfaceFacts { vertices: 2, ..SurfaceFacts::default() },
+                    259 | 262.. => SurfaceFacts { vertices: 2, ..SurfaceFacts::default() },
                     _ => SurfaceFacts { vertices: 5, ..SURFACE },
                 };
                 assert_eq!(begin.surface, surface);
@@ -161,6 +182,7 @@ fn every_vector_is_read_as_what_it_was_written_from() {
                     weights.values.iter().map(|w| f32::from_le_bytes(*w)).collect();
                 assert_eq!((weights.first, values), (0, vec![1.0, -0.5, 0.25]));
             }
+            ("pose", Body::Pose(found)) => assert_eq!((found, packet.sequence), (Ok(pose()), 1)),
             ("heartbeat", Body::Heartbeat(heartbeat)) => {
                 assert_eq!(heartbeat.session, ID.session);
                 assert_eq!(heartbeat.beat, packet.epoch - 253);

@@ -1,14 +1,15 @@
 //! A frame of vertices as packets.
 
 use super::{PacketWriter, begin_packet, capacity};
-use crate::VertexTable;
 use crate::tree::SurfaceFacts;
 use crate::wire::{
     Begin, Content, EncodeError, Encoding, FrameId, Freshness, HEADER_BYTES, MAX_CONTENT_PACKETS,
     MAX_ROWS, Mac, NoMac, kind,
 };
+use crate::{RigidPose, VertexTable};
 
-/// Cuts one frame into packets of at most `MTU` bytes: begin, vertices, commit.
+/// Cuts one frame into packets of at most `MTU` bytes: begin, vertices, commit; behind the begin a pose, if the frame has
+/// [one](Self::with_pose).
 ///
 /// `MTU` is 64 for CAN-FD, up to [`MAX_PACKET`](crate::wire::MAX_PACKET) elsewhere; less than 64 does
 /// not compile. No memory but the caller's buffer.
@@ -47,6 +48,7 @@ pub struct FrameEncoder<'a, T: ?Sized, const MTU: usize, M = NoMac> {
     positions: &'a T,
     /// For a partial frame, the receiver's positions.
     held: Option<&'a T>,
+    pose: Option<RigidPose>,
     mac: M,
     next: Next,
     sequence: u16,
@@ -56,6 +58,7 @@ pub struct FrameEncoder<'a, T: ?Sized, const MTU: usize, M = NoMac> {
 #[derive(Debug)]
 enum Next {
     Begin,
+    Pose(RigidPose),
     Vertices { first: u32 },
     Commit,
     Done,
@@ -80,10 +83,10 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         }
         let (session, freshness) = (id.session, Freshness::default());
         let (content, surface) = (Content::Whole, SurfaceFacts::default());
-        let begin = Begin { session, content, encoding, rows, surface, freshness };
-        let next = Next::Begin;
+        let begin = Begin { session, content, encoding, rows, surface, freshness, is_posed: false };
+        let (held, pose, next) = (None, None, Next::Begin);
         let frame =
-            Self { id, begin, positions, held: None, mac: NoMac, next, sequence: 0, digest: 0 };
+            Self { id, begin, positions, held, pose, mac: NoMac, next, sequence: 0, digest: 0 };
         frame.fits()
     }
 
@@ -127,13 +130,24 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         self
     }
 
+    /// The same frame at a pose, for a receiver of [`Posed`](crate::guard::Posed) frames: positions are those before it. A
+    /// partial frame without one keeps that of its base; a whole one without is where the mesh's file has it.
+    ///
+    /// # Errors
+    /// [`EncodeError::Packets`], because the pose takes one.
+    pub fn with_pose(mut self, pose: RigidPose) -> Result<Self, EncodeError> {
+        self.begin.is_posed = true;
+        self.pose = Some(pose);
+        self.fits()
+    }
+
     /// The same frame, with a tag on every packet.
     ///
     /// # Errors
     /// [`EncodeError::Packets`], because fewer vertices fit a packet.
     pub fn with_mac<M: Mac>(self, mac: M) -> Result<FrameEncoder<'a, T, MTU, M>, EncodeError> {
-        let Self { id, begin, positions, held, next, sequence, digest, .. } = self;
-        FrameEncoder { id, begin, positions, held, mac, next, sequence, digest }.fits()
+        let Self { id, begin, positions, held, pose, next, sequence, digest, .. } = self;
+        FrameEncoder { id, begin, positions, held, pose, mac, next, sequence, digest }.fits()
     }
 }
 
@@ -154,7 +168,7 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
     /// A partial frame never takes more packets than a whole one: each packet starts at a vertex that
     /// moved, and takes all that fit behind it.
     fn fits(self) -> Result<Self, EncodeError> {
-        let packets = self.begin.rows.div_ceil(self.capacity());
+        let packets = self.begin.rows.div_ceil(self.capacity()) + u32::from(self.pose.is_some());
         if packets > MAX_CONTENT_PACKETS { Err(EncodeError::Packets { packets }) } else { Ok(self) }
     }
 
@@ -165,6 +179,17 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
                 let packet = begin_packet::<M>(buffer, &self.id, &self.begin);
                 let (packet, contribution) = packet.finish(&self.mac, self.id.session);
                 self.digest = contribution;
+                self.next = self.pose.map_or_else(|| self.vertices_from(0), Next::Pose);
+                return Some(packet);
+            }
+            Next::Pose(pose) => {
+                self.sequence = self.sequence.wrapping_add(1);
+                let mut packet = self.packet(buffer, kind::POSE, 0, 0);
+                for number in pose.rotation().to_array().iter().chain(&pose.shift().to_array()) {
+                    packet.put(&number.to_le_bytes());
+                }
+                let (packet, contribution) = packet.finish(&self.mac, self.id.session);
+                self.digest = self.digest.wrapping_add(contribution);
                 self.next = self.vertices_from(0);
                 return Some(packet);
             }

@@ -10,7 +10,7 @@ use core::fmt;
 
 use super::checksum::{checksum, scrambled};
 use super::fields::Bytes;
-use super::packet::{HAS_ECHO, STATUS_BYTES};
+use super::packet::{HAS_ECHO, HAS_POSE, STATUS_BYTES};
 use super::{
     Answer, Begin, CHECKSUM_BYTES, Content, Counters, Direction, Encoding, FrameId, HEADER_BYTES,
     MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, Status, TAG_BYTES, VERSION, kind,
@@ -194,7 +194,8 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         let encoding = u8::from(begin.encoding != Encoding::Float);
         let has_echo = if begin.freshness.echo.is_some() { HAS_ECHO } else { 0 };
         self.put(&begin.freshness.age_ms.to_le_bytes());
-        self.put(&[content | encoding << 3 | has_echo]);
+        let has_pose = if begin.is_posed { HAS_POSE } else { 0 };
+        self.put(&[content | encoding << 3 | has_pose | has_echo]);
         if begin.content == Content::Modal {
             self.surface(&begin.surface);
             self.put_u24(begin.rows);

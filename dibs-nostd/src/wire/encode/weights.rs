@@ -96,6 +96,7 @@ impl<M: Mac, const MTU: usize> WeightsEncoder<'_, MTU, M> {
                 rows: self.weights.len() as u32,
                 surface: self.surface,
                 freshness: self.freshness,
+                is_posed: false,
             };
             let packet = begin_packet::<M>(buffer, &self.id, &begin);
             let (packet, contribution) = packet.finish(&self.mac, self.id.session);
