@@ -13,8 +13,8 @@ use crate::math::sqrt::sqrt;
 use crate::surface::{PoseStep, grown};
 use crate::tree::VertexOrder;
 use crate::{
-    Error, FrameGuard, Index, Proximity, QueryError, RigidPose, SurfaceLimits, Tool, TrackerAnswer,
-    Tree, Unavailable,
+    Contacts, Error, FrameGuard, Index, Proximity, QueryError, RigidPose, SurfaceLimits, Tool,
+    TrackerAnswer, Tree, Unavailable, VertexTable,
 };
 
 /// Frames of rows `R`, each with a rigid pose: where the mesh is as a whole, say by a tracker of the patient, beside what
@@ -118,9 +118,10 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
 
     /// Where no pose is known for later, the rows are held as well.
     fn now<'f>(of: &Self::Of<'_>, poses: &Poses, published: &'f FrameGuard<'f>) -> Blend<'f> {
-        match poses.step(published, of.centre) {
-            Some(_) => published.extrapolated(),
-            None => published.held(),
+        if poses.are_none(published) || poses.step(published, of.centre).is_some() {
+            published.extrapolated()
+        } else {
+            published.held()
         }
     }
 
@@ -130,6 +131,10 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
         published: &FrameGuard<'_>,
         rows: &Blend<'_>,
     ) -> Option<Placed> {
+        // Frames that never had one are as those of rows alone, to the bit.
+        if poses.are_none(published) {
+            return None;
+        }
         Some(match poses.step(published, of.centre) {
             Some((step, shown)) => Placed::moving(step, shown, rows),
             None => Placed::at(poses.last(published)),
@@ -253,6 +258,29 @@ impl Placed {
             TrackerAnswer { closest, ..answer }
         });
         (Some(searched), tracked.map_err(Unavailable::Query))
+    }
+
+    /// The velocity (mm/s) that the pose gives a point of a triangle, as it is to the mesh.
+    pub(super) fn flow(
+        &self,
+        surface: &impl VertexTable,
+        corners: [u32; 3],
+        weights: [f32; 3],
+    ) -> Vec3 {
+        let Some((step, part, rate)) = self.step else { return Vec3::ZERO };
+        let mut point = Vec3::ZERO;
+        for (corner, weight) in corners.into_iter().zip(weights) {
+            point += surface.position(corner).unwrap_or_default() * weight;
+        }
+        self.pose.rotate_inverse(step.velocity(part, self.pose.apply(point)) * rate)
+    }
+
+    /// Contacts of the moved tool, as they are in the world.
+    pub(super) fn lead_back<const N: usize, const NEAR: usize>(
+        &self,
+        contacts: &mut Contacts<N, NEAR>,
+    ) {
+        contacts.place(|point| self.pose.apply(point), |vector| self.pose.rotate(vector));
     }
 
     /// The motion as it is to the mesh.

@@ -39,6 +39,13 @@ impl Poses {
         }
     }
 
+    /// Whether neither the frame before nor the last one has another pose than the mesh's own frame.
+    pub(super) fn are_none(&self, published: &FrameGuard<'_>) -> bool {
+        let [(before, _), (last, _)] = self.of_frames(published);
+        let no_frame = RigidPose::kept(Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), Vec3::ZERO);
+        last == RigidPose::IDENTITY && [RigidPose::IDENTITY, no_frame].contains(&before)
+    }
+
     /// The pose of the last frame.
     pub(super) fn last(&self, published: &FrameGuard<'_>) -> RigidPose {
         let [_, (last, _)] = self.of_frames(published);

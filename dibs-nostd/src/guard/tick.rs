@@ -123,8 +123,6 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     /// for others each tick searches anew. The list is empty where there is no surface, or the query failed. Its
     /// [accuracy](Contacts::accuracy) covers what the pair's does.
     ///
-    /// Not for frames with poses yet.
-    ///
     /// Cost: the budget at most, about a thousand instructions, and some hundred for each contact.
     pub fn contacts<T: Tool, const N: usize, const NEAR: usize>(
         &mut self,
@@ -132,19 +130,27 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         margin: f32,
         now: Millis,
         contacts: &mut Contacts<N, NEAR>,
-    ) -> Answer
-    where
-        R: Rows<Poses = ()>,
-    {
+    ) -> Answer {
         contacts.clear();
         let (answer, _) = self.on_latest(
             tool,
             now,
-            |tracker, surface, tool, flow, options| {
-                let off = sum_up(surface.position_error(), flow.margin());
+            |tracker, surface, own, flow, options| {
+                let placed = flow.placed.map_or(0.0, |placed| placed.error(tool));
+                let off = sum_up(sum_up(surface.position_error(), placed), flow.margin());
                 let margin = sum_up(margin, off);
-                let tracked = tracker.contacts(surface, tool, margin, options, contacts)?;
-                contacts.set_velocities(|corners, weights| Ok(flow.at(corners, weights)))?;
+                let tracked = tracker.contacts(surface, own, margin, options, contacts)?;
+                contacts.set_velocities(|corners, weights| {
+                    let own = flow.at(corners, weights);
+                    Ok(match flow.placed {
+                        Some(placed) => own + placed.flow(surface, corners, weights),
+                        None => own,
+                    })
+                })?;
+                if let Some(placed) = flow.placed {
+                    placed.lead_back(contacts);
+                    contacts.widen(placed.error(tool));
+                }
                 Ok(tracked)
             },
             |_, _, _, _| (),
@@ -245,7 +251,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         let (searched, tracked) = match (frame, surface) {
             (Some(frame), Ok((blend, surface))) => {
                 let notes = &notes.of_all;
-                let flow = Flow { rows, blend, frame, failsafe, notes, now };
+                let flow = Flow { rows, blend, placed, frame, failsafe, notes, now };
                 let tracked = search(tracker, surface, own, &flow, options);
                 let searched = Searched {
                     frame,
@@ -319,6 +325,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
 struct Flow<'a, 'f, 't, R: Rows> {
     rows: &'f R::Of<'t>,
     blend: &'f Blend<'f>,
+    placed: Option<&'a Placed>,
     frame: FrameAge,
     failsafe: &'a FailSafe,
     notes: &'a Common,

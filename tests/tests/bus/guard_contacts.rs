@@ -1,9 +1,9 @@
 //! A guard's contacts: those of a tracker on the same surface, in the guard's one budget.
 
 use dibs_build::{Builder, generate};
-use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper};
-use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface, Vertices};
+use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper, VelocityRow};
+use dibs_nostd::glam::{Quat, Vec3};
+use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Posed, Surface, Vertices};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, NoMac};
 use dibs_nostd::{
     Advance, Assembler, Budget, Capsule, Contact, Contacts, Frames, Millis, Options, QueryError,
@@ -153,6 +153,86 @@ fn acts(proxy: &Proxy, answer: &Answer, list: &List, tool: &Capsule) -> bool {
         assert_eq!(wrench.state, ConstraintState::Safe(cause));
     }
     wrench.force.length() > 0.1
+}
+
+type PosedEnds = (
+    Bus<'static, 'static, u16, NoMac, Posed>,
+    Guard<'static, 'static, u16, 64, OPENED, Posed, RANGE>,
+);
+
+/// The contacts of frames with poses are those of frames whose vertices were moved: the mesh lies turned somewhere, and
+/// travels, so that both go on straight between frames.
+#[test]
+fn contacts_on_a_mesh_with_a_pose_are_those_of_the_moved_mesh() {
+    let generate::MovingMesh { mesh, .. } = generate::heart(1_280).expect("a valid size");
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let bytes: &'static [u8] = built.blob().to_vec().leak();
+    let tree = TreeBytes::new(bytes);
+    let surfaces = SurfaceLimits::reach_mm(2_000.0).speed(f32::INFINITY).recovery_mm(f32::INFINITY);
+    let limits = GuardLimits::new(300.0, Millis(200)).surfaces(surfaces).automatic();
+    let posed: &'static Surface<ROWS, Posed> = Box::leak(Box::new(Surface::new()));
+    let moved: &'static Surface<ROWS> = Box::leak(Box::new(Surface::new()));
+    let (mut bus, mut guard): PosedEnds =
+        posed.start_with_contacts(tree, limits, NoMac).expect("valid");
+    let (mut other_bus, mut other): Ends =
+        moved.start_with_contacts(tree, limits, NoMac).expect("valid");
+    let turn = Quat::from_scaled_axis(Vec3::new(0.9, -0.6, 1.3)).normalize();
+    let shift =
+        |now: u32| Vec3::new(50.0, -80.0, 120.0) + Vec3::new(0.04, 0.02, -0.03) * now as f32;
+    let (mut own, mut expected) = (List::new(), List::new());
+    let (mut listed, mut inside, mut others) = (0, 0, 0);
+    for now in 0..4_000 {
+        if now % PERIOD == 0 {
+            let frame = mesh.positions.as_slice();
+            bus.frame_at(frame, (turn, shift(now)), Millis(now), Millis(now)).expect("good");
+            while bus.work(1_000).expect("admitted") == Advance::Pending {}
+            let frame: Vec<Vec3> = frame.iter().map(|&at| turn * at + shift(now)).collect();
+            other_bus.frame(&frame, Millis(now), Millis(now)).expect("a good frame");
+            while other_bus.work(1_000).expect("admitted") == Advance::Pending {}
+        }
+        let local = tool(now);
+        let ends = [local.axis_start(), local.axis_point(1.0)].map(|at| turn * at + shift(now));
+        let tool = Capsule::new(ends[0], ends[1], local.radius()).expect("finite");
+        let answer = guard.contacts(&tool, MARGIN, Millis(now), &mut own);
+        let found = other.contacts(&tool, MARGIN, Millis(now), &mut expected);
+        if now < 4 * PERIOD {
+            continue;
+        }
+        assert!(answer.tracked.is_ok() && found.tracked.is_ok(), "{now} {answer:?} {found:?}");
+        assert!(own.accuracy() < 0.1, "{now} {} {}", own.accuracy(), expected.accuracy());
+        for one in own.iter().filter(|one| one.separation < MARGIN - 0.1) {
+            let near =
+                |other: &&Contact| other.point_on_surface.distance(one.point_on_surface) < 0.5;
+            let Some(same) = expected.iter().find(near) else { continue };
+            // A depth has a tolerance besides.
+            let tolerance = if one.separation < -2.4 { 0.25 } else { 0.0 };
+            let slack = own.accuracy() + expected.accuracy() + tolerance;
+            assert!((one.separation - same.separation).abs() <= slack, "{now} {one:?} {same:?}");
+            let between = one.point_on_tool - one.point_on_surface;
+            assert!(between.cross(one.normal).length() < 0.02, "{now} {one:?}");
+            if one.normal.distance(same.normal) > 0.01 {
+                continue;
+            }
+            listed += 1;
+            assert!(one.velocity.distance(same.velocity) < 0.5, "{now} {one:?} {same:?}");
+            assert!(one.velocity.length() > 10.0, "{now} {one:?}");
+            // And what bounds a depth.
+            if one.separation < -2.5 {
+                let row = |of: &Contact| VelocityRow::new(of, 0.0, tool.axis_start());
+                let (row, same) = (row(one), row(same));
+                let off = |a: [f32; 3], b: [f32; 3]| Vec3::from(a).distance(Vec3::from(b));
+                let is_same = off(row.linear, same.linear) < 0.02
+                    && off(row.angular, same.angular) < 1.0
+                    && (row.least - same.least).abs() < 0.5;
+                inside += u32::from(is_same);
+                others += u32::from(!is_same);
+            }
+        }
+    }
+    println!(
+        "{listed} contacts; of {inside} with a depth its rate is the same, of {others} another"
+    );
+    assert!(listed > 1_000 && inside > 100 && others < inside / 20, "{listed} {inside} {others}");
 }
 
 #[test]

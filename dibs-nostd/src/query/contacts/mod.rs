@@ -279,6 +279,19 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.clear();
     }
 
+    /// Leads each contact to another frame, by what becomes of a point and of a vector.
+    #[cfg(all(feature = "bus", feature = "control"))]
+    pub(crate) fn place(&mut self, point: impl Fn(Vec3) -> Vec3, vector: impl Fn(Vec3) -> Vec3) {
+        for contact in &mut self.found.list {
+            contact.normal = vector(contact.normal);
+            contact.point_on_surface = point(contact.point_on_surface);
+            contact.point_on_tool = point(contact.point_on_tool);
+            contact.velocity = vector(contact.velocity);
+            contact.across.normal = vector(contact.across.normal);
+            contact.across.on_axis = point(contact.across.on_axis);
+        }
+    }
+
     /// Widens the accuracy by a further error (mm) of the surface.
     #[cfg(all(feature = "bus", feature = "control"))]
     pub(crate) fn widen(&mut self, error: f32) {
