@@ -162,7 +162,7 @@
 /**
  * Bytes of a surface's storage besides its vertices.
  */
-#define DIBS_SURFACE_BASE 448
+#define DIBS_SURFACE_BASE 576
 
 /**
  * Bytes of a surface's storage for each vertex: two positions.
@@ -1170,24 +1170,6 @@ typedef struct {
 } dibs_guard_limits;
 
 /**
- * Facts about a bus.
- */
-typedef struct {
-  /**
-   * 0 before the first frame; then the epoch is 0, too.
-   */
-  uint32_t is_published;
-  /**
-   * Number of the frame published last; wraps.
-   */
-  uint32_t epoch;
-  /**
-   * Whole rounds of the check of the tree's bytes; wraps.
-   */
-  uint32_t rounds;
-} dibs_bus_facts;
-
-/**
  * A point, a direction, a force or a velocity.
  */
 typedef struct {
@@ -1204,6 +1186,38 @@ typedef struct {
    */
   float z;
 } dibs_vec3;
+
+/**
+ * Where a mesh is as a whole: its point `p` is at `rotation p + shift`.
+ */
+typedef struct {
+  /**
+   * A quaternion x, y, z, w; the square of its length is within 2^-20 of 1.
+   */
+  float rotation[4];
+  /**
+   * In mm.
+   */
+  dibs_vec3 shift;
+} dibs_pose;
+
+/**
+ * Facts about a bus.
+ */
+typedef struct {
+  /**
+   * 0 before the first frame; then the epoch is 0, too.
+   */
+  uint32_t is_published;
+  /**
+   * Number of the frame published last; wraps.
+   */
+  uint32_t epoch;
+  /**
+   * Whole rounds of the check of the tree's bytes; wraps.
+   */
+  uint32_t rounds;
+} dibs_bus_facts;
 
 /**
  * A wall: a margin around the surface, with a spring and a damper.
@@ -2071,6 +2085,29 @@ dibs_code dibs_bus_frame(dibs_bus *bus,
                          uint32_t count,
                          uint32_t captured,
                          uint32_t now);
+
+/**
+ * The same as `dibs_bus_frame`, with the mesh as a whole elsewhere, say by a tracker of the patient: tools, answers and
+ * commands are then in the world. A frame without a pose is where the mesh's file has it.
+ *
+ * The limits on speed and recovery hold for positions and pose together; the reach is that of the positions alone. Where a
+ * step turns by more than half a radian the surface is held, not extrapolated.
+ *
+ * @param bus        The bus.
+ * @param positions  As for `dibs_bus_frame`.
+ * @param count      Their number.
+ * @param pose       The pose, read during the call.
+ * @param captured   When the surface was so, and there.
+ * @param now        The receiver's clock, in ms; wraps.
+ * @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM` for
+ *         numbers that are no pose.
+ */
+dibs_code dibs_bus_frame_at(dibs_bus *bus,
+                            const float *positions,
+                            uint32_t count,
+                            const dibs_pose *pose,
+                            uint32_t captured,
+                            uint32_t now);
 
 /**
  * Does a slice of the checks: looks at some rows and triangles of the frame that arrives, and publishes it once it is

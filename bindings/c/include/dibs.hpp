@@ -119,6 +119,10 @@ struct Bus : Object<dibs_bus, DIBS_BUS_SIZE, dibs_bus_init> {
     Code frame(std::span<const float> positions, uint32_t captured, uint32_t now) {
         return dibs_bus_frame(*this, positions.data(), uint32_t(positions.size() / 3), captured, now);
     }
+    /** The same, with the mesh as a whole at a pose. */
+    Code frame_at(std::span<const float> positions, const dibs_pose &pose, uint32_t captured, uint32_t now) {
+        return dibs_bus_frame_at(*this, positions.data(), uint32_t(positions.size() / 3), &pose, captured, now);
+    }
     Code work(uint32_t work, dibs_advance *outcome = nullptr) { return dibs_bus_work(*this, work, outcome); }
 };
 /** The control tick's end of a guarded surface. */

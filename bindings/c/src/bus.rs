@@ -2,8 +2,9 @@
 
 use core::ffi::c_void;
 
-use dibs_nostd::guard::Bus;
-use dibs_nostd::nodes::Nodes;
+use bytemuck::AnyBitPattern;
+use dibs_nostd::glam::Quat;
+use dibs_nostd::guard::{Bus, Rows};
 use dibs_nostd::wire::{Event, NoMac};
 use dibs_nostd::{Advance, Millis, Progress, ReceiveError, TreeBytes, VertexTable};
 
@@ -12,7 +13,7 @@ use crate::code::dibs_code;
 use crate::frame::rows;
 use crate::limits::dibs_guard_limits;
 use crate::receiver::{DIBS_EVENTS, DIBS_STATUS, dibs_advance, dibs_progress};
-use crate::surface::dibs_surface;
+use crate::surface::{OfNodes, OfVertices, dibs_surface};
 use crate::tool::dibs_vec3;
 use crate::tree::dibs_tree;
 
@@ -33,8 +34,8 @@ pub struct dibs_bus(TheBus);
     reason = "its storage has one size, and there is no allocator"
 )]
 enum TheBus {
-    Vertices(Bus<'static, 'static, u16>),
-    Nodes(Bus<'static, 'static, u16, NoMac, Nodes<'static>>),
+    Vertices(Bus<'static, 'static, u16, NoMac, OfVertices>),
+    Nodes(Bus<'static, 'static, u16, NoMac, OfNodes>),
 }
 
 /// Calls a function of the bus, of either kind.
@@ -94,11 +95,11 @@ pub extern "C" fn dibs_bus_init(
             let (bytes, notes) = (TreeBytes::new(tree.bytes), &surface.notes);
             let bus = surface.with_writer(|writer| match &tree.nodes {
                 None => {
-                    let tree = (&tree.tree, bytes, &());
+                    let tree = (&tree.tree, bytes, &OfVertices::of(&tree.tree)?);
                     Ok(TheBus::Vertices(Bus::new(notes, writer, tree, &limits, NoMac)?))
                 }
-                Some(nodes) => {
-                    let tree = (&tree.tree, bytes, nodes);
+                Some(_) => {
+                    let tree = (&tree.tree, bytes, &OfNodes::of(&tree.tree)?);
                     Ok(TheBus::Nodes(Bus::new(notes, writer, tree, &limits, NoMac)?))
                 }
             });
@@ -183,6 +184,48 @@ pub extern "C" fn dibs_bus_frame(
     dibs_code::of(|| {
         let (mut bus, rows) = (bus.open()?, rows(positions, count)?);
         let _ = with_bus!(&mut bus.0, |bus| bus.frame(rows, Millis(captured), Millis(now)))?;
+        Ok(())
+    })
+}
+
+/// Where a mesh is as a whole: its point `p` is at `rotation p + shift`.
+#[derive(Clone, Copy, AnyBitPattern)]
+#[repr(C)]
+pub struct dibs_pose {
+    /// A quaternion x, y, z, w; the square of its length is within 2^-20 of 1.
+    pub rotation: [f32; 4],
+    /// In mm.
+    pub shift: dibs_vec3,
+}
+
+/// The same as `dibs_bus_frame`, with the mesh as a whole elsewhere, say by a tracker of the patient: tools, answers and
+/// commands are then in the world. A frame without a pose is where the mesh's file has it.
+///
+/// The limits on speed and recovery hold for positions and pose together; the reach is that of the positions alone. Where a
+/// step turns by more than half a radian the surface is held, not extrapolated.
+///
+/// @param bus        The bus.
+/// @param positions  As for `dibs_bus_frame`.
+/// @param count      Their number.
+/// @param pose       The pose, read during the call.
+/// @param captured   When the surface was so, and there.
+/// @param now        The receiver's clock, in ms; wraps.
+/// @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM` for
+///         numbers that are no pose.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_frame_at(
+    bus: *mut dibs_bus,
+    positions: *const f32,
+    count: u32,
+    pose: *const dibs_pose,
+    captured: u32,
+    now: u32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (pose, mut bus, rows) = (pose.get()?, bus.open()?, rows(positions, count)?);
+        let pose = (Quat::from_array(pose.rotation), pose.shift.into());
+        let (captured, now) = (Millis(captured), Millis(now));
+        let _ = with_bus!(&mut bus.0, |bus| bus.frame_at(rows, pose, captured, now))?;
         Ok(())
     })
 }

@@ -5,8 +5,8 @@ use dibs_nostd::failsafe::{AcknowledgeError, LimitError};
 use dibs_nostd::filter::FilterError;
 use dibs_nostd::wire::{Event, PacketError, StreamError};
 use dibs_nostd::{
-    CorruptTreeError, Error, FormatError, QueryError, ReceiveError, StretchError, ToolError,
-    Unavailable,
+    CorruptTreeError, Error, FormatError, PoseError, QueryError, ReceiveError, StretchError,
+    ToolError, Unavailable,
 };
 
 use crate::code::dibs_code;
@@ -117,8 +117,13 @@ impl From<ReceiveError> for dibs_code {
             ReceiveError::RowCount { .. } | ReceiveError::OutOfRange { .. } => Self::PacketRows,
             ReceiveError::Encoding => Self::PacketEncoding,
             ReceiveError::Order { .. } | ReceiveError::Gaps { .. } => Self::PacketOrder,
-            ReceiveError::NotFinite { .. } => Self::PacketNotFinite,
-            ReceiveError::TooFar { .. } => Self::PacketTooFar,
+            ReceiveError::NotFinite { .. } | ReceiveError::Pose(PoseError::NotFinite) => {
+                Self::PacketNotFinite
+            }
+            ReceiveError::TooFar { .. } | ReceiveError::Pose(PoseError::TooFar { .. }) => {
+                Self::PacketTooFar
+            }
+            ReceiveError::Pose(PoseError::NoRotation { .. }) => Self::PacketForm,
             ReceiveError::Digest { .. } => Self::PacketDigest,
             ReceiveError::Stretch(error) => error.into(),
             _ => Self::PacketRefused,

@@ -6,8 +6,7 @@ use core::ptr;
 use bytemuck::AnyBitPattern;
 use dibs_nostd::filter::{FilterError, Motion};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{Answer, Guard};
-use dibs_nostd::nodes::Nodes;
+use dibs_nostd::guard::{Answer, Guard, Rows};
 use dibs_nostd::{Interval, Millis, Proximity, TreeBytes, Unavailable};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
@@ -19,7 +18,7 @@ use crate::filter::{dibs_admitted, dibs_filter, dibs_motion};
 use crate::limits::dibs_guard_limits;
 use crate::query::{STACK, dibs_interval, dibs_proximity};
 use crate::reader::{dibs_age, dibs_link};
-use crate::surface::{dibs_surface, dibs_surface_init};
+use crate::surface::{OfNodes, OfVertices, dibs_surface, dibs_surface_init};
 use crate::tool::{Shape, dibs_tool, dibs_vec3};
 use crate::tracker::{DIBS_OPENED, dibs_tracked};
 use crate::tree::{DIBS_TREE_SIZE, dibs_tree, dibs_tree_init};
@@ -35,8 +34,8 @@ pub struct dibs_guard(TheGuard);
 
 /// Of frames of vertices, or of the nodes that carry the surface.
 enum TheGuard {
-    Vertices(Guard<'static, 'static, u16, STACK, DIBS_OPENED>),
-    Nodes(Guard<'static, 'static, u16, STACK, DIBS_OPENED, Nodes<'static>>),
+    Vertices(Guard<'static, 'static, u16, STACK, DIBS_OPENED, OfVertices>),
+    Nodes(Guard<'static, 'static, u16, STACK, DIBS_OPENED, OfNodes>),
 }
 
 /// Calls a function of the guard, of either kind.
@@ -87,11 +86,11 @@ pub extern "C" fn dibs_guard_init(
             let (bytes, notes) = (TreeBytes::new(tree.bytes), &surface.notes);
             let guard = surface.with_reader(|reader| match tree.nodes {
                 None => {
-                    let tree = (&tree.tree, bytes, ());
+                    let tree = (&tree.tree, bytes, OfVertices::of(&tree.tree)?);
                     Ok(TheGuard::Vertices(Guard::new(notes, reader, tree, &limits)?))
                 }
-                Some(nodes) => {
-                    let tree = (&tree.tree, bytes, nodes);
+                Some(_) => {
+                    let tree = (&tree.tree, bytes, OfNodes::of(&tree.tree)?);
                     Ok(TheGuard::Nodes(Guard::new(notes, reader, tree, &limits)?))
                 }
             });

@@ -6,7 +6,8 @@ use core::slice;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::Notes;
+use dibs_nostd::guard::{Notes, Posed, Rows};
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{
     Buffer, Buffers, FrameGuard, FrameReader, FrameWriter, Head, MeasuredStretch, Position,
     VertexTable,
@@ -16,7 +17,7 @@ use crate::border::{DIBS_ALIGNMENT, Kind, Storage};
 use crate::code::dibs_code;
 
 /// Bytes of a surface's storage besides its vertices.
-pub const DIBS_SURFACE_BASE: usize = 448;
+pub const DIBS_SURFACE_BASE: usize = 576;
 
 /// Bytes of a surface's storage for each vertex: two positions.
 pub const DIBS_SURFACE_VERTEX: usize = 24;
@@ -37,7 +38,7 @@ pub struct dibs_surface {
     /// A reader holds a frame.
     is_held: AtomicBool,
     /// The notes of the two ends for one another.
-    pub(crate) notes: Notes,
+    pub(crate) notes: Notes<Poses>,
 }
 
 impl Kind for dibs_surface {
@@ -45,11 +46,16 @@ impl Kind for dibs_surface {
     const SIZE: usize = DIBS_SURFACE_BASE;
 }
 
+/// Every frame of a bus may have a pose. Those that have none are as if no frame could, to the bit.
+pub(crate) type OfVertices = Posed;
+pub(crate) type OfNodes = Posed<Nodes<'static>>;
+type Poses = <OfVertices as Rows>::Poses;
+
 pub(crate) type Writer = FrameWriter<'static>;
 pub(crate) type Reader = FrameReader<'static>;
 
 /// Offset of the buffers, after the object and the word of their state.
-const BUFFERS: usize = 256;
+const BUFFERS: usize = 384;
 const HEAD: usize = size_of::<Head>();
 
 const _: () = assert!(BUFFERS + 4 + 3 * HEAD <= DIBS_SURFACE_BASE);

@@ -8,6 +8,7 @@ mod header;
 mod layers;
 mod misuse;
 mod nodes;
+mod pose;
 mod programs;
 mod readme;
 mod ros2;

@@ -171,14 +171,26 @@ class Guard(Remade):
         """Takes one packet, whole, of a network. Raises `ValueError` with the reason where it is not taken; it was counted."""
         return self._native.packet(_bytes("packet", packet), _now(now))
 
-    def frame(self, positions: npt.ArrayLike, now: int, *, captured: Optional[int] = None) -> None:
+    def frame(
+        self,
+        positions: npt.ArrayLike,
+        now: int,
+        *,
+        captured: Optional[int] = None,
+        pose: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None,
+    ) -> None:
         """Takes a whole frame of this process, say of a solver: one position (x, y, z) for each vertex of the mesh's file, or
         for each node, in that file's order. `captured` is when the surface was so, by default `now`. `work` then checks and
         publishes it. One source at a time: a frame of packets that is in work is abandoned. Raises `ValueError` with the
-        reason where it is not taken; it was counted, and the last good surface stays."""
+        reason where it is not taken; it was counted, and the last good surface stays.
+
+        `pose` is where the mesh is as a whole, a rotation (a quaternion x, y, z, w of length 1) and a shift (mm): its point
+        `p` is at `rotation p + shift`. Tools and answers are there, too. A frame without a pose is where the mesh's file
+        has it."""
         now = _now(now)
         when = now if captured is None else _arrays.whole("captured", captured, 0, _WRAP - 1)
-        self._native.frame(_arrays.points("positions", positions).tobytes(), when, now)
+        placed = None if pose is None else _pose(pose)
+        self._native.frame(_arrays.points("positions", positions).tobytes(), placed, when, now)
 
     def work(self, most: int = 1_000) -> Advance:
         """Looks at most at so many rows and triangles of the frame that arrives, and publishes it once it is complete and
@@ -241,3 +253,14 @@ def _bytes(name: str, value: Any) -> bytes:
     if not isinstance(value, (bytes, bytearray, memoryview)):
         raise TypeError(f"{name}: bytes are needed, not {type(value).__name__}")
     return bytes(value)
+
+
+def _pose(pose: tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[list[float], list[float]]:
+    rotation, shift = pose
+    numbers = []
+    for name, given, count in (("rotation", rotation, 4), ("shift", shift, 3)):
+        array = _arrays.numbers(name, given)
+        if array.shape != (count,):
+            raise ValueError(f"{name}: the shape is {array.shape}; give {count} numbers")
+        numbers.append(array.tolist())
+    return numbers[0], numbers[1]

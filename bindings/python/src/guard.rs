@@ -3,11 +3,11 @@
 use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::glam::{DQuat, DVec3, Vec3};
 use dibs_nostd::constraint::{ConstraintForce, ConstraintState, SpringDamper};
 use dibs_nostd::failsafe::LimitError;
 use dibs_nostd::filter::FilterError;
-use dibs_nostd::guard::{Bus, GuardLimits, Notes, Rows, Vertices};
+use dibs_nostd::guard::{Bus, GuardLimits, Notes, Posed, Rows, Vertices};
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::{Event, NoMac};
 use dibs_nostd::{
@@ -35,7 +35,7 @@ struct Memory {
     state: AtomicU32,
     heads: [Head; 3],
     rows: [Vec<Position>; 3],
-    notes: Notes,
+    notes: Notes<Poses>,
 }
 
 impl Memory {
@@ -54,10 +54,13 @@ impl Memory {
 }
 
 /// The bus's end and the control tick's.
-struct Pair<'m, I: Index, R: Rows> {
-    bus: Bus<'m, 'm, I, NoMac, R>,
-    guard: guard::Guard<'m, 'm, I, STACK, OPENED, R>,
+/// Every frame may have a pose. Those that have none are as if no frame could, to the bit.
+struct Pair<'m, I: Index, R: Rows<Poses = ()>> {
+    bus: Bus<'m, 'm, I, NoMac, Posed<R>>,
+    guard: guard::Guard<'m, 'm, I, STACK, OPENED, Posed<R>>,
 }
+
+type Poses = <Posed as Rows>::Poses;
 
 impl<'m, I: Index, R: Rows<Poses = ()>> Pair<'m, I, R> {
     fn new(
@@ -69,7 +72,7 @@ impl<'m, I: Index, R: Rows<Poses = ()>> Pair<'m, I, R> {
             |number: usize| Buffer { head: &memory.heads[number], rows: &memory.rows[number] };
         let buffers = Buffers::new(&memory.state, [buffer(0), buffer(1)], Some(buffer(2)));
         let (writer, reader) = buffers.ends();
-        let (rows, bytes) = (R::of(tree)?, TreeBytes::new(memory.tree.bytes()));
+        let (rows, bytes) = (Posed::<R>::of(tree)?, TreeBytes::new(memory.tree.bytes()));
         let bus = Bus::new(&memory.notes, writer, (tree, bytes, &rows), limits, NoMac)?;
         let guard = guard::Guard::new(&memory.notes, reader, (tree, bytes, rows), limits)?;
         Ok(Box::new(Self { bus, guard }))
@@ -165,12 +168,30 @@ impl Guard {
         })
     }
 
-    /// Positions in the mesh's order, and when they were so.
-    fn frame(&self, py: Python<'_>, positions: &[u8], captured: u32, now: u32) -> PyResult<()> {
+    /// Positions in the mesh's order, when they were so, and the mesh's rotation and shift.
+    #[pyo3(signature = (positions, pose, captured, now))]
+    fn frame(
+        &self,
+        py: Python<'_>,
+        positions: &[u8],
+        pose: Option<([f64; 4], [f64; 3])>,
+        captured: u32,
+        now: u32,
+    ) -> PyResult<()> {
+        let (origin, captured, now) = (self.tree.origin, Millis(captured), Millis(now));
+        let pose = pose.map(|(rotation, shift)| {
+            // Both frames count from the tree's origin.
+            let rotation = DQuat::from_array(rotation);
+            let shift = DVec3::from(shift) + (rotation.normalize() * origin - origin);
+            (rotation.as_quat(), shift.as_vec3())
+        });
         let outcome = py.detach(|| {
-            let local = |position: DVec3| (position - self.tree.origin).as_vec3();
+            let local = |position: DVec3| (position - origin).as_vec3();
             let positions: Vec<Vec3> = bytes::points(positions).into_iter().map(local).collect();
-            with_ends!(self, pair => pair.bus.frame(&positions, Millis(captured), Millis(now)))
+            with_ends!(self, pair => match pose {
+                Some(pose) => pair.bus.frame_at(&positions, pose, captured, now),
+                None => pair.bus.frame(&positions, captured, now),
+            })
         });
         outcome.map(|_| ()).map_err(invalid)
     }

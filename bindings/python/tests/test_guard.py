@@ -59,6 +59,29 @@ class Loop:
 
 
 class Guards(unittest.TestCase):
+    def test_a_frame_may_have_a_pose(self):
+        turn, shift = [0.0, 0.0, 0.6, 0.8], np.array([200.0, -30.0, 50.0])
+        # By twice the angle whose sine is 0.6.
+        rotation = np.array([[0.28, -0.96, 0.0], [0.96, 0.28, 0.0], [0.0, 0.0, 1.0]])
+        for tree, origin in ((TREE, np.zeros(3)), (OTHER, ASIDE)):
+            guard = dibs.Guard(tree, 300.0, 80, automatic=True, without_transit=True)
+            frame = BEAT.frames[0] + origin
+            tool = [100.0, 0.0, 30.0] + origin
+            there = rotation @ tool + shift
+            for now in range(1_000, 2_600):
+                if now % PERIOD == 0:
+                    guard.frame(frame, now, pose=(turn, shift))
+                    while guard.work(500) == "pending":
+                        pass
+                found = guard.closest([*there, 2.5], now).closest
+            plain = tree.query([*tool, 2.5], surface=frame)
+            self.assertAlmostEqual(float(found["separation"]), float(plain["separation"]), delta=1e-3)
+            at = rotation @ plain["point_on_surface"] + shift
+            self.assertLess(np.linalg.norm(found["point_on_surface"] - at), 1e-2)
+            for wrong in ((turn[:3], shift), (turn, shift[:2]), ([0.0, 0.0, 0.0, 1.1], shift), (turn, [np.nan, 0, 0])):
+                with self.assertRaises(ValueError):
+                    guard.frame(frame, 2_610, pose=wrong)
+
     def test_the_answer_is_that_of_the_frame(self):
         for tree, frame, shift, is_serial in [
             (TREE, BEAT.frames[0], 0, False),

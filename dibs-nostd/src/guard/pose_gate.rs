@@ -50,6 +50,12 @@ impl<'s, G> PoseGate<'s, G> {
         }
     }
 
+    /// Whether poses move any point: where they are all the same, no lever counts.
+    fn moves(&self) -> bool {
+        let is_other = |pose: &Option<RigidPose>| pose.is_some_and(|pose| pose != self.pose);
+        is_other(&self.last) || is_other(&self.before)
+    }
+
     /// Looks for the row farthest from the centre among those that have come. Returns the work left.
     fn look<V: VertexTable + ?Sized>(&mut self, surface: &V, ready: u32, work: u32) -> u32 {
         let waiting = ready.saturating_sub(self.next_row);
@@ -129,9 +135,11 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
         work: u32,
     ) -> Result<Admission, StretchError> {
         let IncomingSurface { surface, ready, before, compared } = arriving;
-        let work = self.look(surface, ready, work);
+        let is_looking = self.moves();
+        let work = if is_looking { self.look(surface, ready, work) } else { work };
         let admission = self.rows.advance(arriving, work)?;
-        if admission == Admission::Pending || (self.next_row as usize) < surface.len() {
+        let is_waiting = is_looking && (self.next_row as usize) < surface.len();
+        if admission == Admission::Pending || is_waiting {
             return Ok(Admission::Pending);
         }
         // A registration is compared with nothing.

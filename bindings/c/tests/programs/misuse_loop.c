@@ -105,6 +105,17 @@ static void start(const unsigned char *bytes, size_t length) {
     EXPECT(NULL, dibs_bus_frame(NULL, positions, 1, 0, 0));
     EXPECT(NULL, dibs_bus_frame(bus, NULL, 1, 0, 0));
     EXPECT(PACKET_ROWS, dibs_bus_frame(bus, positions, 1, 0, 0));
+    const dibs_pose pose = {{0.0f, 0.0f, 0.6f, 0.8f}, {1.0f, 2.0f, 3.0f}};
+    const dibs_pose stretched = {{0.0f, 0.0f, 0.0f, 1.1f}, {1.0f, 2.0f, 3.0f}};
+    const dibs_pose nowhere = {{0.0f, 0.0f, 0.6f, 0.8f}, {NAN, 2.0f, 3.0f}};
+    const dibs_pose beyond = {{0.0f, 0.0f, 0.6f, 0.8f}, {1e9f, 2.0f, 3.0f}};
+    EXPECT(NULL, dibs_bus_frame_at(NULL, positions, 1, &pose, 0, 0));
+    EXPECT(NULL, dibs_bus_frame_at(bus, NULL, 1, &pose, 0, 0));
+    EXPECT(NULL, dibs_bus_frame_at(bus, positions, 1, NULL, 0, 0));
+    EXPECT(PACKET_ROWS, dibs_bus_frame_at(bus, positions, 1, &pose, 0, 0));
+    EXPECT(PACKET_FORM, dibs_bus_frame_at(bus, positions, 1, &stretched, 0, 0));
+    EXPECT(PACKET_NOT_FINITE, dibs_bus_frame_at(bus, positions, 1, &nowhere, 0, 0));
+    EXPECT(PACKET_TOO_FAR, dibs_bus_frame_at(bus, positions, 1, &beyond, 0, 0));
     EXPECT(NOT_INITIALISED, dibs_bus_work((dibs_bus *)(void *)guard, 1, NULL));
     EXPECT(NOT_INITIALISED, dibs_bus_register((dibs_bus *)(void *)unmade));
     EXPECT(OK, dibs_bus_register(bus));
