@@ -130,6 +130,9 @@ struct Guard : Object<dibs_guard, DIBS_GUARD_SIZE, dibs_guard_init> {
     Code closest(const dibs_tool &tool, uint32_t now, dibs_answer &answer) {
         return dibs_guard_closest(*this, &tool, now, &answer);
     }
+    Code contacts(const dibs_tool &tool, float margin, uint32_t now, dibs_contacts *list, dibs_answer &answer) {
+        return dibs_guard_contacts(*this, &tool, margin, now, list, &answer);
+    }
     Code admit(const dibs_filter &filter, const dibs_tool &tool, const dibs_motion &command, uint32_t now,
                dibs_admitted &admitted, dibs_answer *answer = nullptr) {
         return dibs_guard_admit(*this, &filter, &tool, &command, now, answer, &admitted);

@@ -17,7 +17,7 @@ use dibs_nostd::wire::{
     Encoding, Event, FrameEncoder, FrameId, Freshness, NoMac, enframe, framed_bytes,
 };
 use dibs_nostd::{
-    Advance, Capsule, Coverage, Fallback, Interval, Millis, NoSide, Progress, Proximity,
+    Advance, Capsule, Contacts, Coverage, Fallback, Interval, Millis, NoSide, Progress, Proximity,
     QueryError, ReceiveError, Side, Sphere, StretchError, TreeBytes, Unavailable,
 };
 use xtask::workspace;
@@ -29,6 +29,9 @@ const VERTICES: usize = 502;
 
 /// Nodes of a box of 3 x 3 x 4 cells.
 const NODES: usize = 80;
+
+/// The wall's margin, and how far contacts are looked for, in mm.
+const MARGIN: f32 = 5.0;
 
 /// ms between two frames.
 const PERIOD: u32 = 30;
@@ -43,6 +46,8 @@ enum Step {
     Status(u32, bool),
     /// Both ends of the axis, and the radius.
     Tick(u32, [f32; 7]),
+    /// The same, with the contacts.
+    Touch(u32, [f32; 7]),
     /// The same, with a command.
     Admit(u32, [f32; 7]),
     Blind(u32),
@@ -104,6 +109,7 @@ fn script(built: &BuiltTree, frames: &[Vec<Vec3>]) -> Vec<Step> {
             _ if now % 3 == 1 && start != end => {
                 Step::Admit(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5])
             }
+            _ if now % 3 == 2 => Step::Touch(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5]),
             _ => Step::Tick(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5]),
         });
         if now % 100 == 99 {
@@ -150,6 +156,9 @@ fn lines(steps: &[Step]) -> String {
             Step::Tick(now, tool) => {
                 writeln!(text, "tick {now} {}", tool.map(|number| number.to_string()).join(" "))
             }
+            Step::Touch(now, tool) => {
+                writeln!(text, "touch {now} {}", tool.map(|number| number.to_string()).join(" "))
+            }
             Step::Admit(now, tool) => {
                 writeln!(text, "admit {now} {}", tool.map(|number| number.to_string()).join(" "))
             }
@@ -162,10 +171,10 @@ fn lines(steps: &[Step]) -> String {
     text
 }
 
-type Ends<'t, R> = (Bus<'static, 't, u16, NoMac, R>, Guard<'static, 't, u16, 512, 256, R>);
+type Ends<'t, R> = (Bus<'static, 't, u16, NoMac, R>, Guard<'static, 't, u16, 512, 256, R, 256>);
 
 /// The Rust library's answer, in the program's words.
-fn answer<R: Rows>((bus, guard): &mut Ends<'_, R>, step: &Step) -> String {
+fn answer<R: Rows<Poses = ()>>((bus, guard): &mut Ends<'_, R>, step: &Step) -> String {
     match step {
         Step::Packet(now, bytes) => match bus.packet(bytes, Millis(*now)) {
             Ok(progress) => format!("packet 0 {}", number(progress)),
@@ -211,6 +220,18 @@ fn answer<R: Rows>((bus, guard): &mut Ends<'_, R>, step: &Step) -> String {
                 }
             }
         }
+        Step::Touch(now, [a, b, c, d, e, f, radius]) => {
+            let (start, end) = (Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f));
+            let (now, mut list) = (Millis(*now), Contacts::<16>::new());
+            let answer = if start == end {
+                let tool = Sphere::new(start, *radius).expect("a tool");
+                guard.contacts(&tool, MARGIN, now, &mut list)
+            } else {
+                let tool = Capsule::new(start, end, *radius).expect("a tool");
+                guard.contacts(&tool, MARGIN, now, &mut list)
+            };
+            tick(0, &answer) + &touched(&list)
+        }
         Step::Admit(now, [a, b, c, d, e, f, radius]) => {
             let (start, end) = (Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f));
             let tool = Capsule::new(start, end, *radius).expect("a tool");
@@ -230,9 +251,25 @@ fn answer<R: Rows>((bus, guard): &mut Ends<'_, R>, step: &Step) -> String {
     }
 }
 
+/// The contacts of a list, with its bound and accuracy.
+fn touched(list: &Contacts<16>) -> String {
+    let mut line = format!(" {}", list.len());
+    let floats = |line: &mut String, values: &[f32]| {
+        values.iter().for_each(|value| write!(line, " {:08x}", value.to_bits()).expect("a string"));
+    };
+    floats(&mut line, &[list.bound(), list.accuracy()]);
+    for contact in list.iter() {
+        floats(&mut line, &[contact.separation]);
+        floats(&mut line, &contact.normal.to_array());
+        write!(line, " {}", contact.triangle.0).expect("a string");
+        floats(&mut line, &contact.velocity.to_array());
+    }
+    line
+}
+
 fn tick(code: u32, answer: &Answer) -> String {
     let spring = SpringDamper::stiffness(1.0).damping(0.002).hold_damping(0.001).max_force(5.0);
-    let force = answer.force(&ForbiddenRegion::new(spring, 5.0).expect("a margin"));
+    let force = answer.force(&ForbiddenRegion::new(spring, MARGIN).expect("a margin"));
     let pair = answer.closest.unwrap_or(Proximity::NOWHERE);
     let unknown = Interval { lower: f32::NEG_INFINITY, upper: f32::INFINITY };
     let interval = answer.closest.map_or(unknown, |pair| pair.interval());
@@ -415,12 +452,15 @@ fn compile(name: &str, folder: &Path) -> PathBuf {
 }
 
 /// The answers of a surface of `N` rows, which are the same in C to the bit.
-fn compared<const N: usize, R: Rows>((built, frames): &(BuiltTree, Vec<Vec<Vec3>>)) -> Vec<String> {
+fn compared<const N: usize, R: Rows<Poses = ()>>(
+    (built, frames): &(BuiltTree, Vec<Vec<Vec3>>),
+) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let steps = script(built, frames);
     let surface: &Surface<N, R> = Box::leak(Box::new(Surface::new()));
     let limits = GuardLimits::new(300.0, Millis(80));
-    let mut ends: Ends<'_, R> = surface.start(TreeBytes::new(built.blob()), limits).expect("valid");
+    let tree = TreeBytes::new(built.blob());
+    let mut ends: Ends<'_, R> = surface.start_with_contacts(tree, limits, NoMac).expect("valid");
     let expected: Vec<_> = steps.iter().map(|step| answer(&mut ends, step)).collect();
 
     let [tree, script] = ["tree", "script"].map(|name| folder.path().join(name));
@@ -465,7 +505,12 @@ fn the_loop_in_c_answers_with_the_same_bits() {
         assert!(count(place, word) > 10, "{} of {word} at {place}", count(place, word));
     }
     let width = ticks.iter().map(Vec::len).min().expect("ticks");
-    let admitted = ticks.iter().filter_map(|tick| tick.get(width).copied());
+    // A list begins with its length, bound and accuracy, a command's answer with a code.
+    let is_list = |tick: &&Vec<&str>| tick.get(width + 1).is_some_and(|word| word.len() == 8);
+    let lists = ticks.iter().filter(is_list).filter(|tick| tick[width] != "0").count();
+    assert!(lists > 100, "{lists} lists of contacts");
+    let others = ticks.iter().filter(|tick| !is_list(tick));
+    let admitted = others.filter_map(|tick| tick.get(width).copied());
     let (admitted, refused): (Vec<_>, Vec<_>) = admitted.partition(|&code| code == "0");
     assert!(admitted.len() > 100 && refused.len() > 100, "{} admitted", admitted.len());
     assert!(ticks.iter().any(|tick| tick[30] != tick[31] && tick[2] == "0"), "no velocity");

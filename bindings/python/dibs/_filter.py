@@ -23,6 +23,11 @@ _TOOLS = 8
 _ROWS = 8
 
 
+def contacts_of(native: tuple[bytearray, float]) -> Contacts:
+    found, bound = native
+    return Contacts(np.frombuffer(found, CONTACT), np.array([bound], dtype=np.float32))
+
+
 class Tracked(Bound):
     """The answer of a tracker's tick."""
 
@@ -44,10 +49,7 @@ class Tracked(Bound):
         self._native = native
         self.closest = np.frombuffer(native.record(), ANSWER)[0]
         self.is_kept, self.fallback, self.moved = native.facts()
-        self.contacts = None
-        if contacts is not None:
-            found, bound = contacts
-            self.contacts = Contacts(np.frombuffer(found, CONTACT), np.array([bound], dtype=np.float32))
+        self.contacts = None if contacts is None else contacts_of(contacts)
 
     def __repr__(self) -> str:
         return f"Tracked({self.closest['separation']} mm)"

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arrays, _dibs
-from ._filter import Admitted, Filter, RigidMotion, Tracked, admitted_of, motion_of, tool_of
+from ._filter import Admitted, Filter, RigidMotion, Tracked, _at_least, admitted_of, contacts_of, motion_of, tool_of
 from ._pickle import Bound, Remade
-from ._tree import ANSWER, Tree, _tests
+from ._tree import ANSWER, Contacts, Tree, _tests
 
 _WRAP = 1 << 32
 
@@ -210,6 +210,15 @@ class Guard(Remade):
         if tool is None:
             return Answer(self._native.closest(None, _now(now)))
         return Answer(self._native.closest(tool_of(tool), _now(now)))
+
+    def contacts(self, tool: npt.ArrayLike, margin: float, now: int) -> tuple[Answer, Contacts]:
+        """The answer of this tick, and all locally closest pairs within the `margin` (mm), deepest first, in the one `budget`.
+
+        Each has the velocity of the surface there. Act on them only where the answer has a pair to act on.
+        """
+        margin = _at_least("margin", margin, 0)
+        answer, found = self._native.contacts(tool_of(tool), margin, _now(now))
+        return Answer(answer), contacts_of(found)
 
     def admit(
         self, filter: Filter, tool: npt.ArrayLike, command: RigidMotion, now: int

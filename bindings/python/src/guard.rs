@@ -19,7 +19,7 @@ use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::record::push_answer;
 use crate::tool::AnyTool;
-use crate::tracker::{Admitted, Filter, Tracked, motion, named, record};
+use crate::tracker::{Admitted, Filter, List, Listed, Tracked, listed, motion, named, record};
 use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, error, invalid};
 
@@ -57,7 +57,7 @@ impl Memory {
 /// Every frame may have a pose. Those that have none are as if no frame could, to the bit.
 struct Pair<'m, I: Index, R: Rows<Poses = ()>> {
     bus: Bus<'m, 'm, I, NoMac, Posed<R>>,
-    guard: guard::Guard<'m, 'm, I, STACK, OPENED, Posed<R>>,
+    guard: guard::Guard<'m, 'm, I, STACK, OPENED, Posed<R>, OPENED>,
 }
 
 type Poses = <Posed as Rows>::Poses;
@@ -111,6 +111,7 @@ macro_rules! with_ends {
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Guard {
     both: Mutex<Loop>,
+    contacts: Mutex<Box<List>>,
     tree: Arc<Owned>,
 }
 
@@ -149,7 +150,8 @@ impl Guard {
                 View::Wide(tree) => Ends::Wide(Pair::new(memory, tree, &limits)?),
             })
         });
-        Ok(Self { both: Mutex::new(both.map_err(start_error)?), tree: Arc::clone(&tree.0) })
+        let (both, contacts) = (Mutex::new(both.map_err(start_error)?), Mutex::default());
+        Ok(Self { both, contacts, tree: Arc::clone(&tree.0) })
     }
 
     fn receive(&self, py: Python<'_>, bytes: &[u8], now: u32) {
@@ -247,6 +249,28 @@ impl Guard {
             })
         });
         Ok(Answer { answer, tree: Arc::clone(&self.tree) })
+    }
+
+    /// The answer, and the contacts within a margin.
+    fn contacts<'py>(
+        &self,
+        py: Python<'py>,
+        tool: &[u8],
+        margin: f32,
+        now: u32,
+    ) -> PyResult<(Answer, Listed<'py>)> {
+        let (origin, now) = (self.tree.origin, Millis(now));
+        let tool = AnyTool::of(&bytes::doubles(tool), origin);
+        let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
+        let mut list = self.contacts.lock().unwrap_or_else(PoisonError::into_inner);
+        let contacts = &mut **list;
+        let answer = py.detach(|| {
+            with_ends!(self, pair => match &tool {
+                AnyTool::Sphere(sphere) => pair.guard.contacts(sphere, margin, now, contacts),
+                AnyTool::Capsule(capsule) => pair.guard.contacts(capsule, margin, now, contacts),
+            })
+        });
+        Ok((Answer { answer, tree: Arc::clone(&self.tree) }, listed(py, contacts, &self.tree)))
     }
 
     /// The answer, and the motion that a filter admits of a command; none where no surface is trusted.

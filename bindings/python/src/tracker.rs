@@ -114,19 +114,27 @@ fn options(surface: &Surface) -> Options {
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Tracker {
     ticks: Mutex<OnTree>,
-    contacts: Mutex<Box<Contacts<MOST_CONTACTS, 16_384>>>,
+    contacts: Mutex<Box<List>>,
     tree: Arc<Owned>,
 }
 
-/// A contact list's records and bound.
-type Listed<'py> = (Bound<'py, PyByteArray>, f32);
+/// A list of contacts.
+pub type List = Contacts<MOST_CONTACTS, 16_384>;
+
+/// Its records and bound.
+pub type Listed<'py> = (Bound<'py, PyByteArray>, f32);
+
+pub fn listed<'py>(py: Python<'py>, list: &List, tree: &Owned) -> Listed<'py> {
+    let mut records = Vec::new();
+    list.iter().for_each(|found| push_contact(&mut records, 0, found, tree));
+    (PyByteArray::new(py, &records), list.bound())
+}
 
 #[pymethods]
 impl Tracker {
     #[new]
     fn new(tree: &Tree) -> Self {
-        let contacts = Mutex::new(Box::new(Contacts::new()));
-        Self { ticks: on(tree), contacts, tree: Arc::clone(&tree.0) }
+        Self { ticks: on(tree), contacts: Mutex::default(), tree: Arc::clone(&tree.0) }
     }
 
     /// The closest pair of a tick, and with a margin the contacts.
@@ -171,11 +179,7 @@ impl Tracker {
             })
         });
         let found = found.map_err(invalid)?;
-        let listed = margin.map(|_| {
-            let mut records = Vec::new();
-            contacts.iter().for_each(|found| push_contact(&mut records, 0, found, &self.tree));
-            (PyByteArray::new(py, &records), contacts.bound())
-        });
+        let listed = margin.map(|_| listed(py, contacts, &self.tree));
         Ok((Tracked { found, tree: Arc::clone(&self.tree) }, listed))
     }
 }

@@ -109,6 +109,28 @@ class Guards(unittest.TestCase):
                 moved = loop.tick(tool + np.array([0.1, 0, 0] * (len(tool) // 3) + [0]))
                 np.testing.assert_allclose(moved.velocity, [100, 0, 0], atol=0.1)
 
+    def test_contacts_are_those_of_the_frame(self):
+        loop, listed = Loop(OTHER, HEART.vertices + ASIDE, budget=2_000), 0
+        tool = np.array([16.0, -15, 88, 52, 72, 106, 2.5]) + np.array([*ASIDE, *ASIDE, 0])
+        for tick in range(1_200):
+            if tick % PERIOD == 0:
+                loop.send()
+            loop.now += 1
+            answer, (found, bound) = loop.guard.contacts(tool, 12.0, loop.now)
+            if tick % 100 == 99 and answer.closest is not None:
+                truth = OTHER.contacts(tool, 12.0, surface=loop.frame)
+                self.assertEqual(len(found), len(truth.found))
+                self.assertAlmostEqual(float(bound[0]), float(truth.bound[0]), places=3)
+                for field in ["separation", "point_on_surface", "normal"]:
+                    np.testing.assert_allclose(found[field], truth.found[field], atol=1e-3)
+                listed += len(found)
+        self.assertEqual(answer.state, dibs.State.NOMINAL)
+        self.assertGreater(listed, 5)
+        # A tick within a tiny budget lists less, and says how far it is complete.
+        few = Loop(OTHER, HEART.vertices + ASIDE, budget=40)
+        few.send()
+        self.assertLess(few.guard.contacts(tool, 12.0, few.now)[1].bound[0], 12)
+
     def test_a_frame_of_this_process_is_that_of_packets(self):
         answers = []
         for is_called in [False, True]:
@@ -251,6 +273,10 @@ class Guards(unittest.TestCase):
             ("tool", ValueError, lambda: guard.closest([1, 2, 3], 0)),
             ("tool", ValueError, lambda: guard.closest([0, 0, 0, -1], 0)),
             ("tool", ValueError, lambda: guard.closest([0, 0, float("nan"), 1], 0)),
+            ("margin", ValueError, lambda: guard.contacts(SPHERE, -1, 0)),
+            ("margin", TypeError, lambda: guard.contacts(SPHERE, None, 0)),
+            ("tool", ValueError, lambda: guard.contacts([1, 2, 3], 5, 0)),
+            ("now", TypeError, lambda: guard.contacts(SPHERE, 5, 0.5)),
             ("answer", TypeError, lambda: WALL.force(None)),
             ("filter", TypeError, lambda: guard.admit(None, SPHERE, dibs.RigidMotion([0, 0, 0]), 0)),
             ("command", TypeError, lambda: guard.admit(dibs.Filter(TREE, 1, 2), SPHERE, None, 0)),

@@ -11,6 +11,7 @@
  *     work ROWS                    a slice of the checks
  *     status NOW FRAMED            the status for the sender
  *     tick NOW START END RADIUS    a control tick: a capsule, or a sphere where both ends are one
+ *     touch NOW START END RADIUS   a control tick with the contacts within 5 mm
  *     admit NOW START END RADIUS   a control tick whose command, a tenth of a millimetre along -x, is filtered
  *     blind NOW                    a control tick without a pose
  *     acknowledge 0                an operator's acknowledgement
@@ -29,6 +30,8 @@
 #define VERTICES 10000
 
 static alignas(DIBS_ALIGNMENT) uint8_t memory[DIBS_START_SIZE(VERTICES)];
+static alignas(DIBS_ALIGNMENT) uint8_t list_memory[DIBS_CONTACTS_SIZE];
+static dibs_contacts *list;
 
 static const dibs_wall wall = {
     .stiffness = 1.0f, .damping = 0.002f, .hold_damping = 0.001f, .max_force = 5.0f, .margin = 5.0f};
@@ -95,6 +98,21 @@ static void print_answer(const dibs_answer *answer) {
     print_searched(&answer->searched);
 }
 
+static void print_contacts(void) {
+    dibs_contacts_facts facts;
+    must(dibs_contacts_get_facts(list, &facts));
+    print_words(&facts.count, 1);
+    print_floats(&facts.bound, 2);
+    for (uint32_t number = 0; number < facts.count; number++) {
+        dibs_contact contact;
+        must(dibs_contacts_get(list, number, &contact));
+        print_floats(&contact.separation, 1);
+        print_floats(&contact.normal.x, 3);
+        print_words(&contact.triangle, 1);
+        print_floats(&contact.velocity.x, 3);
+    }
+}
+
 static dibs_tool take_tool(char *text) {
     dibs_tool tool;
     float *numbers = &tool.start.x;
@@ -135,6 +153,12 @@ static void answer_event(dibs_bus *bus, dibs_guard *guard, const char *name, uin
         dibs_answer answer;
         printf("tick %u", dibs_guard_closest(guard, &tool, now, &answer));
         print_answer(&answer);
+    } else if (strcmp(name, "touch") == 0) {
+        const dibs_tool tool = take_tool(rest);
+        dibs_answer answer;
+        printf("tick %u", dibs_guard_contacts(guard, &tool, wall.margin, now, list, &answer));
+        print_answer(&answer);
+        print_contacts();
     } else if (strcmp(name, "admit") == 0) {
         const dibs_tool tool = take_tool(rest);
         const dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
@@ -208,6 +232,7 @@ int main(int argc, char **argv) {
     char *script = (char *)file_read(argv[2], &script_length);
     const dibs_guard_limits limits = dibs_guard_limits_of(300.0f, 80);
     must(dibs_start(memory, sizeof memory, tree, length, &limits, &bus, &guard));
+    must(dibs_contacts_init(list_memory, sizeof list_memory, &list));
     for (char *line = strtok(script, "\n"); line != NULL; line = strtok(NULL, "\n")) {
         char *rest = line + strcspn(line, " ");
         if (*rest != '\0') {

@@ -17,6 +17,7 @@ MEMORY(plain_memory, DIBS_SURFACE_SIZE(VERTICES));
 MEMORY(small_memory, DIBS_GUARDED_SIZE(10));
 MEMORY(bus_memory, DIBS_BUS_SIZE);
 MEMORY(guard_memory, DIBS_GUARD_SIZE);
+MEMORY(contacts_memory, DIBS_CONTACTS_SIZE);
 MEMORY(writer_memory, DIBS_WRITER_SIZE);
 MEMORY(reader_memory, DIBS_READER_SIZE);
 MEMORY(frame_memory, DIBS_FRAME_SIZE);
@@ -76,6 +77,20 @@ static void start(const unsigned char *bytes, size_t length) {
     EXPECT(NO_SURFACE, force.cause);
     EXPECT(ACKNOWLEDGE, dibs_guard_acknowledge(guard));
     EXPECT(NULL, dibs_guard_acknowledge(NULL));
+
+    dibs_contacts *list = NULL;
+    dibs_contacts_facts facts;
+    EXPECT(NULL, dibs_guard_contacts(guard, &tool, 5.0f, 0, NULL, &answer));
+    EXPECT(OK, dibs_contacts_init(contacts_memory, sizeof contacts_memory, &list));
+    EXPECT(NULL, dibs_guard_contacts(NULL, &tool, 5.0f, 0, list, &answer));
+    EXPECT(NULL, dibs_guard_contacts(guard, &tool, 5.0f, 0, list, NULL));
+    EXPECT(MISALIGNED, dibs_guard_contacts(guard, (const dibs_tool *)(const void *)(unmade + 1), 5.0f, 0, list, &answer));
+    for (int without = 0; without < 2; without++) {
+        EXPECT(OK, dibs_guard_contacts(guard, without ? NULL : &tool, 5.0f, 0, list, &answer));
+        EXPECT(NO_SURFACE, answer.outcome);
+        EXPECT(OK, dibs_contacts_get_facts(list, &facts));
+        EXPECT_THAT(facts.count == 0 && facts.bound == -INFINITY);
+    }
 
     const dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
     const dibs_filter none = dibs_filter_of(-1.0f, 200.0f);
