@@ -132,12 +132,13 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         contacts: &mut Contacts<N, NEAR>,
     ) -> Answer {
         contacts.clear();
+        let (mut off, mut placing) = (0.0, 0.0);
         let (answer, _) = self.on_latest(
             tool,
             now,
             |tracker, surface, own, flow, options| {
-                let placed = flow.placed.map_or(0.0, |placed| placed.error(tool));
-                let off = sum_up(sum_up(surface.position_error(), placed), flow.margin());
+                placing = flow.placed.map_or(0.0, |placed| placed.error(tool));
+                off = sum_up(sum_up(surface.position_error(), placing), flow.margin());
                 let margin = sum_up(margin, off);
                 let tracked = tracker.contacts(surface, own, margin, options, contacts)?;
                 contacts.set_velocities(|corners, weights| {
@@ -149,13 +150,12 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
                 })?;
                 if let Some(placed) = flow.placed {
                     placed.lead_back(contacts);
-                    contacts.widen(placed.error(tool));
                 }
                 Ok(tracked)
             },
             |_, _, _, _| (),
         );
-        contacts.widen(answer.trust.margin);
+        contacts.widen(sum_up(answer.trust.margin, placing), off);
         answer
     }
 

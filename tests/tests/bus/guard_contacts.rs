@@ -73,7 +73,7 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let proxy = Proxy::new(spring, MARGIN).expect("in range");
     let (mut listed, mut moving, mut cut, mut most, mut acted, mut opened) = (0, 0, 0, 0, 0, 0);
-    let mut widest = 0.0_f32;
+    let (mut widest, mut between) = (0.0_f32, 0);
     for budget in [100, 200, 300, 600, 1_200, u32::MAX] {
         let options = Options::new().budget(Budget::new(budget));
         let limits = GuardLimits::new(200.0, Millis(200)).options(options).automatic();
@@ -128,6 +128,10 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
             let reach = MARGIN + own.accuracy() - ROUNDING;
             assert!(!is_outside || own.is_empty() || wider > reach, "{wider} {reach}");
             widest = widest.max(wider);
+            if let Ok(all) = own.within(MARGIN) {
+                assert_eq!(all.is_complete(), own.bound() >= wider, "{budget} {tick}");
+                between += usize::from(own.bound() >= MARGIN && own.bound() < wider);
+            }
             listed += own.len();
             cut += usize::from(own.bound() < MARGIN);
             let work = found.closest.work();
@@ -141,7 +145,7 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
     }
     println!("{listed} contacts, {moving} that move; {cut} lists cut; a tick of {most} at most");
     assert!(listed > 5_000 && moving > 3_000 && cut > 500, "{listed} {moving} {cut}");
-    assert!(widest > MARGIN + 0.1, "{widest}");
+    assert!(widest > MARGIN + 0.1 && between > 10, "{widest} {between}");
     assert!(most > 1_200 && acted > 3_000 && opened > 50, "{most} {acted} {opened}");
 }
 

@@ -82,7 +82,7 @@ impl Contact {
 /// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
 /// contact, and some with no lower vertex next to theirs, at most half of `NEAR`.
 ///
-/// RAM on a 32-bit processor: 152 bytes for each of the `N`, 20 for each of the `NEAR`, and 28.
+/// RAM on a 32-bit processor: 152 bytes for each of the `N`, 20 for each of the `NEAR`, and 32.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -120,7 +120,8 @@ pub struct ContactIter<'c> {
 }
 
 impl ContactIter<'_> {
-    /// Whether all contacts within the margin are among them. If not, the list or its places were too few, or the budget
+    /// Whether all contacts within the margin are among them, of a guard's list also those that the error and the age of the
+    /// surface may bring within it. If not, the list or its places were too few, or the budget
     /// ended: walls may be missing beyond [`bound`](Self::bound).
     #[must_use]
     pub const fn is_complete(&self) -> bool {
@@ -185,8 +186,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin; [`QueryError::Margin`] if the
     /// query's margin was less.
     pub fn within(&self, margin: f32) -> Result<ContactIter<'_>, Unavailable> {
-        let List { bound, is_open, has_no_side, accuracy, .. } = self.found;
-        let is_complete = bound >= margin;
+        let List { bound, is_open, has_no_side, accuracy, off, .. } = self.found;
+        let is_complete = bound >= sum_up(margin, off);
         if is_open && !is_complete {
             return Err(Unavailable::CutShort);
         }
@@ -292,10 +293,11 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
     }
 
-    /// Widens the accuracy by a further error (mm) of the surface.
+    /// Widens the accuracy by a further error (mm) of the surface, which is `off` from the one that was searched by all.
     #[cfg(all(feature = "bus", feature = "control"))]
-    pub(crate) fn widen(&mut self, error: f32) {
+    pub(crate) fn widen(&mut self, error: f32, off: f32) {
         self.found.accuracy = sum_up(self.found.accuracy, error);
+        self.found.off = off;
     }
 }
 

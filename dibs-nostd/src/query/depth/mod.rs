@@ -22,6 +22,8 @@ mod start;
 mod touches;
 mod walk;
 
+use glam::Vec3;
+
 use super::corners::positions;
 use super::memory::depth::{Point, Points, Remembered};
 use super::search::{Ties, Waiting};
@@ -300,8 +302,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     ) -> Result<Sample, QueryError> {
         let on_axis = self.tool.axis_point(parameter);
         let along = parameter * self.tool.axis_length();
-        let corners = positions(self.vertices, corners)?;
+        let corners = self.corners(corners)?;
         Ok(Sample { parameter, along, on_axis, depth, triangle, corners, fit: Fit::Closest })
+    }
+
+    /// A function of its own: four places call it, and a depth is no tight loop.
+    fn corners(&self, rows: [u32; 3]) -> Result<[Vec3; 3], QueryError> {
+        positions(self.vertices, rows)
     }
 
     /// The answer, where no point of the axis is deeper than `bound`.

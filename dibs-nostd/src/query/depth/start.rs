@@ -4,7 +4,6 @@ use super::part::{Part, Parts, Sample, smaller};
 use super::touches::Touches;
 use super::{DISTANCE_COST, Depth};
 use crate::query::Proximity;
-use crate::query::corners::corners;
 use crate::query::memory::depth::Point;
 use crate::tool::Tool;
 use crate::unavailable::QueryError;
@@ -39,7 +38,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 self.touches = Touches::anywhere();
                 return Ok(());
             }
-            let (_, corners) = corners(self.tree, self.vertices, row)?;
+            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            let corners = self.corners(corners)?;
             if let Some(pair) = self.tool.closest_on_triangle(&corners, f32::INFINITY) {
                 let accuracy = self.closest.accuracy;
                 let touches = &mut self.touches;

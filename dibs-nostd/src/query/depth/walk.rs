@@ -4,7 +4,6 @@
 use super::part::{self, Fit, Parts, Sample, smaller};
 use super::{DISTANCE_COST, Depth};
 use crate::math::sqrt::sqrt;
-use crate::query::corners::corners;
 use crate::tool::Tool;
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
@@ -17,8 +16,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     pub(super) fn place(&self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let mut sample = parts.sample(row);
         if let (Fit::Remembered, Some(TriangleRow(row))) = (sample.fit, sample.triangle) {
-            let (_, corners) = corners(self.tree, self.vertices, row)?;
-            (sample.corners, sample.fit) = (corners, Fit::Near);
+            let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+            (sample.corners, sample.fit) = (self.corners(corners)?, Fit::Near);
         }
         parts.set_sample(row, sample);
         Ok(())
@@ -45,7 +44,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             };
             let neighbours = (0..3).filter_map(|edge| self.tree.row_across(from, edge));
             for row in neighbours.filter(|&row| before != Some(row)) {
-                let (_, corners) = corners(self.tree, self.vertices, row)?;
+                let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
+                let corners = self.corners(corners)?;
                 let square = part::square(sample.on_axis, &corners);
                 distances += 1;
                 if square < least {

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{Search, Step, ties};
 use crate::math::sqrt::sqrt;
-use crate::query::corners::corners;
+use crate::query::corners::positions;
 use crate::query::plane::{Plane, least};
 use crate::tool::{AxisPair, Tool};
 use crate::unavailable::QueryError;
@@ -78,8 +78,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     #[inline(always)]
     pub(super) fn corners(&self, triangle: u32) -> Result<[Vec3; 3], QueryError> {
-        let (_, corners) = corners(self.tree, self.vertices, triangle)?;
-        Ok(corners)
+        let rows = self.tree.triangle(triangle).ok_or(QueryError::Corrupt { row: triangle })?;
+        positions(self.vertices, rows)
     }
 
     /// The exact test; the caller has counted it.
