@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use dibs_build::glam::Vec3;
+use dibs_nostd::RigidPose;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -9,10 +10,15 @@ use std::time::{Duration, Instant};
 /// The time to the next frame that is assumed at the first one: of 30 frames a second.
 const FIRST_GAP: Duration = Duration::from_millis(33);
 
+/// Positions, and the pose at which they are as a whole.
+type Rows = (Vec<Vec3>, Option<RigidPose>);
+
 /// A frame that fits the tree, as a source has it.
 pub struct Parsed {
     /// In the mesh's order.
     pub positions: Vec<Vec3>,
+    /// At which they are as a whole, where the source has one.
+    pub pose: Option<RigidPose>,
     /// When its last byte came.
     pub came: Instant,
     pub age: Age,
@@ -31,6 +37,7 @@ pub enum Age {
 pub struct Frame {
     /// In the mesh's order.
     pub positions: Vec<Vec3>,
+    pub pose: Option<RigidPose>,
     /// When it came.
     pub came: Instant,
     /// When the one that it repeats came, or it did: a source that states no age and stands still grows old.
@@ -113,23 +120,22 @@ impl Shared {
     }
 
     fn fill(&self, mut next: impl FnMut() -> Result<Option<Parsed>>, keeps_all: bool) {
-        // The last positions, when they came, when their like first did, and its age then.
-        let mut last: Option<(Vec<Vec3>, Instant, Instant, Duration)> = None;
+        // The last positions and their pose, when they came, when their like first did, and its age then.
+        let mut last: Option<(Rows, Instant, Instant, Duration)> = None;
         let end = loop {
-            let Parsed { positions, came, age } = match next() {
+            let Parsed { positions, pose, came, age } = match next() {
                 Ok(Some(parsed)) => parsed,
                 Ok(None) => break Ok(()),
                 Err(error) => break Err(error),
             };
+            let rows = (positions.clone(), pose);
             let (first, age) = match (age, &last) {
-                (Age::Delay(_), Some((before, _, first, age))) if *before == positions => {
-                    (*first, *age)
-                }
+                (Age::Delay(_), Some((before, _, first, age))) if *before == rows => (*first, *age),
                 (Age::Delay(age) | Age::Stated(age), _) => (came, age),
             };
             let gap = last.as_ref().map_or(FIRST_GAP, |(_, last, ..)| came - *last);
-            last = Some((positions.clone(), came, first, age));
-            let frame = Frame { positions, came, first, age, gap };
+            last = Some((rows, came, first, age));
+            let frame = Frame { positions, pose, came, first, age, gap };
             let mut place = self.place();
             if keeps_all {
                 let is_full = |place: &mut Place| place.frame.is_some();

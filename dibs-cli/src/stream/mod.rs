@@ -48,6 +48,7 @@ Examples:
   solver | dibs stream heart.dibs --from - --format json --unit m --to udp:192.168.1.20:5000
   dibs stream heart.dibs --from shm:heart --to udp:192.168.1.20:5000
   dibs bridge heart.dibs --from igtl:192.168.1.30:18944 --axes RAS:LPS --to udp:192.168.1.20:5000
+  dibs bridge heart.dibs --from igtl:192.168.1.30:18944 --pose-device organ --to udp:192.168.1.20:5000
 
 Frames of --from shm:NAME are raw in memory of that name, /dev/shm/NAME, after 16 bytes: a sequence number (u64), the number of
 positions (u32), 0 (u32). The number is 0 while there is no frame; the program that writes adds 1 before a frame and 1 after
@@ -80,6 +81,10 @@ pub struct Args {
     /// Take the messages of this OpenIGTLink device alone
     #[arg(long, conflicts_with_all = ["motion", "unnamed_motion"])]
     device: Option<String>,
+    /// Send every frame with the rigid pose that this OpenIGTLink device had last, in TRANSFORM, TDATA or QTDATA: the frame's
+    /// positions are those before it. For controllers that take posed frames; the age is that of the older of both
+    #[arg(long, value_name = "TRACKED", conflicts_with_all = ["motion", "unnamed_motion"])]
+    pose_device: Option<String>,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
     /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next one
     #[arg(long)]
@@ -202,8 +207,10 @@ fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> 
     if args.format != Format::Raw && !matches!(source, LiveSource::Input) {
         bail!("--format: frames in shared memory are raw, and those of OpenIGTLink have its own");
     }
-    if args.device.is_some() && !matches!(source, LiveSource::Igtl(_)) {
-        bail!("--device: only OpenIGTLink has devices");
+    for (word, device) in [("--device", &args.device), ("--pose-device", &args.pose_device)] {
+        if device.is_some() && !matches!(source, LiveSource::Igtl(_)) {
+            bail!("{word}: only OpenIGTLink has devices");
+        }
     }
     let (name, live, exchange) = match source {
         LiveSource::Input => {
@@ -218,8 +225,9 @@ fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> 
         }
         LiveSource::Igtl(address) => {
             let exchange = Arc::<Exchange>::default();
-            let (device, patience) = (args.device.clone(), Duration::from_secs(args.retry));
-            let mut igtl = Igtl::new(address, device, patience, place, Arc::clone(&exchange))?;
+            let devices = [args.device.clone(), args.pose_device.clone()];
+            let patience = Duration::from_secs(args.retry);
+            let mut igtl = Igtl::new(address, devices, patience, place, Arc::clone(&exchange))?;
             (address.to_string(), Live::start(move || igtl.next(), keeps_all), Some(exchange))
         }
     };

@@ -71,7 +71,7 @@ impl<R: Read> Parser<R> {
         let positions = self.place.frame(positions, number);
         let positions = positions.map_err(|error| anyhow!("{name}: {error}"))?;
         let age = age.map_or(Age::Delay(Duration::ZERO), Age::Stated);
-        Ok(Some(Parsed { positions, came, age }))
+        Ok(Some(Parsed { positions, pose: None, came, age }))
     }
 
     fn raw(&mut self) -> Result<Option<Unplaced>> {

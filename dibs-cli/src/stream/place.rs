@@ -1,8 +1,9 @@
 //! Positions of a live source, in the tree's unit, axes and origin.
 
 use anyhow::{Result, anyhow};
-use dibs_build::glam::{DVec3, Vec3};
+use dibs_build::glam::{DMat3, DQuat, DVec3, Vec3};
 use dibs_build::{Motion, ReadErrorKind, Unit};
+use dibs_nostd::RigidPose;
 use dibs_stream::SurfaceOrder;
 use std::str::FromStr;
 
@@ -42,6 +43,27 @@ impl Place {
         })?;
         self.order.to_rows(&positions).map_err(|error| anyhow!("frame {number}: {error}"))?;
         Ok(positions)
+    }
+
+    /// A pose in the source's unit and axes, as the tree has it. Where the tree counts from a point of its own, so does the
+    /// world.
+    ///
+    /// # Errors
+    /// If its shift is too large.
+    pub fn pose(&self, rotation: &DQuat, shift: DVec3) -> Result<RigidPose> {
+        let (mut rotation, mut shift) = (*rotation, shift);
+        if let Some(axes) = self.axes {
+            // By columns: each axis of the tree, as the source's has it.
+            let from = DMat3::from_cols_array_2d(
+                &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| axes.turn(axis)),
+            );
+            rotation = DQuat::from_mat3(&(from * DMat3::from_quat(rotation) * from.transpose()));
+            shift = axes.turn(shift.to_array()).into();
+        }
+        shift *= self.unit.map_or(1.0, Unit::millimetres);
+        let shift = shift + rotation * self.origin - self.origin;
+        let pose = RigidPose::new(rotation.as_quat().normalize(), shift.as_vec3());
+        pose.map_err(|error| anyhow!("{error}"))
     }
 }
 
@@ -85,7 +107,39 @@ impl FromStr for Axes {
 
 #[cfg(test)]
 mod tests {
-    use super::Axes;
+    use super::{Axes, Place};
+    use dibs_build::generate::heart;
+    use dibs_build::glam::{DQuat, DVec3};
+    use dibs_build::{Builder, Unit};
+    use dibs_stream::SurfaceOrder;
+
+    /// A point that a source moves by its pose is where the tree's point is moved by the tree's: in other axes, metres, and from
+    /// another origin.
+    #[test]
+    fn a_pose_is_placed_as_its_points_are() {
+        let built = Builder::new().build(&heart(320).expect("a size").mesh).expect("a tree");
+        let order = SurfaceOrder::of(&built.tree::<u16>().expect("a tree"));
+        let rotation = DQuat::from_scaled_axis(DVec3::new(0.3, -0.7, 1.1));
+        let shift = DVec3::new(0.02, -0.05, 0.3);
+        for axes in [None, Some("RAS:LPS"), Some("ALS:PIR"), Some("RAS:RAI")] {
+            let axes = axes.map(|axes| axes.parse().expect("axes"));
+            let origin = DVec3::new(300.0, -20.0, 1000.0);
+            let place = Place { unit: Some(Unit::Metre), axes, origin, order: order.clone() };
+            let placed = |point: DVec3| {
+                let turned =
+                    axes.map_or(point.to_array(), |axes: Axes| axes.turn(point.to_array()));
+                DVec3::from(turned) * 1000.0 - origin
+            };
+            let pose = place.pose(&rotation, shift).expect("near");
+            for point in [DVec3::ZERO, DVec3::new(0.1, 0.2, -0.4)] {
+                let moved = pose.apply(placed(point).as_vec3()).as_dvec3();
+                let truth = placed(rotation * point + shift);
+                assert!(moved.abs_diff_eq(truth, 1e-2), "{moved} {truth} {axes:?}");
+            }
+        }
+        let place = Place { unit: None, axes: None, origin: DVec3::ZERO, order };
+        assert!(place.pose(&rotation, DVec3::splat(1e30)).is_err());
+    }
 
     #[test]
     fn axes_are_turned_as_their_letters_say() {

@@ -8,6 +8,7 @@ use super::timing::Timing;
 use super::{Args, Frames, Source};
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::Vec3;
+use dibs_nostd::RigidPose;
 use dibs_nostd::wire::Mac;
 use dibs_stream::transport::{Line, Target};
 use dibs_stream::{Pace, SendError, Sender};
@@ -47,7 +48,7 @@ pub struct Player<'a, const MTU: usize, M> {
 
 /// What is sent of a frame.
 enum Rows<'a> {
-    Positions(Cow<'a, [Vec3]>),
+    Positions(Cow<'a, [Vec3]>, Option<RigidPose>),
     Weights(&'a [f32]),
 }
 
@@ -186,7 +187,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                 let at = (number % positions.len() as u64) as usize;
                 let rows = match weights {
                     Some(weights) => Rows::Weights(&weights[at]),
-                    None => Rows::Positions(Cow::Borrowed(&positions[at])),
+                    None => Rows::Positions(Cow::Borrowed(&positions[at]), None),
                 };
                 // A recorded frame counts as captured when it is due, even if the surface stands still.
                 return Ok(Some(Due { rows, ago: Duration::ZERO, period, came: None }));
@@ -201,7 +202,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                 Next::Frame(frame) => {
                     *due = frame.came.max(*due);
                     self.outcome.passed_over = live.passed_over();
-                    let rows = Rows::Positions(Cow::Owned(frame.positions));
+                    let rows = Rows::Positions(Cow::Owned(frame.positions), frame.pose);
                     // A program that prints faster than the rate has frames that are due later.
                     let is_waiting = period.is_zero() || is_due_when_it_came;
                     let waited = if is_waiting { frame.first.elapsed() } else { Duration::ZERO };
@@ -225,7 +226,10 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         let sender = &mut self.sender;
         let prepared = match &frame.rows {
             Rows::Weights(weights) => sender.prepare_weights_captured(weights, frame.ago),
-            Rows::Positions(positions) => sender.prepare_captured(positions, frame.ago),
+            Rows::Positions(positions, None) => sender.prepare_captured(positions, frame.ago),
+            Rows::Positions(positions, Some(pose)) => {
+                sender.prepare_at(positions, *pose, frame.ago)
+            }
         };
         let sent = prepared.and_then(|prepared| {
             let packets = prepared.sent().packets;

@@ -51,6 +51,7 @@ pub const WORDS: &[Row] = &[
     ("format", "FORMAT", "what those frames are", "stream"),
     ("axes", "AXES", "the axes of those frames and of the tree", "stream"),
     ("device", "DEVICE", "the OpenIGTLink device whose frames are taken", "stream"),
+    ("pose-device", "TRACKED", "the OpenIGTLink device whose pose the frames have", "stream"),
     ("to", "TO", "the receiver's address", "stream"),
     ("quantise", "", "6 bytes a vertex", "stream"),
     ("partial", "TOLERANCE", "distance of vertices that stand still", "stream"),

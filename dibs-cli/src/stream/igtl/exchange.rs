@@ -35,10 +35,12 @@ pub enum Cause {
     Topology,
     /// Its positions are no frame of the tree's surface.
     Frame,
+    /// Its pose is none, or its frame has none.
+    Pose,
 }
 
 impl Cause {
-    const ALL: [Self; 4] = [Self::Checksum, Self::Layout, Self::Topology, Self::Frame];
+    const ALL: [Self; 5] = [Self::Checksum, Self::Layout, Self::Topology, Self::Frame, Self::Pose];
 
     const fn name(self) -> &'static str {
         match self {
@@ -46,6 +48,7 @@ impl Cause {
             Self::Layout => "layout",
             Self::Topology => "topology",
             Self::Frame => "frame",
+            Self::Pose => "pose",
         }
     }
 }
@@ -65,6 +68,8 @@ pub struct Exchange(Mutex<State>);
 struct State {
     connections: u64,
     messages: u64,
+    /// Those with a pose that was taken.
+    poses: u64,
     /// Messages of other types and devices.
     passed: u64,
     /// Whether a note tells of another device with positions.
@@ -128,6 +133,13 @@ impl Exchange {
             }
             state.timeless += 1;
         }
+    }
+
+    /// Counts a message whose pose is taken.
+    pub fn posed(&self) {
+        let mut state = self.state();
+        state.messages += 1;
+        state.poses += 1;
     }
 
     /// Leaves a note.
@@ -207,6 +219,7 @@ impl Exchange {
         json!({
             "connections": state.connections,
             "messages": state.messages,
+            "poses": state.poses,
             "passed": state.passed,
             "without_time": state.timeless,
             "refused": refused,

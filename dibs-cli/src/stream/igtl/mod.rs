@@ -9,6 +9,7 @@ mod exchange;
 mod matching;
 mod message;
 mod peer;
+mod pose;
 #[cfg(test)]
 mod tests;
 mod topology;
@@ -21,9 +22,11 @@ use super::place::Place;
 use anyhow::Result;
 use content::{Content, Kind};
 use delay::Delay;
+use dibs_nostd::RigidPose;
 use exchange::Cause;
 use message::{BodyError, Header};
 use peer::{Door, Ended, Peer};
+use pose::PoseError;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use topology::Topology;
@@ -35,6 +38,9 @@ pub struct Igtl {
     peer: Option<Peer>,
     /// The only device whose positions are taken.
     device: Option<String>,
+    /// The device whose pose every frame has, and the last one.
+    pose_device: Option<String>,
+    pose: Option<Known>,
     place: Place,
     topology: Topology,
     exchange: Arc<Exchange>,
@@ -48,6 +54,16 @@ pub struct Igtl {
     has_message: bool,
 }
 
+/// A pose, when it came, and how late it was then.
+struct Known {
+    pose: RigidPose,
+    came: Instant,
+    delay: Duration,
+}
+
+/// Bytes of the largest message with poses: of a thousand instruments.
+const MOST_POSES: u64 = 1 << 17;
+
 /// A message that is refused.
 type Refusal = (Cause, String);
 
@@ -56,7 +72,7 @@ impl Igtl {
     /// If nobody can connect here.
     pub fn new(
         address: &Address,
-        device: Option<String>,
+        [device, pose_device]: [Option<String>; 2],
         patience: Duration,
         place: Place,
         exchange: Arc<Exchange>,
@@ -69,6 +85,8 @@ impl Igtl {
             door,
             peer: None,
             device,
+            pose_device,
+            pose: None,
             place,
             topology,
             exchange,
@@ -123,6 +141,18 @@ impl Igtl {
     /// Reads one message. `None` if it has no frame, or none that fits.
     fn message(&mut self, peer: &mut Peer) -> Result<Option<Parsed>, Ended> {
         let header = peer.header(&mut self.door, &self.exchange)?;
+        if let Some(kind) = self.pose_of(&header) {
+            let read =
+                self.body(peer, &header, MOST_POSES, "a message with poses", |igtl, body| {
+                    igtl.read_pose(&header, kind, body, Instant::now())
+                })?;
+            match read {
+                Ok(true) => self.exchange.posed(),
+                Ok(false) => self.exchange.passed(None),
+                Err(refusal) => self.refuse(peer, &header, refusal),
+            }
+            return Ok(None);
+        }
         let other = self.device.as_ref().filter(|device| **device != header.device);
         let kind = Kind::of(&header.kind);
         let Some(kind) = kind.filter(|_| other.is_none()) else {
@@ -139,36 +169,81 @@ impl Igtl {
             return Ok(None);
         };
         let most = self.most();
-        let read = if header.size > most {
-            peer.skip(header.size)?;
-            Err((
-                Cause::Layout,
-                format!("has {} bytes, and the tree's surface needs at most {most}", header.size),
-            ))
-        } else {
-            let mut body = std::mem::take(&mut self.body);
-            let whole = peer.body(header.size, &mut body);
-            let came = Instant::now();
-            let read = whole.map(|()| self.read(&header, kind, &body, came));
-            self.body = body;
-            read?
-        };
+        let read = self.body(peer, &header, most, "the tree's surface", |igtl, body| {
+            igtl.read(&header, kind, body, Instant::now())
+        })?;
         self.number += 1;
         match read {
             Ok(parsed) => {
                 self.exchange.accepted(header.time > 0.0);
                 Ok(Some(parsed))
             }
-            Err((cause, why)) => {
-                let what = format!(
-                    "{}, {} of device \"{}\": {why}",
-                    self.name, header.kind, header.device
-                );
-                self.exchange.refused(cause, what);
-                peer.report(&self.exchange);
+            Err(refusal) => {
+                self.refuse(peer, &header, refusal);
                 Ok(None)
             }
         }
+    }
+
+    /// Reads a body of at most so many bytes, as `what` needs them, and what is in it.
+    fn body<T>(
+        &mut self,
+        peer: &mut Peer,
+        header: &Header,
+        most: u64,
+        what: &str,
+        read: impl FnOnce(&mut Self, &[u8]) -> Result<T, Refusal>,
+    ) -> Result<Result<T, Refusal>, Ended> {
+        if header.size > most {
+            peer.skip(header.size)?;
+            let why = format!("has {} bytes, and {what} needs at most {most}", header.size);
+            return Ok(Err((Cause::Layout, why)));
+        }
+        let mut body = std::mem::take(&mut self.body);
+        let whole = peer.body(header.size, &mut body);
+        let read = whole.map(|()| read(self, &body));
+        self.body = body;
+        read
+    }
+
+    fn refuse(&self, peer: &mut Peer, header: &Header, (cause, why): Refusal) {
+        let what = format!("{}, {} of device \"{}\": {why}", self.name, header.kind, header.device);
+        self.exchange.refused(cause, what);
+        peer.report(&self.exchange);
+    }
+
+    /// The type of a message that may have the pose that is wanted.
+    fn pose_of(&self, header: &Header) -> Option<pose::Kind> {
+        let wanted = self.pose_device.as_ref()?;
+        let kind = pose::Kind::of(&header.kind)?;
+        (!kind.is_of_device() || header.device == *wanted).then_some(kind)
+    }
+
+    /// Takes the pose of a message. Returns whether it has the one that is wanted.
+    fn read_pose(
+        &mut self,
+        header: &Header,
+        kind: pose::Kind,
+        body: &[u8],
+        came: Instant,
+    ) -> Result<bool, Refusal> {
+        let content = content(header, body)?;
+        let device = self.pose_device.as_deref().unwrap_or_default();
+        let read = kind.read(content, device).map_err(|error| match error {
+            PoseError::Layout => {
+                (Cause::Layout, "is not as the protocol has it: a list ends early".to_owned())
+            }
+            PoseError::NoRotation => {
+                let why =
+                    "its matrix or quaternion is no rotation: a pose neither scales nor mirrors";
+                (Cause::Pose, why.to_owned())
+            }
+        })?;
+        let Some(pose) = read else { return Ok(false) };
+        let placed = self.place.pose(&pose.rotation, pose.shift);
+        let pose = placed.map_err(|error| (Cause::Pose, error.to_string()))?;
+        self.pose = Some(Known { pose, came, delay: self.delay.of(came, header.time) });
+        Ok(true)
     }
 
     /// Bytes of the largest message of this surface: 256 for a point, with its attributes, and 64 for a triangle.
@@ -184,12 +259,7 @@ impl Igtl {
         body: &[u8],
         came: Instant,
     ) -> Result<Parsed, Refusal> {
-        let content = header.content(body).map_err(|error| match error {
-            BodyError::Checksum => (Cause::Checksum, "its checksum is wrong".to_owned()),
-            BodyError::Layout => {
-                (Cause::Layout, "its extended header reaches outside of it".to_owned())
-            }
-        })?;
+        let content = content(header, body)?;
         let layout = match kind {
             Kind::Array => "is no array of N times 3 numbers, float32 or float64",
             Kind::PolyData | Kind::Point => {
@@ -208,6 +278,26 @@ impl Igtl {
         }
         let positions = self.place.frame(positions, self.number);
         let positions = positions.map_err(|error| (Cause::Frame, error.to_string()))?;
-        Ok(Parsed { positions, came, age: Age::Delay(self.delay.of(came, header.time)) })
+        let delay = self.delay.of(came, header.time);
+        let Some(device) = &self.pose_device else {
+            return Ok(Parsed { positions, pose: None, came, age: Age::Delay(delay) });
+        };
+        let Some(known) = &self.pose else {
+            let why = format!("no pose of device \"{device}\" has come before it");
+            return Err((Cause::Pose, why));
+        };
+        // A frame is as old as what came first of its two parts.
+        let pose_age = came.saturating_duration_since(known.came) + known.delay;
+        let age = Age::Delay(delay.max(pose_age));
+        Ok(Parsed { positions, pose: Some(known.pose), came, age })
     }
+}
+
+fn content<'b>(header: &Header, body: &'b [u8]) -> Result<&'b [u8], Refusal> {
+    header.content(body).map_err(|error| match error {
+        BodyError::Checksum => (Cause::Checksum, "its checksum is wrong".to_owned()),
+        BodyError::Layout => {
+            (Cause::Layout, "its extended header reaches outside of it".to_owned())
+        }
+    })
 }

@@ -92,7 +92,7 @@ fn connected(to: &str) -> TcpStream {
 }
 
 /// The next connection. One that does not come fails the test.
-fn accepted(server: &TcpListener) -> TcpStream {
+pub fn accepted(server: &TcpListener) -> TcpStream {
     server.set_nonblocking(true).unwrap();
     let start = Instant::now();
     loop {

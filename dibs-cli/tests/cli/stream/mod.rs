@@ -6,6 +6,7 @@
 mod igtl;
 mod igtl_messages;
 mod igtl_peers;
+mod igtl_pose;
 mod live;
 #[cfg(target_os = "linux")]
 mod memory;
