@@ -1,5 +1,7 @@
 //! The connected components of a set of triangles.
 
+// Requirement: A-08
+
 use std::collections::HashMap;
 
 use petgraph::unionfind::UnionFind;

@@ -1,5 +1,7 @@
 //! The one check of frames against a tree, wherever they come from: a file, an array, a live source.
 
+// Requirement: M-06
+
 use dibs_nostd::format::Unit;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree, TriangleRow};

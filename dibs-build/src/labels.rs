@@ -2,6 +2,8 @@
 //!
 //! Text: lines that start with `#` and empty ones are skipped; then one number from 0 to 255 a line, in the file's order.
 
+// Requirement: A-12
+
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;

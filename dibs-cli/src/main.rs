@@ -1,5 +1,7 @@
 //! `dibs`: from a mesh file to a tree, and queries on it, on the command line.
 
+// Requirement: P-08
+
 #[macro_use]
 mod output;
 

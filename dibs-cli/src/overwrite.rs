@@ -1,5 +1,7 @@
 //! No output replaces an input, or another output.
 
+// Requirement: P-08
+
 use anyhow::{Result, bail};
 use dibs_build::files_of;
 use std::fs::Metadata;

@@ -1,5 +1,7 @@
 //! Includes the module that `dibs-build` generates for a tree.
 
+// Requirement: P-11
+
 /// Includes the module of a tree that a build script emitted: `include_tree!("heart")` gives `mod heart`.
 ///
 /// The module has every item that follows from the tree:

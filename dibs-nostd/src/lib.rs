@@ -58,6 +58,9 @@
 //! - `portable-atomic`: processors without compare-and-swap; interrupts are masked for the few instructions of each publication
 //!   and read of a frame, by the program's `critical-section` implementation.
 //! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver takes only packets with a genuine tag.
+
+// Requirement: P-01
+
 #![no_std]
 #![deny(unsafe_code)]
 

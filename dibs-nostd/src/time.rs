@@ -9,6 +9,8 @@
 //! - A stamp never grows younger: when the clock comes around, its age stays [`Millis::MAX`]. This requires a reading of
 //!   its age at least once in 2^31 ms.
 
+// Requirement: B-05
+
 use core::fmt;
 use core::num::NonZeroU32;
 

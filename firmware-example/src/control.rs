@@ -1,5 +1,7 @@
 //! The control tick: pose, answer, force, record.
 
+// Requirement: P-05
+
 use bytemuck::Zeroable;
 use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
 use dibs_nostd::filter::Filter;

@@ -3,6 +3,8 @@
 //! It is as small as the bus: one address, one port, no fragments, no options, and one peer, the sender of the last good
 //! packet. `docs/decisions.md` says why it is not a whole network stack.
 
+// Requirement: P-05
+
 use etherparse::checksum::Sum16BitWords;
 use etherparse::{
     ArpEthIpv4Packet, ArpOperation, ArpPacketSlice, EtherType, Ethernet2Header, Ethernet2Slice,

@@ -1,5 +1,7 @@
 //! The control logic on the host, against an in-process bus: the same bytes as on the board.
 
+// Requirement: P-05
+
 use std::collections::HashMap;
 use std::sync::OnceLock;
 

@@ -1,5 +1,7 @@
 //! The controller's end of a network, against bytes put together by hand from RFC 826, 791 and 768.
 
+// Requirement: P-05
+
 use controller::network::{ADDRESS, Content, HARDWARE, MAX_REPLY, PORT, announcement, read, seal};
 
 /// The sender of the frames.

@@ -2,6 +2,8 @@
 //!
 //! One file, because it is the page's whole interface.
 
+// Requirement: P-09
+
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Budget, FormatError, Index, MeasuredStretch, MovingSurface, Odometer, Options, Proximity,

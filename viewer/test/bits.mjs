@@ -1,4 +1,7 @@
 // The session compiled to WebAssembly answers with the bits of `dibs query`: `node bits.mjs SESSION-FOLDER HEART-FOLDER`.
+
+// Requirement: P-09
+
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { readFile, writeFile } from "node:fs/promises";

@@ -1,4 +1,7 @@
 // Opens pages of `dibs view` in Chromium and uses them as a hand would: `node browser.mjs HEART-FOLDER [--record]`.
+
+// Requirement: P-09
+
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { readFile, stat, writeFile } from "node:fs/promises";

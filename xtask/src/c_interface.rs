@@ -1,5 +1,7 @@
 //! The C interface's static library for the board.
 
+// Requirements: P-01, P-06
+
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;

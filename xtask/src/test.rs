@@ -1,5 +1,7 @@
 //! `cargo xtask test`: everything that CI runs.
 
+// Requirement: E-04
+
 use std::path::PathBuf;
 use std::process::Command;
 use std::thread;

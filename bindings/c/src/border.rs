@@ -4,6 +4,8 @@
 //! is null, or it points to as much as its function says, for as long as it says. Null, misalignment, another kind of
 //! object and an object in use are found here, and become codes.
 
+// Requirements: P-04, P-06
+
 use core::cell::UnsafeCell;
 use core::ffi::c_void;
 #[cfg(not(target_os = "none"))]

@@ -6,6 +6,9 @@
 //!
 //! Names are those of the header. `unsafe` stands in `border`, which trusts the caller's pointers, in `surface`, whose
 //! buffers have a size that no type has, and where a struct of the header has pointers.
+
+// Requirement: P-06
+
 #![no_std]
 #![allow(non_camel_case_types)]
 // Parameters are named in Doxygen's way.

@@ -1,5 +1,7 @@
 //! The filter of commands in C: the same bits as in Rust, for a chain pushed into a moving surface.
 
+// Requirement: P-06
+
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;

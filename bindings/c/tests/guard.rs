@@ -1,5 +1,7 @@
 //! The loop of bus and guard in C: the same bits as in Rust, and its misuses.
 
+// Requirement: P-06
+
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};

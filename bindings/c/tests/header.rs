@@ -1,5 +1,7 @@
 //! `include/dibs.h` is the header that cbindgen generates. `DIBS_WRITE=1` writes it anew.
 
+// Requirement: P-06
+
 use std::path::Path;
 use std::{env, fs};
 

@@ -1,5 +1,7 @@
 //! The layers below bus and guard answer a script with the same bits as the Rust library.
 
+// Requirement: P-06
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;

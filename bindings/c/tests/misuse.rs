@@ -1,5 +1,7 @@
 //! Misuse in C returns a code, and touches no memory outside the object.
 
+// Requirement: P-06
+
 use std::path::Path;
 use std::process::Command;
 

@@ -1,5 +1,7 @@
 //! Queries in C on a surface that nodes carry: the same bits as in Rust, and what is refused.
 
+// Requirement: P-06
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;

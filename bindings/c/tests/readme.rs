@@ -1,5 +1,7 @@
 //! The README's programs compile.
 
+// Requirements: P-06, P-11
+
 use std::fs;
 use std::path::Path;
 

@@ -1,5 +1,7 @@
 //! The controller of `examples/ros2`, without ROS: its ticks act on a wall while frames come, and hold once they do not.
 
+// Requirement: P-06
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;

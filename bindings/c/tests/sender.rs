@@ -1,5 +1,7 @@
 //! A sender in C, whose frames a bus of the same program receives over UDP.
 
+// Requirement: P-06
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;

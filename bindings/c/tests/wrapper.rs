@@ -1,5 +1,7 @@
 //! `include/dibs.hpp`, installed, compiles as C++20 without exceptions, and its queries answer.
 
+// Requirement: P-06
+
 use std::path::Path;
 use std::process::Command;
 

@@ -1,6 +1,8 @@
 //! The native half of the Python package `dibs`: bytes in, bytes out. `dibs/__init__.py` makes arrays of them, and
 //! checks shapes and types before.
 
+// Requirement: P-07
+
 mod bytes;
 mod error;
 mod guard;

@@ -1,5 +1,7 @@
 //! From a tree of sections to the flat array: ordered, rounded up, written.
 
+// Requirement: A-02
+
 use dibs_nostd::format::{
     CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, Unit, VERSION, field, section,
 };

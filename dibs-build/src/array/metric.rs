@@ -1,5 +1,7 @@
 //! The metric section: it lets the controller measure a triangle's stretch without the rest shape.
 
+// Requirement: F-02
+
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 

@@ -1,5 +1,7 @@
 //! The one writer of a tree's bytes: header, table of sections, sections, checksum.
 
+// Requirement: M-01
+
 use dibs_nostd::format::{CRC, HEADER_BYTES, SECTION_ALIGN, SECTION_BYTES, field};
 
 use crate::error::BuildError;

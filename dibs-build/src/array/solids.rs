@@ -1,5 +1,7 @@
 //! The solids of a surface of several parts: which closed part bounds one, and which are its cavities.
 
+// Requirement: S-02
+
 use dibs_nostd::Index;
 use dibs_nostd::format::no_neighbour;
 

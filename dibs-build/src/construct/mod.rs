@@ -1,5 +1,7 @@
 //! Top-down construction: the triangles of each component become a tree of sections.
 
+// Requirement: M-04
+
 mod embedded;
 mod paper;
 mod pin;

@@ -1,5 +1,7 @@
 //! A section: the triangles below one node, and the searches that measure it.
 
+// Requirement: A-02
+
 use crate::Mesh;
 use crate::geodesic::{Distances, Farthest, Graph};
 use crate::nodes::VolumePaths;

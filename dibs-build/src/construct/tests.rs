@@ -1,5 +1,7 @@
 //! The work of a construction, counted in arcs that its searches look at, on meshes made to cost much.
 
+// Requirement: M-04
+
 use glam::Vec3;
 
 use super::{Construction, Constructor, Surface};

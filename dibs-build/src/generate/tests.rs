@@ -1,5 +1,7 @@
 //! Properties of every generated surface, for any number of triangles.
 
+// Requirement: M-03
+
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, Vec3};

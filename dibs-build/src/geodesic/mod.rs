@@ -1,5 +1,7 @@
 //! Distances along the surface: the graph of its paths, and shortest paths in it.
 
+// Requirement: A-02
+
 mod graph;
 mod search;
 mod topology;

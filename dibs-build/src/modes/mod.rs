@@ -3,6 +3,8 @@
 //! [`ModalFit`] decomposes a motion, [`BuiltTree::with_modes`](crate::BuiltTree::with_modes) adds the
 //! first of its modes to a tree, and a sender turns positions into weights with a [`Projector`].
 
+// Requirement: F-06
+
 mod encode;
 mod fit;
 mod growth;

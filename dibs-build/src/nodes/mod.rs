@@ -1,5 +1,7 @@
 //! Volumes of tetrahedra whose nodes move a surface: [`Builder::nodes`](crate::Builder::nodes).
 
+// Requirement: F-07
+
 mod binding;
 mod encode;
 mod paths;

@@ -2,6 +2,8 @@
 //!
 //! One file, because the order of the checks is their meaning.
 
+// Requirement: M-03
+
 use super::place::{Place, check_nearness, rounding};
 use super::polygon::Triangulator;
 use super::raw::Raw;

@@ -1,5 +1,7 @@
 //! Mesh files, recognised by their contents.
 
+// Requirement: M-03
+
 #[cfg(feature = "formats")]
 mod base64;
 mod check;

@@ -1,5 +1,7 @@
 //! From a file's coordinates to a mesh's: in millimetres, and from an origin near the mesh, where f32 holds them.
 
+// Requirement: M-05
+
 use super::ReadErrorKind;
 use super::raw::Raw;
 use crate::Unit;

@@ -10,6 +10,8 @@
 //! The rest shapes of neighbours need not fit together; a flat one does not fit, so no chord crosses it. The fattened
 //! shape is nowhere shorter than the true one, so the true rest shape stays within its spheres.
 
+// Requirement: A-02
+
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 

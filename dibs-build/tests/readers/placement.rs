@@ -1,6 +1,8 @@
 //! Surfaces that a scene mirrors: a placement of negative determinant turns a surface inside out unless its triangles
 //! are flipped.
 
+// Requirement: M-03
+
 use std::io::Write;
 
 use base64::Engine;

@@ -1,5 +1,7 @@
 //! Files that other programs write now: `../writers.py` runs those that are installed.
 
+// Requirement: M-03
+
 use std::path::Path;
 use std::process::Command;
 

@@ -1,5 +1,7 @@
 //! Frames as they come: a thread reads them, and the newest waits to be sent.
 
+// Requirement: B-10
+
 use anyhow::Result;
 use dibs_build::glam::Vec3;
 use dibs_nostd::RigidPose;

@@ -1,5 +1,7 @@
 //! The command line says one thing one way.
 
+// Requirement: P-08
+
 mod table;
 
 use clap::builder::ValueParser;

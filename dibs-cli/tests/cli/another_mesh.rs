@@ -1,5 +1,7 @@
 //! Frames of another mesh, or in another unit, are refused wherever they come from; the accuracy covers what was dropped.
 
+// Requirement: M-06
+
 use std::fmt::Write;
 use std::path::Path;
 

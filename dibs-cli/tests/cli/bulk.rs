@@ -1,5 +1,7 @@
 //! `dibs query --poses`: many poses at once.
 
+// Requirement: P-08
+
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};

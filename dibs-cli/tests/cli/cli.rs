@@ -2,6 +2,8 @@
 //!
 //! One file, because each test is a few commands.
 
+// Requirement: P-08
+
 use std::net::UdpSocket;
 use std::path::Path;
 use std::process::Command;

@@ -1,5 +1,7 @@
 //! The `dibs` program and recorded motions: modes, weights and limits.
 
+// Requirement: P-08
+
 use std::net::UdpSocket;
 use std::time::Duration;
 

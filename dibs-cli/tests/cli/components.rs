@@ -1,5 +1,7 @@
 //! Meshes of several surfaces that share no vertex, on the command line.
 
+// Requirement: A-08
+
 use std::fmt::Write;
 
 use crate::program::{dibs, fails, json, succeeds};

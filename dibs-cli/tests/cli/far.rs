@@ -1,6 +1,8 @@
 //! The program on a heart kilometres from the origin: coordinates go in and come out as the file has them, and
 //! everything between counts from the tree's origin.
 
+// Requirement: M-05
+
 use std::fs;
 use std::io::Read;
 use std::net::TcpListener;

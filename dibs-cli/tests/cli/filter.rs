@@ -1,5 +1,7 @@
 //! `dibs filter`: admitted poses keep the stand-off, and bad input is named.
 
+// Requirements: C-05, P-08
+
 use std::fs::write;
 use std::path::Path;
 

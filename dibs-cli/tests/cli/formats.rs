@@ -1,5 +1,7 @@
 //! Files as other programs write them: `../fixtures/make.py` says which.
 
+// Requirement: M-03
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,7 @@
 //! Labels from the groups of mesh files, as other programs write them.
 
+// Requirement: A-12
+
 use std::path::{Path, PathBuf};
 
 use dibs_build::{Group, Groups, Import, ReadErrorKind, ReadOptions};

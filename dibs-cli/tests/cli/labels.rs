@@ -1,5 +1,7 @@
 //! Labels of triangles, from a text file to the answers of `dibs query`.
 
+// Requirement: A-12
+
 use std::fmt::Write;
 
 use dibs_build::{Builder, LabelsErrorKind, generate, read_labels};

@@ -1,5 +1,7 @@
 //! What shells, scripts and `man` ask of a program.
 
+// Requirement: P-08
+
 use std::process::Command;
 
 use crate::program::{dibs, fails, json, succeeds};

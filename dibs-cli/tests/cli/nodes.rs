@@ -1,5 +1,7 @@
 //! The `dibs` program and surfaces that the nodes of a volume move.
 
+// Requirements: F-07, P-08
+
 use std::fmt::Write as _;
 use std::net::UdpSocket;
 use std::path::Path;

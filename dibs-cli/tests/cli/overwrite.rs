@@ -1,5 +1,7 @@
 //! No output of the program replaces an input or another output.
 
+// Requirement: P-08
+
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! The times of a frame's packets, on a clock of the test's; and of `dibs stream`.
 
+// Requirement: B-09
+
 use std::collections::BTreeMap;
 use std::net::UdpSocket;
 use std::thread;

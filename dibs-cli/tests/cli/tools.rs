@@ -1,5 +1,7 @@
 //! A tool is written in one way for `--tool`, `--poses` and `--path`.
 
+// Requirement: P-08
+
 use std::fs::write;
 use std::io::Write;
 use std::path::Path;

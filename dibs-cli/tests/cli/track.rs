@@ -1,5 +1,7 @@
 //! `dibs track --budget` and `--contacts`: the interval stays certain, and a tick says what its budget left open.
 
+// Requirements: P-08, T-02
+
 use std::fs::write;
 use std::path::Path;
 

@@ -1,5 +1,7 @@
 //! The page that `dibs view` writes. Its contents are tested where they are read: `viewer/test/`.
 
+// Requirement: P-09
+
 use std::fs;
 use std::io::Read;
 

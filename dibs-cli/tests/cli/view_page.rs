@@ -1,5 +1,7 @@
 //! The page without data, which a checkout's program makes once: here by stand-ins for Node.js and Cargo.
 
+// Requirement: P-09
+
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,7 @@
 //! The answer of a tick.
 
+// Requirement: C-08
+
 use glam::Vec3;
 
 use crate::constraint::{ConstraintForce, ForbiddenRegion, Guidance};

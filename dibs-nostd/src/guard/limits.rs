@@ -1,5 +1,7 @@
 //! The limits of a controller: numbers that only its user knows.
 
+// Requirement: C-07
+
 use super::Rows;
 use crate::failsafe::{LimitError, Limits, Watch};
 use crate::{Budget, Index, Millis, Options, SurfaceLimits, Tree};

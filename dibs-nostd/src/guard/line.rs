@@ -1,5 +1,7 @@
 //! The bus's end on a byte stream of the embedded ecosystem.
 
+// Requirement: B-09
+
 use embedded_io::{Read, Write};
 
 use super::{Bus, Rows};

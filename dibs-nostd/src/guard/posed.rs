@@ -1,5 +1,7 @@
 //! Frames with a rigid pose each: the tool is moved by its inverse, and nothing below knows.
 
+// Requirement: F-08
+
 use core::marker::PhantomData;
 
 use glam::Vec3;

@@ -1,5 +1,7 @@
 //! The memory that both ends share.
 
+// Requirement: C-07
+
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 

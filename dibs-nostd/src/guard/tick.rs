@@ -1,5 +1,7 @@
 //! The control tick's end: pose in, answer out.
 
+// Requirements: C-01, C-07
+
 use glam::Vec3;
 
 use super::posed::Placed;

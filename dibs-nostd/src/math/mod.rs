@@ -1,5 +1,7 @@
 //! Arithmetic that gives the same bits on host and target.
 
+// Requirement: A-11
+
 #[cfg(feature = "serde")]
 pub(crate) mod no_limit;
 pub(crate) mod round;

@@ -2,6 +2,9 @@
 //!
 //! `core` has no stable square root, and the portable one in software takes tens of instructions on a Cortex-M7 whose
 //! FPU needs a single one. All ways below round correctly, so that host and target agree in every bit.
+
+// Requirements: A-11, P-01
+
 #![allow(unsafe_code)]
 
 /// The square root of `x`, correctly rounded; NaN for a negative number or NaN.

@@ -12,6 +12,8 @@
 //! | [`ModalGate`], [`ModalReader`] | both ends of a bus that carries weights |
 //! | [`Memo`] | remembers positions, for the length of a query |
 
+// Requirement: F-06
+
 mod bound;
 mod error;
 mod frame;

@@ -1,5 +1,7 @@
 //! The motion of a modal surface as its odometer states it, which only the crate can read.
 
+// Requirements: F-06, T-04
+
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree, Motion, generate};
 use fastrand::Rng;

@@ -22,6 +22,8 @@
 //! times its rest length, so the builder stores `12 u s^3` times the product of the rest lengths: a volume above it is
 //! positive.
 
+// Requirement: F-07
+
 use core::ops::{Add, BitAnd, Mul, Sub};
 
 use glam::Vec4;

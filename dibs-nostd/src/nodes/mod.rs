@@ -15,6 +15,8 @@
 //! a frame's [`interpolated`](crate::FrameGuard::interpolated) and [`extrapolated`](crate::FrameGuard::extrapolated) nodes
 //! carry surfaces, too.
 
+// Requirement: F-07
+
 mod error;
 mod kernel;
 mod layout;

@@ -1,5 +1,7 @@
 //! Several tools and several surfaces: the closest of all pairs.
 
+// Requirement: A-09
+
 use glam::Vec3;
 
 use super::contacts::Pair;

@@ -1,5 +1,7 @@
 //! From a deadline to a budget, by a fitted bound on a query's cost.
 
+// Requirement: A-05
+
 use super::Budget;
 
 /// A fitted bound on a query's cost: `base + n * node_test + t * triangle_test`, in instructions, where `n`

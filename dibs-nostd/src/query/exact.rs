@@ -15,6 +15,8 @@
 //! A point on an edge that is nearly a vertex may be taken for the vertex: then the edge's angle is 90 degrees, and no
 //! other's is clearly less. One in a face is at a sine of 1 from it, and the edge has the face's side.
 
+// Requirement: S-01
+
 use super::NoSide;
 use super::normal::{Feature, MAX_RING, NORMAL, after, turned};
 use super::precision::Precision;

@@ -4,6 +4,8 @@
 //! pseudonormal there (Bærentzen & Aanæs, "Signed distance computation using the angle weighted pseudonormal", IEEE
 //! TVCG 11(3), 2005).
 
+// Requirement: S-01
+
 use core::f32::consts::{FRAC_PI_2, PI};
 
 use glam::Vec3;

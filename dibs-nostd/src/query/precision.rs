@@ -1,5 +1,7 @@
 //! The numbers that a side is decided in: f32 first, and f64 where its rounding hides the side.
 
+// Requirement: A-01
+
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use glam::{DVec3, Vec3};

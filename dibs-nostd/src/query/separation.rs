@@ -3,6 +3,8 @@
 //! The signed distance of a point is negative inside. It changes by at most the motion of point and surface, and so does
 //! the least of an axis. Where the axis is outside, the closest pair has it; where it crosses or is inside, the deepest point.
 
+// Requirements: A-03, S-02
+
 use glam::Vec3;
 
 use super::depth::Depth;

@@ -1,5 +1,7 @@
 //! On which side of the surface a point is.
 
+// Requirement: S-01
+
 use core::fmt;
 
 use glam::Vec3;

@@ -4,6 +4,8 @@
 //! sheet of all decides nothing. The least of their separations changes by no more than tool and surface move, as each
 //! of them does.
 
+// Requirement: S-02
+
 use super::Proximity;
 use super::memory::depth::KnownDepthMut;
 use super::search::{Search, Ties, WHOLE, Waiting};

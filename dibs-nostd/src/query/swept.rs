@@ -1,5 +1,7 @@
 //! Between ticks: the first time at which a moving tool and surface come closer than a margin.
 
+// Requirement: A-10
+
 use super::tracker::{Tracker, TrackerAnswer};
 use super::{Options, Proximity, Side};
 use crate::math::sqrt::sqrt;

@@ -1,5 +1,7 @@
 //! The packets of a frame that have arrived, as ranges instead of a mark for each.
 
+// Requirement: B-01
+
 use core::ops::Range;
 
 /// Contiguous ranges of sequence numbers noted besides the first: the most gaps that a frame can have at once.

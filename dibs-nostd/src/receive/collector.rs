@@ -4,6 +4,8 @@
 //!
 //! One file, because the order of its checks is the protocol's.
 
+// Requirement: B-01
+
 mod heartbeats;
 
 use super::ReceiveError;

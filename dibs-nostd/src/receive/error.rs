@@ -1,5 +1,7 @@
 //! Why a packet or frame was rejected.
 
+// Requirement: B-02
+
 use core::fmt;
 
 use crate::StretchError;

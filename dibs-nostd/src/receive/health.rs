@@ -1,5 +1,7 @@
 //! The bus's health, in numbers that a fail-safe machine watches.
 
+// Requirement: B-04
+
 use super::ReceiveError;
 use crate::surface::Millis;
 use crate::wire::{FrameId, Packet, is_newer};

@@ -1,5 +1,7 @@
 //! Whole frames of this process, without packets: the same checks, and the same gate.
 
+// Requirement: B-08
+
 use glam::Vec3;
 
 use super::health::FrameName;

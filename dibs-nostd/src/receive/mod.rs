@@ -2,6 +2,8 @@
 //!
 //! One file, because it is the assembler's whole interface.
 
+// Requirement: B-11
+
 mod arrivals;
 mod collector;
 mod error;

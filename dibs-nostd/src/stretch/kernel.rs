@@ -21,6 +21,8 @@
 //! The builder avoids products that overflow or underflow; where it cannot, it stores a metric of zeros, which no
 //! triangle passes.
 
+// Requirement: F-02
+
 use glam::{Vec3, Vec4};
 
 use crate::math::sqrt::sqrt;

@@ -1,5 +1,7 @@
 //! Limits of a surface besides its stretch, which depend on the tissue.
 
+// Requirement: F-03
+
 /// Limits for a surface to be published, besides the tree's stretch limit.
 ///
 /// They refuse surfaces of impossible position or shape. A closed surface must enclose a volume of the sign that its

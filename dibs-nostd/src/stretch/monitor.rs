@@ -1,5 +1,7 @@
 //! The stretch of each frame, measured in slices of bounded work while its packets arrive.
 
+// Requirement: F-02
+
 use core::ops::Range;
 
 use super::motion::{farthest, largest_step, too_fast};

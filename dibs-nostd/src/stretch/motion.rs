@@ -1,5 +1,7 @@
 //! The motion of vertices since the published frame.
 
+// Requirement: F-03
+
 use core::ops::Range;
 
 #[cfg(feature = "bus")]

@@ -5,6 +5,8 @@
 //! shadow on a plane (the divergence theorem for the field (0, 0, z)). A whole frame sums up all triangles; a partial one
 //! replaces those of the regions that it moved.
 
+// Requirement: F-03
+
 use core::ops::Range;
 
 use glam::Vec3;

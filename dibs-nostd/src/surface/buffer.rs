@@ -1,5 +1,7 @@
 //! The parts of a buffer: positions and the label of their frame, in relaxed atomics.
 
+// Requirement: F-01
+
 use glam::Vec3;
 
 use super::atomic::{AtomicU32, Ordering};

@@ -29,6 +29,8 @@
 //! when an exception comes between its load and its store: at most once an exception, and never in the handler of
 //! highest priority.)
 
+// Requirement: F-01
+
 use core::ops::Range;
 
 use glam::Vec3;

@@ -1,5 +1,7 @@
 //! The measured stretch of one frame.
 
+// Requirement: F-04
+
 use crate::tree::TriangleRow;
 
 /// Regions that a surface is divided into for its measured stretch: equal runs of triangle rows, which

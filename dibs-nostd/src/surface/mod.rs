@@ -1,5 +1,7 @@
 //! The current surface: vertex tables, and the double buffer that frames arrive in.
 
+// Requirement: F-09
+
 mod atomic;
 mod buffer;
 mod error;

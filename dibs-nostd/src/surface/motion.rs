@@ -6,6 +6,8 @@
 //!
 //! One file, because reading, unit and odometer keep their fields private.
 
+// Requirement: T-04
+
 mod hold;
 
 use glam::Vec3;

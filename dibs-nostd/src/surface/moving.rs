@@ -4,6 +4,8 @@
 //! frame jumps. A tree needs no refitting, so a surface that moves at every tick costs only the sums below, at the
 //! vertices that a query reads.
 
+// Requirement: F-05
+
 use glam::Vec3;
 
 use super::buffer::PredictionCheck;

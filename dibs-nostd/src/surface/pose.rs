@@ -3,6 +3,8 @@
 //! Quaternions are kept as they came, of any length near one: every rotation divides by its square. So a check costs no
 //! rounding.
 
+// Requirement: F-08
+
 #[cfg(feature = "control")]
 mod step;
 

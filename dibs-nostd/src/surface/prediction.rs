@@ -5,6 +5,8 @@
 //! it is `c + t (c - b)`. The difference is `((1 + t) r - s) (b - a) + (1 + t) e`: the time that went by on the old
 //! prediction, and an error that grows with the new one.
 
+// Requirements: F-05, T-04
+
 use super::buffer::PredictionCheck;
 
 /// The prediction of the frames one earlier, as far as an extrapolated surface is along it.

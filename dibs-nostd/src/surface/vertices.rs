@@ -1,5 +1,7 @@
 //! Tables of the vertices' current positions, over which a query is generic.
 
+// Requirement: F-04
+
 use glam::Vec3;
 
 use super::MeasuredStretch;

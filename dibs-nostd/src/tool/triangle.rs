@@ -29,6 +29,8 @@
 //!   `(S a)^2 / 2 D`, the face's at most `D (c u / a)^2 / 2`, and the smaller of the two at most the
 //!   geometric mean, `c u S / 2`, for every `a`.
 
+// Requirement: A-01
+
 use super::capsule::Axis;
 use super::edge::{edge_to_point, edge_to_segment};
 use super::{AxisPair, clamp};

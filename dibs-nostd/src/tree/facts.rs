@@ -1,5 +1,7 @@
 //! The facts by which both ends of a bus see that they mean the same surface.
 
+// Requirement: M-06
+
 use core::fmt;
 
 use super::Unit;

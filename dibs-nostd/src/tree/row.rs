@@ -1,5 +1,7 @@
 //! Types for two kinds of numbers that are easily confused with each other, and with rows of a vertex table.
 
+// Requirement: A-12
+
 use core::fmt;
 
 /// A triangle, by its row in the tree's table, not its number in the mesh's file.

@@ -1,5 +1,7 @@
 //! Finds changed bytes of a tree while the controller runs: the checksum, a few bytes at a time.
 
+// Requirement: M-02
+
 use core::fmt;
 
 use crate::tree::format::field::CHECKSUM;

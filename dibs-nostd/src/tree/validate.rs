@@ -1,5 +1,7 @@
 //! The well-formedness checker: whether header and sections are a tree.
 
+// Requirement: M-01
+
 use core::marker::PhantomData;
 
 use crate::tree::format::{

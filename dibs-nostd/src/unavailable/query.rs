@@ -1,5 +1,7 @@
 //! Why a query gives no answer.
 
+// Requirement: A-07
+
 use core::fmt;
 
 /// Why a query gave no answer.

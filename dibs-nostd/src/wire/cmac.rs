@@ -1,5 +1,7 @@
 //! AES-128-CMAC, AUTOSAR's choice for secure onboard communication.
 
+// Requirement: B-03
+
 use core::fmt;
 
 use aes::Aes128;

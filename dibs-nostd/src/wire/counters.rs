@@ -1,5 +1,7 @@
 //! A receiver's counters, in the protocol's order.
 
+// Requirement: B-02
+
 use core::ffi::CStr;
 use core::fmt;
 

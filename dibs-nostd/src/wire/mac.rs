@@ -1,5 +1,7 @@
 //! Message authentication of packets.
 
+// Requirement: B-03
+
 /// Bytes of a tag: the first 48 bits of a message authentication code.
 ///
 /// With 48 bits a CAN-FD message holds six quantised positions or three `f32` ones, and a guess is

@@ -11,6 +11,8 @@
 //!
 //! Work is bounded by the packet's length, and only positions are copied.
 
+// Requirement: B-06
+
 mod body;
 pub mod canfd;
 mod checksum;

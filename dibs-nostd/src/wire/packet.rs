@@ -1,5 +1,7 @@
 //! One packet, decoded in place.
 
+// Requirement: B-07
+
 use glam::{Quat, Vec3};
 
 use super::checksum::{checksum, scrambled};

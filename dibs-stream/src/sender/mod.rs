@@ -2,6 +2,8 @@
 //!
 //! One file, because packets and statuses have one state.
 
+// Requirement: B-09
+
 mod clock;
 mod error;
 mod frame;

@@ -1,5 +1,7 @@
 //! Transports of packets: datagrams, or COBS frames on a byte stream.
 
+// Requirement: B-09
+
 mod line;
 mod target;
 

@@ -1,5 +1,7 @@
 //! What the sender sends, read back packet by packet; and what the injector makes of it.
 
+// Requirement: B-09
+
 use std::collections::HashMap;
 use std::mem::take;
 use std::sync::LazyLock;

@@ -1,5 +1,7 @@
 //! Packets over every transport, there and back.
 
+// Requirement: B-09
+
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, UdpSocket};
 use std::time::{Duration, Instant};

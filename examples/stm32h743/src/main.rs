@@ -3,6 +3,9 @@
 //! The control tick (`SysTick`, 1 kHz) runs above everything else, from memory without wait states. The idle loop takes
 //! packets from Ethernet, or from FDCAN with the feature `fdcan`, checks complete frames and the tree in flash a slice
 //! at a time, and sends statuses.
+
+// Requirement: P-10
+
 #![no_std]
 #![no_main]
 

@@ -1,5 +1,7 @@
 //! `cargo xtask bench` runs this.
 
+// Requirement: E-05
+
 use std::process::ExitCode;
 
 use clap::Parser;

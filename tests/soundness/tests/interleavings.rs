@@ -1,5 +1,8 @@
 //! Runs one writer and one reader in every order of their steps, by the model checker loom: no frame is torn, the
 //! last published frame is read, and neither end waits.
+
+// Requirement: F-01
+
 #![cfg(loom)]
 
 use dibs_nostd::glam::{Quat, Vec3};

@@ -1,6 +1,8 @@
 //! Attacks on bus and sender by somebody without the key, and accidents of the same effect. Each of them once
 //! succeeded.
 
+// Requirement: B-03
+
 use std::cell::Cell;
 use std::time::Duration;
 

@@ -1,5 +1,7 @@
 //! Packets with tags: without the right key nothing is published; replays and forgeries are counted.
 
+// Requirement: B-03
+
 use dibs_nostd::wire::{
     AesCmac, Answer, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet,
     TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_hello, encode_status,

@@ -1,5 +1,7 @@
 //! Checks `docs/black-channel.md`: the tests that it names exist, and the arithmetic that it shows is right.
 
+// Requirement: B-06
+
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! Rejections: each names its cause, is counted once and leaves no trace.
 
+// Requirement: B-02
+
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     Content, Counters, Encoding, Event, NoMac, PacketError, QuantisedBox, Status, StreamError,

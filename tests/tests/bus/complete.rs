@@ -1,5 +1,7 @@
 //! The bus: packets, COBS, and the assembler, which publishes only complete and right frames.
 
+// Requirement: B-01
+
 use std::cell::Cell;
 use std::rc::Rc;
 

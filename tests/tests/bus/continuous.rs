@@ -1,5 +1,7 @@
 //! The surface between the frames that a bus brings, and beyond the last.
 
+// Requirement: F-05
+
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;

@@ -1,5 +1,7 @@
 //! Types and traits of other crates: byte streams of `embedded-io`, points of `mint`, values through `serde`.
 
+// Requirements: B-09, P-11
+
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};

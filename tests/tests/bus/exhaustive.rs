@@ -1,5 +1,7 @@
 //! The receiver on surfaces so small that every case can be tried.
 
+// Requirement: B-01
+
 use std::collections::BTreeMap;
 
 use dibs_nostd::glam::Vec3;

@@ -1,5 +1,7 @@
 //! The guard: its velocities, its limits, and what it does before the first frame and after the last.
 
+// Requirements: C-01, C-07
+
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 use dibs_nostd::failsafe::{LimitError, Limits, State, Watch};

@@ -1,5 +1,7 @@
 //! A guard's contacts: those of a tracker on the same surface, in the guard's one budget.
 
+// Requirement: C-08
+
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::glam::{Quat, Vec3};

@@ -1,5 +1,7 @@
 //! The guard of a surface that a volume's nodes carry: the same loop, with frames of nodes.
 
+// Requirements: C-07, F-07
+
 use dibs_build::{Builder, Volume, generate};
 use dibs_nostd::filter::{Filter, Motion, Reason};
 use dibs_nostd::glam::Vec3;

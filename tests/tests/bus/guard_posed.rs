@@ -1,5 +1,7 @@
 //! Frames with a rigid pose each: answers on the moved mesh, climbed against exhaustive search in f64.
 
+// Requirement: F-08
+
 use dibs_nostd::glam::{DVec3, Quat, Vec3};
 use dibs_nostd::guard::{Bus, Guard, GuardLimits, Posed, Surface};
 use dibs_nostd::wire::NoMac;

@@ -1,5 +1,7 @@
 //! A controller's loop on frames with a rigid pose each; what is refused, and what is held.
 
+// Requirement: F-08
+
 use dibs_nostd::filter::{Filter, Motion, Reason};
 use dibs_nostd::glam::{DQuat, DVec3, Quat, Vec3};
 use dibs_nostd::guard::{GuardLimits, Posed, Surface};

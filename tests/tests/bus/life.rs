@@ -1,5 +1,7 @@
 //! Signs of life and statuses: held back, forged, from far ahead. The watch sees a death, and genuine packets heal.
 
+// Requirements: B-04, B-05
+
 use std::collections::VecDeque;
 use std::time::Duration;
 

@@ -1,5 +1,7 @@
 //! A line without loss between a sender and a receiver with a key, for attacks on both.
 
+// Requirement: B-04
+
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

@@ -1,5 +1,7 @@
 //! Frames of the same process: what packets give, from positions in the order of the mesh's file.
 
+// Requirement: B-08
+
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;

@@ -1,5 +1,7 @@
 //! The order of frames, heartbeats and statuses: sessions, epochs, and the wraps of their counters.
 
+// Requirement: B-01
+
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
     Body, Counters, EncodeError, Encoding, Event, FrameEncoder, FrameId, NoMac, Packet,

@@ -1,5 +1,7 @@
 //! Partial frames: only the moved rows, on top of the published frame.
 
+// Requirement: B-01
+
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{EncodeError, Encoding, Event, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{

@@ -1,5 +1,7 @@
 //! The bus against random packets, orders, losses and damage.
 
+// Requirement: B-01
+
 use std::collections::BTreeSet;
 
 use dibs_nostd::glam::{DVec3, Vec3};

@@ -1,5 +1,7 @@
 //! The motion of published frames, by which a tracker's bounds run out.
 
+// Requirement: T-04
+
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;

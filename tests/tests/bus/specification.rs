@@ -1,5 +1,7 @@
 //! `docs/wire.md` against the code: the encoders write its test vectors, and the decoder reads them.
 
+// Requirement: B-07
+
 use dibs_nostd::format::Unit;
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{

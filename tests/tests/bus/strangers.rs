@@ -1,5 +1,7 @@
 //! Strangers without the key change neither the count of rejections nor the state, and their guesses have a rate.
 
+// Requirement: B-04
+
 use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, Watch};
 use dibs_nostd::wire::{
     AesCmac, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, encode_heartbeat,

@@ -1,6 +1,8 @@
 //! The times of captures: the speed limit is kept whatever ages frames state, and an age that a packet cannot state is
 //! no age at all.
 
+// Requirement: B-05
+
 use std::sync::OnceLock;
 
 use dibs_build::{Builder, BuiltTree, generate};

@@ -1,5 +1,7 @@
 //! Weights on a bus: they are received, bounded or measured, refused and counted.
 
+// Requirement: F-06
+
 use dibs_build::Builder;
 use dibs_build::modes::ModalFit;
 use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};

@@ -1,5 +1,7 @@
 //! The surface between frames of weights, and beyond the last.
 
+// Requirements: F-05, F-06
+
 use dibs_build::Builder;
 use dibs_build::glam::DVec3;
 use dibs_build::modes::ModalFit;

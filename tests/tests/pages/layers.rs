@@ -3,6 +3,8 @@
 //! `docs/evidence/dependencies.md` lists them, and `DIBS_WRITE=1` writes that list anew. `DIBS_CHECKOUT=FOLDER cargo test -p
 //! dibs-tests --test pages layers -- --nocapture` prints the list of another checkout.
 
+// Requirement: E-04
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::{env, fs};

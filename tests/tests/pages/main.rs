@@ -1,7 +1,9 @@
-//! The documents are true: figures, public items, packages, dependencies, the guide.
+//! The documents are true: figures, public items, packages, dependencies, the guide, the evidence for a device's file.
 
 mod layers;
 mod new_user;
 mod packages;
+mod page;
 mod public_api;
 mod readme;
+mod requirements;

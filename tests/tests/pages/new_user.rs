@@ -3,6 +3,8 @@
 //! `cargo test --release -p dibs-tests --test pages new_user -- --ignored --nocapture` shows each command and its
 //! output.
 
+// Requirement: P-11
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};

@@ -1,5 +1,7 @@
 //! The sources of the published crates refer to no page that is not in their package.
 
+// Requirement: E-04
+
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 

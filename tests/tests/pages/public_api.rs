@@ -2,6 +2,8 @@
 //!
 //! An item has a path: a type, trait, function, constant or macro. Methods and fields are not listed.
 
+// Requirement: E-04
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::{env, fs};

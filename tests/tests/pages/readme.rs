@@ -1,8 +1,12 @@
 //! The README's figures come from the records. `DIBS_WRITE=1` writes them anew.
 
+// Requirements: E-02, P-11
+
 use std::{env, fs};
 
 use serde_json::Value;
+
+use crate::page::records;
 
 const README: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md");
 const BEGIN: &str =
@@ -80,13 +84,6 @@ refitted trees win, and [docs/evidence/guarantees.md](docs/evidence/guarantees.m
         figure("m7.warm.queries"),
     );
     block
-}
-
-/// The rows of a record under `docs/evidence`.
-fn records(name: &str) -> Vec<Value> {
-    let path = format!("{}/../docs/evidence/{name}", env!("CARGO_MANIFEST_DIR"));
-    let text = fs::read_to_string(path).expect("a record");
-    serde_json::from_str(&text).expect("rows")
 }
 
 /// One decimal below 10, none from there on.

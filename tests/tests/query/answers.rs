@@ -3,6 +3,8 @@
 //! `answers.txt` has a line a kind: a hash of all answers, and the sums of node and triangle tests. A change of the
 //! answers on purpose is recorded with `DIBS_WRITE=1`, and its commit says why.
 
+// Requirements
+
 use std::fmt::Write;
 
 use dibs_build::{Builder, BuiltTree, generate};

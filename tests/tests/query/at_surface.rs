@@ -1,6 +1,8 @@
 //! An axis at the surface, where the side is below the accuracy: no contact is less deep than it may be, and a part keeps
 //! its margin.
 
+// Requirement: S-04
+
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper};
 use dibs_nostd::format::MAX_STACK;

@@ -2,6 +2,8 @@
 //!
 //! One file, because all tests compare with the same queries one by one.
 
+// Requirement: A-09
+
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

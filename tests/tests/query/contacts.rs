@@ -2,6 +2,8 @@
 //!
 //! One file, because all tests compare with the same list.
 
+// Requirement: S-04
+
 use std::collections::{HashMap, HashSet};
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};

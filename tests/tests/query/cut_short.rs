@@ -1,5 +1,7 @@
 //! Depths whose search a limit ends: by the budget, or by the most work that a depth may take.
 
+// Requirements: A-03, S-03
+
 use dibs_build::{Builder, Mesh};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Odometer, Options, Proximity, Query, Side, Tracker};

@@ -1,6 +1,8 @@
 //! Whole queries against exhaustive search in f64: every construction, both index widths, spheres and capsules,
 //! deformations up to the limit. No separation may be off by more than the stated accuracy.
 
+// Requirement: A-01
+
 use dibs_build::{Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Index, Options, Proximity, Query, Tree, TriangleRow, measure_stretch};

@@ -1,5 +1,7 @@
 //! A list with few places says truly how far it is complete: against the same list with room for every triangle near it.
 
+// Requirement: S-05
+
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Contact, Contacts, Options, Query, Side, Sphere, Tool, TriangleRow};

@@ -1,6 +1,8 @@
 //! A filter of commands: no tick of adversarial walks comes nearer than the stand-off without saying so, and none brakes along
 //! a wall.
 
+// Requirements: C-05, C-06
+
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::format::MAX_STACK;

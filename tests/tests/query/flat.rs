@@ -1,5 +1,7 @@
 //! Meshes with some nearly flat triangles: answers stay right, and rounding on the bus does not count as stretch.
 
+// Requirement: A-01
+
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::{MAX_STACK, PathKind};
 use dibs_nostd::wire::QuantisedBox;

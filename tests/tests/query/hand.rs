@@ -1,6 +1,8 @@
 //! A hand pushes an instrument into surfaces: the force of all contacts holds it everywhere, the force of the closest
 //! pair does not.
 
+// Requirement: C-03
+
 use dibs_tests::hand::scenes;
 
 #[test]

@@ -1,5 +1,7 @@
 //! Frames that are held: whether the odometer measures their motion or starts anew, the answers are the same.
 
+// Requirement: T-01
+
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

@@ -4,6 +4,8 @@
 //! accuracy. From tick to tick, with a warm start, the lower end may fall although nothing has moved, because tests are
 //! spent elsewhere.
 
+// Requirements
+
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Options, Proximity, Query, measure_stretch};

@@ -3,6 +3,8 @@
 //!
 //! One file, because all tests draw from the same cases.
 
+// Requirement: A-01
+
 use dibs_nostd::{ACCURACY, AxisPair, Capsule, Sphere, Tool, ToolError};
 use dibs_tests::oracle::{Instrument, closest_pair, exhaustive};
 use dibs_tests::sample;

@@ -1,5 +1,7 @@
 //! The baseline of the paper's search agrees with exhaustive search, by fewer polygon tests.
 
+// Requirement: E-05
+
 use dibs_build::{Builder, Construction, IndexWidth, Mesh, generate};
 use dibs_nostd::format::PathKind;
 use dibs_nostd::{Capsule, Sphere};

@@ -1,5 +1,7 @@
 //! A position that is not finite: a query names its vertex, or its answer is finite.
 
+// Requirement: A-07
+
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Options, Proximity, Query, QueryError, Sphere};

@@ -1,6 +1,8 @@
 //! The proxy's force against a search of all active sets in f64. It is the same force, it points outward, it is
 //! continuous, and no wall counts twice.
 
+// Requirement: C-03
+
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::constraint::{Proxy, SpringDamper};
 use dibs_nostd::format::MAX_STACK;

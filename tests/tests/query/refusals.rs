@@ -1,5 +1,7 @@
 //! Refusals of a query, and the answer within a budget without triangle tests.
 
+// Requirement: A-07
+
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Options, Query, QueryError, Sphere, VertexTable, measure_stretch};

@@ -1,5 +1,7 @@
 //! Surfaces that share no vertex in one tree: its answers are those of exhaustive search, however they move apart.
 
+// Requirement: A-08
+
 use dibs_build::{BuildError, Builder, BuiltTree, Mesh, check_winding, generate, orient};
 use dibs_nostd::format::{MAX_ROOTS, MAX_STACK, PathKind, field};
 use dibs_nostd::{

@@ -1,5 +1,7 @@
 //! Velocity rows of tools that are inside or cross, against finite differences of the deepest distance in f64.
 
+// Requirement: S-06
+
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::constraint::VelocityRow;
 use dibs_nostd::format::MAX_STACK;

@@ -1,6 +1,8 @@
 //! The budgets in the README's and the guide's examples are enough. A query that its budget cuts short has no side, and
 //! the wall does not push.
 
+// Requirement: A-05
+
 use std::fs;
 
 use dibs_build::{Builder, generate};

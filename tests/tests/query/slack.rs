@@ -1,6 +1,8 @@
 //! The slacks of a query, each on surfaces and poses that need it: radii that are used nearly in full, coordinates far
 //! from the origin, axes along long triangles.
 
+// Requirement: A-01
+
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

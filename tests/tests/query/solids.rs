@@ -2,6 +2,8 @@
 //! property: it changes by no more than tool and surface move, whatever solids overlap, touch or hold each other. And
 //! one geometry has one answer, as one tree or as a scene.
 
+// Requirement: S-02
+
 use std::sync::LazyLock;
 
 use dibs_build::{Builder, BuiltTree, Mesh};

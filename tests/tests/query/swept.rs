@@ -1,5 +1,7 @@
 //! Sweeps against dense sampling in f64: no contact may be jumped over.
 
+// Requirement: A-10
+
 use std::env;
 
 use dibs_build::{Builder, Mesh};

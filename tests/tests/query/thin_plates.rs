@@ -1,6 +1,8 @@
 //! Plates thinner than the rounding of their coordinates. A certain side is wrong only where a plate cuts itself, by exact
 //! predicates.
 
+// Requirement: S-01
+
 use dibs_build::{Builder, Mesh};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Odometer, Options, Proximity, Query, Side, Sphere, Tracker};

@@ -4,6 +4,8 @@
 //!
 //! One file, because all tests compare with the same oracle.
 
+// Requirement: S-01
+
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, WindingError, check_winding, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

@@ -1,5 +1,7 @@
 //! Ticks whose budget ends: what the last tick left certain, less the motion since, is still an answer.
 
+// Requirement: T-02
+
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

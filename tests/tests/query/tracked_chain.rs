@@ -1,5 +1,7 @@
 //! Several trackers against whole queries: the same answers, most pairs not looked at.
 
+// Requirement: T-01
+
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

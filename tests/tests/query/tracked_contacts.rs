@@ -1,5 +1,7 @@
 //! A tracker's contacts against those of whole queries.
 
+// Requirement: T-01
+
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

@@ -1,5 +1,7 @@
 //! The depth of a crossing axis through a tracker, which keeps its proof from tick to tick, against whole queries.
 
+// Requirements: S-03, T-01
+
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Odometer, Options, Proximity, Query, Side, Tracker};

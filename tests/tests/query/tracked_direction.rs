@@ -1,5 +1,7 @@
 //! Poses that jitter where triangles tie: a tracker's direction does not turn to and fro with their last digits.
 
+// Requirement: T-03
+
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

@@ -1,5 +1,7 @@
 //! The tracker against whole queries: the same separation at every tick, for any motion of tool and surface.
 
+// Requirement: T-01
+
 use std::env;
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};

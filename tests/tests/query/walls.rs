@@ -3,6 +3,8 @@
 //!
 //! One file, because all tests compare with the same oracle.
 
+// Requirement: S-04
+
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Proxy, SpringDamper};
 use dibs_nostd::format::MAX_STACK;

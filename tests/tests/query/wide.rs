@@ -1,5 +1,7 @@
 //! The wide search: its counts, its stacks and its budgets. `differential.rs` tests the accuracy of both searches.
 
+// Requirement: A-01
+
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Options, Query, Sphere, measure_stretch};

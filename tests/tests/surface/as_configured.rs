@@ -1,6 +1,8 @@
 //! Limits hold as they are configured: of size where triangles have their own limits of stretch, of exactly 1, and those
 //! learned from a motion.
 
+// Requirements: F-02, F-03
+
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::modes::Modes;

@@ -2,6 +2,8 @@
 //!
 //! One file, because all tests need the same trees.
 
+// Requirement: F-07
+
 use dibs_build::{Builder, BuiltTree, Mesh, Volume, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::{NodeMonitor, Nodes};

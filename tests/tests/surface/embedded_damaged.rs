@@ -1,5 +1,7 @@
 //! Volumes that cannot carry a surface, and damaged nodes: typed errors.
 
+// Requirement: F-07
+
 use dibs_build::{BuildError, Builder, BuiltTree, Mesh, Volume, VolumeError, generate};
 use dibs_nostd::nodes::{Nodes, NodesError};
 use dibs_nostd::{FormatError, PathKind, StretchError, Tree, measure_stretch};

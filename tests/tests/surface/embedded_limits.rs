@@ -1,5 +1,7 @@
 //! Limits of stretch for each tetrahedron, learned from a motion of the nodes.
 
+// Requirement: F-07
+
 use dibs_build::{Builder, BuiltTree, Mesh, Motion, MotionStretch, Volume, generate};
 use dibs_nostd::nodes::Nodes;
 use dibs_tests::embedded::{NodeMotion, climb, hull, sections, shrunk, stretch_of};

@@ -1,5 +1,7 @@
 //! Vertices outside of the volume that moves them, bound to the nearest tetrahedron.
 
+// Requirement: F-07
+
 use dibs_build::{BuildError, Builder, BuiltTree, Mesh, Volume, VolumeError, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::{NodeMonitor, Nodes, NodesError};

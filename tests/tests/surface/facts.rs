@@ -1,5 +1,7 @@
 //! A surface carries its stretch and its error, and a query its last answer: the caller states none of them.
 
+// Requirement: F-04
+
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{

@@ -1,5 +1,7 @@
 //! The double buffer: one writer, one reader, complete frames, no torn read.
 
+// Requirement: F-01
+
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use dibs_nostd::glam::Vec3;

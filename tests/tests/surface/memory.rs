@@ -1,6 +1,8 @@
 //! A surface's share of a controller's memory: two or three buffers of positions, and some bytes for both of their ends,
 //! the assembler, and the stretch of every region.
 
+// Requirement: F-09
+
 use dibs_nostd::guard::{Bus, Guard, Surface};
 use dibs_nostd::{Assembler, FrameReader, Frames, StretchMonitor, Tracker};
 

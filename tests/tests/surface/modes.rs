@@ -2,6 +2,8 @@
 //!
 //! One file, because all tests need the same fit.
 
+// Requirement: F-06
+
 use std::cell::RefCell;
 use std::collections::HashSet;
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! The bound of a modal surface's stretch, from its weights alone.
 
+// Requirement: F-06
+
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, Mesh, Paths};
 use dibs_nostd::modes::Modes;

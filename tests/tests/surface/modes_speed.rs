@@ -1,5 +1,7 @@
 //! The limit on speed holds for modal surfaces as for surfaces of vertices, whether a frame is measured or not.
 
+// Requirement: F-06
+
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree};
 use dibs_nostd::modes::{ModalGate, ModalReader, Modes};

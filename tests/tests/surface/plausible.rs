@@ -1,6 +1,8 @@
 //! Implausible surfaces are not published, and counted by their cause: collapsed, in another unit, mirrored, turned or
 //! jumped. Plausible ones pass.
 
+// Requirement: F-03
+
 use std::path::Path;
 
 use dibs_build::{Builder, BuiltTree, Motion, generate};

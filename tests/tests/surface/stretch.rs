@@ -1,5 +1,7 @@
 //! The measured stretch against f64, and as a gate.
 
+// Requirement: F-02
+
 use dibs_build::{Builder, Mesh, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::{Join, MAX_STACK};
 use dibs_nostd::glam::Vec3;

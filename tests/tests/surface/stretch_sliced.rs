@@ -1,5 +1,7 @@
 //! The stretch check in slices has the result of a measurement of the whole frame.
 
+// Requirement: F-02
+
 use dibs_nostd::{
     Admission, FrameExtent, Gate, IncomingSurface, MeasuredStretch, REGIONS, StretchError,
     StretchMonitor, SurfaceLimits, Tree, VertexTable, measure_stretch,

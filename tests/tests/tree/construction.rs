@@ -1,5 +1,7 @@
 //! The builder: coverage against independently computed distances, determinism, cost, refusals.
 
+// Requirements: A-02, M-04
+
 use std::collections::HashMap;
 
 use dibs_build::{BuildError, Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};

@@ -6,6 +6,8 @@
 //! are in f64 with the stored numbers, with a tolerance of 1e-9. `COVERAGE=20 cargo test ...` tries twenty times as
 //! many trees.
 
+// Requirement: A-02
+
 use dibs_build::{Builder, BuiltTree, Construction, Mesh, Paths};
 use dibs_nostd::format::Link;
 use dibs_nostd::{Tree, TriangleRow, measure_stretch};

@@ -1,5 +1,7 @@
 //! Meshes far from the origin, where f32 coordinates are coarse.
 
+// Requirements: A-01, M-05
+
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{
     Builder, Import, Mesh, Motion, MotionMismatchError, ReadErrorKind, ReadOptions, Unit,

@@ -2,6 +2,8 @@
 //!
 //! One file, because all tests damage the same trees.
 
+// Requirements: A-12, M-01
+
 use dibs_build::{BuildError, Builder, BuiltTree, IndexWidth, Mesh, ReadOptions, Unit, generate};
 use dibs_nostd::format::{CRC, Link, MAX_STACK};
 use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree, TriangleRow};

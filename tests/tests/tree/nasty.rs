@@ -2,6 +2,8 @@
 //!
 //! The files are not part of the project; without them these tests are ignored.
 
+// Requirement: M-03
+
 use dibs_build::{Import, ReadErrorKind, ReadOptions};
 use dibs_nostd::format::MAX_ROOTS;
 use std::collections::BTreeMap;

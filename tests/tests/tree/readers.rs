@@ -1,6 +1,8 @@
 //! Readers and checks on mesh files written here: every format gives the same surface, and indexed files keep the
 //! numbers of their vertices.
 
+// Requirement: M-03
+
 use std::path::Path;
 
 use dibs_build::{Format, Import, Motion, MotionMismatchError, ReadErrorKind, ReadOptions};

@@ -1,5 +1,7 @@
 //! Damaged mesh files are refused with a message, or give a sound mesh; no reader panics.
 
+// Requirement: M-03
+
 use std::fmt::Write;
 
 use dibs_build::{Import, ReadErrorKind, ReadOptions};

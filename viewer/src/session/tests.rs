@@ -1,5 +1,7 @@
 //! The spheres to draw, against their definition.
 
+// Requirement: P-09
+
 use std::collections::HashSet;
 
 use dibs_build::{Builder, generate};

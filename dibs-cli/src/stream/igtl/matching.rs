@@ -4,6 +4,8 @@
 //! has a colour of its own, any two numberings of the mesh pair vertices of one colour: there is one at most. The pairs are
 //! compared triangle by triangle, so a colour that two surroundings share by chance gives no wrong pair.
 
+// Requirement: B-10
+
 /// Rounds in which colours must have told all vertices apart: organs take fewer than ten, a regular grid as many as it is
 /// long.
 const ROUNDS: usize = 64;

@@ -1,5 +1,7 @@
 //! No message puts a vertex where another one is. `DIBS_FRAMES` gives the number of messages.
 
+// Requirement: B-10
+
 use super::content::Kind;
 use super::matching::{Matched, matched};
 use super::message::{HEADER, Header, pack};

@@ -1,6 +1,8 @@
 //! `dibs bridge --from igtl:…`: what OpenIGTLink messages hold reaches a receiver, or is refused by its cause. The messages
 //! are written here, from the protocol's specification.
 
+// Requirement: B-10
+
 use std::fs;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};

@@ -1,5 +1,7 @@
 //! `dibs bridge` beside other programs' messages, on request: of `pyigtl`, and of the C++ library OpenIGTLink.
 
+// Requirement: B-10
+
 use std::io::Write;
 use std::net::TcpListener;
 use std::path::Path;

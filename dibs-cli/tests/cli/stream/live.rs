@@ -1,5 +1,7 @@
 //! `dibs stream --from -`: frames from standard input reach a receiver, or are refused by their number.
 
+// Requirements: B-09, B-10
+
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::net::{TcpListener, UdpSocket};

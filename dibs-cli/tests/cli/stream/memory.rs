@@ -1,5 +1,7 @@
 //! `dibs stream --from shm:NAME`: whole frames of shared memory reach a receiver.
 
+// Requirements: B-09, B-10
+
 use std::fs::{self, File};
 use std::net::TcpListener;
 use std::os::unix::fs::FileExt;

@@ -3,6 +3,8 @@
 //!
 //! One file, because all tests receive by the same helpers.
 
+// Requirements: B-09, P-08
+
 mod igtl;
 mod igtl_messages;
 mod igtl_peers;

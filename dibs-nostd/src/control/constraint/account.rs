@@ -1,5 +1,7 @@
 //! An account of the energy that a wall gives, and a limit on the force's steps.
 
+// Requirement: C-04
+
 use glam::Vec3;
 
 use super::{GainError, positive};

@@ -1,5 +1,7 @@
 //! Keeps the tool out of a margin around the surface.
 
+// Requirement: C-02
+
 use glam::Vec3;
 
 use super::{Approach, ConstraintForce, GainError, SpringDamper, positive};

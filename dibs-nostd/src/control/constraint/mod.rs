@@ -38,6 +38,8 @@
 //! - A moving surface moves the wall: it does work on the tool, as a beating heart would.
 //! - Saturation: a hand that pushes harder than `max_force` gets through.
 
+// Requirement: C-02
+
 /// `?` in a `const fn`.
 macro_rules! tri {
     ($result:expr) => {

@@ -1,5 +1,7 @@
 //! Keeps the tool out by all its contacts: the force and the torque from a proxy that is held outside.
 
+// Requirement: C-03
+
 use glam::Vec3;
 
 use super::walls::{MOST, Wall, displacement};

@@ -1,5 +1,7 @@
 //! Contacts as inequalities on the tool's velocity.
 
+// Requirement: S-06
+
 use glam::Vec3;
 
 use crate::math::round::sum_down;

@@ -1,5 +1,7 @@
 //! The forces: their laws, their bounds, and their output for invalid input.
 
+// Requirement: C-02
+
 extern crate std;
 
 use proptest::prelude::*;

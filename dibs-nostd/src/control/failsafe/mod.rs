@@ -43,6 +43,8 @@
 //! of surface, packets and heartbeats follow one rule, that of [`FrameAge`]: a stamp up to 16 ms ahead of the clock is
 //! new, one farther ahead is old, and what was found old stays old when the clock comes around.
 
+// Requirement: C-01
+
 mod freshness;
 mod limits;
 mod link;

@@ -2,6 +2,8 @@
 //!
 //! One file, because table, second machine and comparison need each other.
 
+// Requirement: C-01
+
 extern crate std;
 
 use std::vec::Vec;

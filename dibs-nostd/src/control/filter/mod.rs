@@ -60,6 +60,8 @@
 //!
 //! *Nearest* is by the sum of the squares of the translation and of the rotation times a [lever](Filter::lever).
 
+// Requirements: C-05, C-06
+
 mod answer;
 mod motion;
 mod nearest;

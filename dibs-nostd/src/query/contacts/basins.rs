@@ -14,6 +14,8 @@
 //!
 //! One file, because floods and triangles keep their fields private.
 
+// Requirement: S-04
+
 use glam::Vec3;
 
 use super::activation::{self, Looking};

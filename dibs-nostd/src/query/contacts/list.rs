@@ -1,5 +1,7 @@
 //! The contacts found so far, deepest first, and a bound on the others.
 
+// Requirement: S-05
+
 use heapless::Vec;
 
 use super::Contact;

@@ -1,5 +1,7 @@
 //! All locally closest pairs of a tool and a surface within a margin.
 
+// Requirement: S-04
+
 mod across;
 mod activation;
 mod add;

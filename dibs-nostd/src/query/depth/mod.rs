@@ -16,6 +16,8 @@
 //!
 //! One file, because the search and its steps share one state.
 
+// Requirement: S-03
+
 mod look;
 mod part;
 mod start;

@@ -11,6 +11,8 @@
 //!
 //! One clock counts the motion for all.
 
+// Requirement: T-01
+
 mod axis;
 pub mod clock;
 pub mod depth;

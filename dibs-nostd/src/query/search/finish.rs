@@ -1,5 +1,7 @@
 //! The answer of a search.
 
+// Requirement: A-03
+
 use glam::Vec3;
 
 use super::slack::{ACCURACY, FLOOR};

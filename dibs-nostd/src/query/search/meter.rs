@@ -1,5 +1,7 @@
 //! A search's budget, and what is left of it.
 
+// Requirement: A-05
+
 use crate::Budget;
 use crate::query::made::Tests;
 

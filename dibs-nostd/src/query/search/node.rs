@@ -1,5 +1,7 @@
 //! The stack of waiting subtrees, and the tests of a node's children.
 
+// Requirement: A-04
+
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::tree::format::Link;

@@ -3,6 +3,8 @@
 //! No sphere around several such surfaces can be invariant, because nothing bounds how far they move apart. So every
 //! search begins with the spheres of all.
 
+// Requirement: A-08
+
 use super::{NearestPin, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::tool::Tool;

@@ -4,6 +4,8 @@
 //! sphere, plus twice the axis and the tool's radius. The errors below are proven, not measured: hill climbing finds
 //! errors of at most 4 `u S`, so no test could detect a slack that is too small. The sums are asserted instead.
 
+// Requirement: A-01
+
 use crate::tool::ACCURACY as KERNEL;
 
 /// Half a unit in the last place of 1.

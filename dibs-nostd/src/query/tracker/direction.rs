@@ -4,6 +4,8 @@
 //! turn to and fro. So an answer keeps the triangle that led the last one while that may be the closest, as far as the rounding
 //! of the two distances tells: not the error of the positions, within which a nearer wall is the nearer one.
 
+// Requirement: T-03
+
 use glam::Vec3;
 
 use super::Tracker;

@@ -7,6 +7,8 @@
 //! The side of an open surface is that of its closest sheet, which can change without contact: there the past stands in
 //! only where a search finds no side.
 
+// Requirement: T-02
+
 use glam::Vec3;
 
 use super::Tracker;

@@ -1,5 +1,7 @@
 //! The closest pair from tick to tick: a tick costs in proportion to the change.
 
+// Requirement: T-01
+
 mod contacts;
 mod direction;
 mod kept;

@@ -1,5 +1,7 @@
 //! Several trackers: the closest of all pairs. A pair that is certain to be farther is not looked at.
 
+// Requirement: T-01
+
 use super::{Last, Purpose, Tracker, TrackerAnswer};
 use crate::query::made::Tests;
 use crate::query::{Budget, NoSide, Options, Side};

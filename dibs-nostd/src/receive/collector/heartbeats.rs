@@ -1,5 +1,7 @@
 //! Heartbeats: which are taken, and when the sender is known to have lived.
 
+// Requirement: B-05
+
 use super::Collector;
 use crate::ReceiveError;
 use crate::surface::{Millis, elapsed};

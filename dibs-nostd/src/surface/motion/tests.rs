@@ -1,5 +1,7 @@
 //! The odometer goes on from the frame measured last, and from no other.
 
+// Requirement: T-04
+
 extern crate std;
 
 use std::prelude::rust_2024::*;

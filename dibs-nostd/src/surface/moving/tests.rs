@@ -1,5 +1,7 @@
 //! The error that a surface between its frames, or beyond them, carries into answers.
 
+// Requirement: F-05
+
 extern crate std;
 
 use std::prelude::rust_2024::*;

@@ -1,5 +1,7 @@
 //! Poses against f64: bounds on motion and rounding, searched for what breaks them.
 
+// Requirement: F-08
+
 extern crate std;
 
 use std::prelude::rust_2024::*;

@@ -1,5 +1,7 @@
 //! The motion of an extrapolated surface as its odometer states it, which only the crate can read.
 
+// Requirement: T-04
+
 extern crate std;
 
 use std::prelude::rust_2024::*;

@@ -1,5 +1,7 @@
 //! Packets as bytes, for senders.
 
+// Requirement: B-07
+
 mod frame;
 mod weights;
 

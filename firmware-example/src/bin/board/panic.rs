@@ -1,5 +1,7 @@
 //! The panic and fault handlers, which never run in a sound program.
 
+// Requirement: P-01
+
 use cortex_m_rt::exception;
 
 /// Links only if the optimiser has removed every call: a surviving panic path is a link error that names this symbol.

@@ -1,5 +1,7 @@
 //! The interrupts, and the watch over the first one's deadline.
 
+// Requirement: P-03
+
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use controller::telemetry::Summary;

@@ -1,5 +1,7 @@
 //! The stack's high-water mark: `cortex-m-rt` paints the stack at reset, and use overwrites the paint.
 
+// Requirement: P-02
+
 use core::ptr::addr_of;
 
 use cortex_m_rt::STACK_PAINT_VALUE;

@@ -1,5 +1,7 @@
 //! The benchmark itself: it runs, its methods agree, and its documents are those of its records.
 
+// Requirement: E-05
+
 use std::path::Path;
 
 use dibs_bench::imaging::controller::{Controller, Tick, Times};

@@ -1,5 +1,7 @@
 //! Kernels beside those of another library.
 
+// Requirement: A-01
+
 use dibs_nostd::{Sphere, Tool};
 use fastrand::Rng;
 use glam::Vec3;

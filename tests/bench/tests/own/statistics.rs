@@ -1,5 +1,7 @@
 //! The benchmark's statistics, against textbooks.
 
+// Requirement: E-05
+
 use dibs_bench::statistics::{Paired, Summary, crossover, holm, repeatable_worst};
 
 #[test]

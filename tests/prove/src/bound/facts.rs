@@ -6,6 +6,8 @@
 //! branch on what is not stays. A place that is there no more is an error; that a fact is true of the program as it was compiled is
 //! checked by traces, where one executes what the fact limits: the page names the others.
 
+// Requirement: A-06
+
 use super::lines::Within::{self, Function, Line};
 
 /// A number of executions.

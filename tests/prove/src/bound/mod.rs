@@ -5,6 +5,8 @@
 //! ([`prices`]), and an exact search of the longest walk checks that the prices give a bound ([`walk`]). [`queries`]
 //! are those that have a bound; [`trace`] and [`follow`] compare graph and facts with what an emulated processor executes.
 
+// Requirement: A-06
+
 pub mod analysis;
 pub mod decode;
 pub mod facts;

@@ -1,6 +1,8 @@
 //! A query cut short by its budget: the interval holds the true separation and shrinks as the budget grows, and the
 //! force is that of its conservative end.
 
+// Requirements, C-02
+
 use std::ops::AddAssign;
 
 use anyhow::Result;

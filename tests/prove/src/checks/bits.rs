@@ -1,5 +1,7 @@
 //! The same bits from every compiler option and processor.
 
+// Requirement: A-11
+
 use anyhow::Result;
 use xtask::steps::Outcome;
 

@@ -1,5 +1,7 @@
 //! The fault matrix on the emulated board, every byte through its UART.
 
+// Requirement: B-01
+
 use anyhow::Result;
 use xtask::steps::Outcome;
 

@@ -2,6 +2,8 @@
 //!
 //! One file, because what is measured and its limits belong together.
 
+// Requirements: P-01, P-02, P-10
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;

@@ -1,5 +1,7 @@
 //! The path bound: proven constants of plain queries, against counted and traced ones.
 
+// Requirement: A-06
+
 use anyhow::Result;
 use xtask::steps::Outcome;
 

@@ -1,6 +1,8 @@
 //! A tracker's ticks within a budget: an instrument that hovers over a beating heart, touches it, goes through its wall,
 //! lies along it and moves fast. What each tick knows is compared with whole queries.
 
+// Requirement: T-02
+
 use anyhow::Result;
 use dibs_build::{Builder, BuiltTree, Motion, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};

@@ -1,5 +1,7 @@
 //! Bits that flip in a validated tree while it is in use: no panic, no hang, and the scrub finds all.
 
+// Requirements: M-01, M-02
+
 use std::ops::AddAssign;
 
 use anyhow::Result;

@@ -1,6 +1,8 @@
 //! The cost model: constants fitted above the instructions of adversarial queries, with a margin, and checked on
 //! surfaces and poses that the fit has not seen. A fitted bound, not a proof.
 
+// Requirement: A-05
+
 use std::fs;
 use std::process::Command;
 use std::thread;

@@ -1,5 +1,7 @@
 //! The demo on the emulated board: deadlines, answers, and every published frame read back.
 
+// Requirements: A-01, B-01, P-03
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,7 @@
 //! The demo with the controller in C, on the emulated board.
 
+// Requirement: P-06
+
 use anyhow::Result;
 use xtask::c_firmware;
 use xtask::steps::Outcome;

@@ -1,5 +1,7 @@
 //! The demo with faults on the bus, which also falls silent for a while.
 
+// Requirements: B-01, C-01, P-03
+
 use anyhow::{Context, Result};
 use serde_json::Value;
 use xtask::steps::Outcome;

@@ -1,5 +1,7 @@
 //! The demo with a simulated hand, which pushes the instrument against the beating heart and does not get in.
 
+// Requirements: C-03, C-04, C-05, P-03
+
 use anyhow::Result;
 use xtask::steps::Outcome;
 

@@ -1,5 +1,7 @@
 //! The demo on a heart of 50,000 triangles that a lattice's nodes carry.
 
+// Requirements: F-07, P-03
+
 use anyhow::Result;
 use xtask::steps::Outcome;
 

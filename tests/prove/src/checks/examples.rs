@@ -1,5 +1,7 @@
 //! The smallest loops, in RTIC and in Embassy, on the emulated board.
 
+// Requirements: P-05, P-11
+
 use std::net::Shutdown;
 use std::os::unix::net::UnixListener;
 use std::process::{Child, Stdio};

@@ -1,5 +1,7 @@
 //! A filter of commands against adversarial walks, and beside other ways to hold an instrument.
 
+// Requirements: C-05, C-06
+
 use anyhow::Result;
 use dibs_build::generate;
 use dibs_tests::filter::{Episode, Glided, Tally, glide, scenes, walk};

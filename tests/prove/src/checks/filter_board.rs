@@ -1,5 +1,7 @@
 //! A filter of commands on the emulated board: the walks of the computer, with the same bits, and their instructions.
 
+// Requirement: C-05
+
 use anyhow::Result;
 use dibs_build::{Builder, generate};
 use dibs_tests::filter::{Episode, Tally, glide_told, scenes, walk_told};

@@ -1,5 +1,7 @@
 //! The emulated board on a flooded network.
 
+// Requirement: P-03
+
 use anyhow::{Context, Result, ensure};
 use xtask::steps::Outcome;
 

@@ -1,5 +1,7 @@
 //! The fuzz targets, if there is a nightly compiler.
 
+// Requirements: M-03, P-04
+
 use anyhow::{Result, ensure};
 use xtask::nightly::{self, FuzzOptions, Fuzzed};
 use xtask::steps::Outcome;

@@ -1,5 +1,7 @@
 //! A simulated hand that pushes against the constraint: all contacts hold it, the closest pair alone not always.
 
+// Requirements: C-03, C-04
+
 use anyhow::Result;
 use controller::Hand;
 use dibs_tests::hand::{Pushed, scenes};

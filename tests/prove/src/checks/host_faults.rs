@@ -1,5 +1,7 @@
 //! The fault matrix on this computer.
 
+// Requirement: B-01
+
 use anyhow::{Context, Result};
 use xtask::steps::Outcome;
 use xtask::workspace;

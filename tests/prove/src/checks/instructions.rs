@@ -1,5 +1,7 @@
 //! Instructions of the hot functions on this computer, by callgrind.
 
+// Requirement: E-01
+
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};

@@ -1,5 +1,7 @@
 //! Every order of a writer's and a reader's steps, by loom.
 
+// Requirement: F-01
+
 use anyhow::Result;
 use xtask::nightly;
 use xtask::steps::Outcome;

@@ -1,5 +1,7 @@
 //! The firmware links, so it has no panic path; and it has no allocator.
 
+// Requirement: P-01
+
 use anyhow::{Context, Result, ensure};
 use xtask::firmware::{self, Surface};
 use xtask::steps::Outcome;

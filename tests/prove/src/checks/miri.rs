@@ -1,5 +1,7 @@
 //! The frames under Miri, where it is installed.
 
+// Requirements: F-01, P-04
+
 use anyhow::Result;
 use xtask::nightly;
 use xtask::steps::Outcome;

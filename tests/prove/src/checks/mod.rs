@@ -1,5 +1,7 @@
 //! Each file has one check, with its promises. A new check is a new file, and a line here.
 
+// Requirement: E-03
+
 mod anytime;
 pub mod bits;
 mod board_faults;

@@ -1,5 +1,7 @@
 //! Modal surfaces on the board: the host's bits, and instructions of a vertex, a bound and a query.
 
+// Requirement: F-06
+
 use anyhow::{Result, ensure};
 use xtask::steps::Outcome;
 

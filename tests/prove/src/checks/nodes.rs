@@ -1,6 +1,8 @@
 //! A controller's loop on the board where a volume's nodes carry a surface of 50,000 triangles: the host's bits, memory, and
 //! instructions of a tick, of an element's check and of a vertex.
 
+// Requirements: F-07, F-09
+
 use anyhow::{Context, Result, anyhow, ensure};
 use dibs_build::{Builder, BuiltTree, IndexWidth, Motion, Volume, generate};
 use dibs_nostd::Tool;

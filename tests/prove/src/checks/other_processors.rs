@@ -1,5 +1,7 @@
 //! The same bits on an emulated Cortex-M55 and on an emulated RISC-V, and their instructions.
 
+// Requirement: A-11
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;

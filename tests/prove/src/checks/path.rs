@@ -1,5 +1,7 @@
 //! A query's instructions on the board: the paper's moving tool around a beating heart, and adversarial poses.
 
+// Requirements: A-01, E-01
+
 use anyhow::Result;
 use xtask::steps::Outcome;
 

@@ -1,5 +1,7 @@
 //! The Python package's own tests, against trimesh, scipy and the program `dibs`.
 
+// Requirement: P-07
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;

@@ -1,5 +1,7 @@
 //! Instructions of receiving a frame and checking its stretch on the board, for each vertex and packet.
 
+// Requirement: B-11
+
 use anyhow::{Result, ensure};
 use dibs_build::{Builder, BuiltTree, IndexWidth, Motion, generate};
 use dibs_nostd::wire::{AesCmac, Mac, NoMac};

@@ -1,5 +1,7 @@
 //! A controller finds a tree that has changed in flash.
 
+// Requirements: C-01, M-02
+
 use std::path::Path;
 use std::process::Stdio;
 

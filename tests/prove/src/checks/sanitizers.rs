@@ -1,5 +1,7 @@
 //! Frames, bus and corrupt trees under the sanitizers of the nightly compiler.
 
+// Requirement: P-04
+
 use anyhow::Result;
 use xtask::nightly::{self, Sanitized};
 use xtask::steps::Outcome;

@@ -1,5 +1,7 @@
 //! The side of a tool, compared with f64.
 
+// Requirement: S-01
+
 use anyhow::Result;
 use dibs_tests::side_poses::{POSES_OF_A_FRAME, Tally, closed, judge};
 use rayon::prelude::*;

@@ -1,5 +1,7 @@
 //! Instructions of side, signed separation, depth and contacts on the board.
 
+// Requirements: S-01, S-03, S-04
+
 use anyhow::Result;
 use xtask::steps::Outcome;
 

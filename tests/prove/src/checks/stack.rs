@@ -1,5 +1,7 @@
 //! The firmware's stack: a bound from the binary, and detection of an overflow.
 
+// Requirement: P-02
+
 use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};

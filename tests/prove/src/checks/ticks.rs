@@ -1,6 +1,8 @@
 //! The longest control tick: the firmware's receiver and tick on the emulated board, on admitted frames that a search
 //! has chosen to make the tick long.
 
+// Requirement: P-03
+
 use anyhow::{Context, Result, ensure};
 use controller::surface::{self, CENTRE, REACH};
 use controller::{BUDGET, MTU, TICK_INSTRUCTIONS, instrument};

@@ -1,5 +1,7 @@
 //! Frames published during queries, on the emulated board.
 
+// Requirement: F-01
+
 use anyhow::{Result, ensure};
 use dibs_build::{Builder, IndexWidth};
 use dibs_tests::surfaces;

@@ -1,5 +1,7 @@
 //! A tracker's instructions on the board: the paper's moving tool around a heart that moves at every tick.
 
+// Requirements: E-01, T-01
+
 use anyhow::{Context, Result};
 use dibs_build::{Builder, IndexWidth, generate};
 use probe::track::{OPENED, tick};

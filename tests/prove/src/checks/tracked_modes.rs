@@ -1,6 +1,8 @@
 //! A tracker's instructions on the board where weights move the surface: the paper's moving tool around a heart whose
 //! modes move at every tick.
 
+// Requirements: F-06, T-01
+
 use anyhow::{Context, Result, ensure};
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, IndexWidth};

@@ -1,5 +1,7 @@
 //! docs/evidence/guarantees.md, from the records and the texts in `texts/`.
 
+// Requirement: E-02
+
 use std::fmt::Write;
 
 use anyhow::Result;

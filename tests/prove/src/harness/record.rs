@@ -1,5 +1,7 @@
 //! The records in docs/evidence/guarantees.json: one a promise, each with the run that measured it.
 
+// Requirements: E-01, E-02
+
 use std::fs;
 use std::path::PathBuf;
 

@@ -1,5 +1,7 @@
 //! docs/boards.md shows the records.
 
+// Requirement: E-02
+
 use std::{env, fs};
 
 use dibs_prove::checks::boards::table;

@@ -1,5 +1,7 @@
 //! The path bound, on functions of a few instructions.
 
+// Requirement: A-06
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 

@@ -1,5 +1,7 @@
 //! The paper's path of table 3, as the firmware has it.
 
+// Requirement: E-05
+
 use dibs_nostd::Tool;
 use dibs_tests::method::Probe;
 use dibs_tests::streams::Beat;

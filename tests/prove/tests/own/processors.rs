@@ -1,5 +1,7 @@
 //! docs/processors.md shows the records.
 
+// Requirement: E-02
+
 use std::{env, fs};
 
 use dibs_prove::checks::other_processors::table;

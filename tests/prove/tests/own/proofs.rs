@@ -1,5 +1,7 @@
 //! The page of proofs is complete.
 
+// Requirement: E-03
+
 use std::collections::BTreeSet;
 use std::fs;
 

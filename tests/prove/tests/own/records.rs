@@ -1,5 +1,7 @@
 //! Records say of when they are, and golden figures do not creep.
 
+// Requirements: E-01, E-02
+
 use std::fs;
 
 use dibs_prove::harness::figures::Figures;

@@ -1,5 +1,7 @@
 //! The demo's words are those of `dibs`.
 
+// Requirement: P-08
+
 #[path = "../../../../dibs-cli/src/words/table.rs"]
 mod table;
 

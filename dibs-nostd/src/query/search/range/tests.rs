@@ -1,5 +1,7 @@
 //! Compares every bound in the front of a range search with the distances of all vertices below it.
 
+// Requirement: T-01
+
 extern crate std;
 
 use std::vec::Vec;

@@ -1,0 +1,25 @@
+//! Pages that these tests write.
+
+use std::path::Path;
+use std::{env, fs};
+
+use serde_json::Value;
+
+pub const REPOSITORY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
+/// Compares a page of `docs/evidence` with its text, or writes it with `DIBS_WRITE=1`.
+pub fn keep(name: &str, text: &str) {
+    let path = Path::new(REPOSITORY).join("docs/evidence").join(name);
+    if env::var_os("DIBS_WRITE").is_some() {
+        fs::write(path, text).expect("writable");
+    } else {
+        let kept = fs::read_to_string(path).unwrap_or_default();
+        assert!(kept == text, "{name}: write it anew with DIBS_WRITE=1");
+    }
+}
+
+/// The rows of a record in `docs/evidence`.
+pub fn records(name: &str) -> Vec<Value> {
+    let path = Path::new(REPOSITORY).join("docs/evidence").join(name);
+    serde_json::from_str(&fs::read_to_string(path).expect("a record")).expect("rows")
+}
