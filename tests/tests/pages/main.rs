@@ -1,5 +1,7 @@
 //! The documents are true: figures, public items, packages, dependencies, the guide, the evidence for a device's file.
 
+mod device;
+mod failures;
 mod layers;
 mod new_user;
 mod packages;
@@ -7,3 +9,4 @@ mod page;
 mod public_api;
 mod readme;
 mod requirements;
+mod sbom;

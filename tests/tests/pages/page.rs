@@ -23,3 +23,16 @@ pub fn records(name: &str) -> Vec<Value> {
     let path = Path::new(REPOSITORY).join("docs/evidence").join(name);
     serde_json::from_str(&fs::read_to_string(path).expect("a record")).expect("rows")
 }
+
+/// A number with commas.
+pub fn thousands(value: u32) -> String {
+    let digits = value.to_string();
+    let mut out = String::new();
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}

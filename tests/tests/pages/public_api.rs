@@ -223,11 +223,11 @@ fn module_file(folder: &Path, name: &str) -> Option<(PathBuf, PathBuf)> {
     Some((files.into_iter().find(|file| file.exists())?, inner))
 }
 
-fn is_public(visibility: &Visibility) -> bool {
+pub fn is_public(visibility: &Visibility) -> bool {
     matches!(visibility, Visibility::Public(_))
 }
 
-fn is_hidden(attributes: &[Attribute]) -> bool {
+pub fn is_hidden(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let list = attribute.meta.require_list();
         attribute.path().is_ident("doc") && list.is_ok_and(|l| l.tokens.to_string() == "hidden")

@@ -6,7 +6,7 @@ use std::{env, fs};
 
 use serde_json::Value;
 
-use crate::page::records;
+use crate::page::{records, thousands};
 
 const README: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md");
 const BEGIN: &str =
@@ -92,16 +92,4 @@ fn short(value: f64) -> String {
         _ if value < 10.0 => format!("{value:.1}"),
         _ => thousands(value.round() as u32),
     }
-}
-
-fn thousands(value: u32) -> String {
-    let digits = value.to_string();
-    let mut out = String::new();
-    for (at, digit) in digits.chars().enumerate() {
-        if at > 0 && (digits.len() - at).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(digit);
-    }
-    out
 }

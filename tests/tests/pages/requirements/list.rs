@@ -350,7 +350,8 @@ pub const REQUIREMENTS: &[Requirement] = &[
     ),
     requirement(
         "E-03",
-        "Every check and every file of tests has a row in the page of proofs, and a requirement.",
+        "Every check and every file of tests has a row in the page of proofs, and a requirement; each public call of a guard has \
+         its failures listed, each assumption of use its check, each known anomaly its place.",
         &[],
     ),
     requirement(

@@ -1,0 +1,152 @@
+//! Known anomalies: where the library is worse than it should be, or where its promise ends in a way that surprises.
+
+/// An anomaly.
+pub struct Anomaly {
+    /// It is never used again for another.
+    pub id: &'static str,
+    /// `{id}` stands for the recorded figure of that name.
+    pub says: &'static str,
+    pub remedy: &'static str,
+    /// Where it is.
+    pub file: &'static str,
+}
+
+const fn anomaly(
+    id: &'static str,
+    says: &'static str,
+    remedy: &'static str,
+    file: &'static str,
+) -> Anomaly {
+    Anomaly { id, says, remedy, file }
+}
+
+pub const ANOMALIES: &[Anomaly] = &[
+    anomaly(
+        "K-01",
+        "Until the scrub comes by, a bit that flipped in the tree can make a distance too great: {corruption.undetected} % of \
+         damages did.",
+        "Flash with error correction; idle time for `Bus::work`.",
+        "dibs-nostd/src/tree/scrub.rs",
+    ),
+    anomaly(
+        "K-02",
+        "After a start that fails for a stack, a metric or a reach, the ends are gone: the next start gives `SplitError`.",
+        "None is needed: tree and types decide it, so it shows at a build's first start.",
+        "dibs-nostd/src/guard/surface.rs",
+    ),
+    anomaly(
+        "K-03",
+        "The proven bound covers plain queries. A tracker's tick, contacts and a firmware's tick are measured, not proven: the \
+         longest was {ticks.longest} instructions.",
+        "Leave room in the tick.",
+        "tests/prove/src/bound/mod.rs",
+    ),
+    anomaly(
+        "K-04",
+        "A proven node test of a sphere costs {bound.sphere.ratio} times the typical one.",
+        "Budgets of spheres by proven constants do less.",
+        "dibs-nostd/src/query/plane.rs",
+    ),
+    anomaly(
+        "K-05",
+        "Facts of the proof that no trace executes are not tried: roots on surfaces that nodes carry.",
+        "docs/evidence/bound.md names them.",
+        "tests/prove/src/bound/facts.rs",
+    ),
+    anomaly(
+        "K-06",
+        "All contacts within 5 mm cost {m7.track.contacts.mean} instructions in the mean tick, {m7.track.contacts.largest} at most: \
+         a budget below that leaves the list open.",
+        "A smaller margin; the closest pair alone.",
+        "dibs-nostd/src/query/tracker/contacts.rs",
+    ),
+    anomaly(
+        "K-07",
+        "`ContactIter::is_complete` compares the margin alone, without the answer's accuracy: a wall that is farther than the \
+         margin by less than the accuracy may be missing from a complete list.",
+        "Ask with a margin larger by the accuracy.",
+        "dibs-nostd/src/query/contacts/mod.rs",
+    ),
+    anomaly(
+        "K-08",
+        "The accuracy of an answer with a pose leaves out the rounding of the moved tool's ends: 6 units of 2^-24 of their distance.",
+        "Keep the mesh's origin near the mesh.",
+        "dibs-nostd/src/surface/pose.rs",
+    ),
+    anomaly(
+        "K-09",
+        "`Guard::admit` does not count the rounding of a motion to the mesh and back: 2e-4 mm at 3 m.",
+        "A stand-off larger by that.",
+        "dibs-nostd/src/guard/posed.rs",
+    ),
+    anomaly(
+        "K-10",
+        "Where captures go back within the jitter of a clock, the residual of a pose and that of its rows are of two times.",
+        "Captures that go forward.",
+        "dibs-nostd/src/guard/posed.rs",
+    ),
+    anomaly(
+        "K-11",
+        "The poses of frames are not under the model checker that tries every interleaving; the rows are.",
+        "None.",
+        "dibs-nostd/src/guard/posed.rs",
+    ),
+    anomaly(
+        "K-12",
+        "Packets carry no pose, and the C and Python interfaces have neither poses nor a guard's contacts. A guard gives no \
+         contacts of frames with poses.",
+        "`Bus::frame_at` in Rust.",
+        "dibs-nostd/src/guard/posed.rs",
+    ),
+    anomaly(
+        "K-13",
+        "`Bus::send_status_to` loses the status where the stream fails or takes a part.",
+        "The next is due after 100 ms.",
+        "dibs-nostd/src/guard/line.rs",
+    ),
+    anomaly(
+        "K-14",
+        "On a flooded network packets that meet a full buffer are lost, and their frame with them: {flood.rate} frames a second \
+         came through.",
+        "A network of its own.",
+        "firmware-example/src/bin/board/network.rs",
+    ),
+    anomaly(
+        "K-15",
+        "Without a key, a line that damages every packet may give a false heartbeat more often than 1e-9 an hour.",
+        "A key, or the age alone: docs/black-channel.md.",
+        "dibs-nostd/src/receive/collector/heartbeats.rs",
+    ),
+    anomaly(
+        "K-16",
+        "The side is undefined at {sides.undefined} % of the poses away from contact; open surfaces, and shells that cut \
+         themselves, have the sign of the closest sheet, which can change without contact.",
+        "Close the mesh.",
+        "dibs-nostd/src/query/side.rs",
+    ),
+    anomaly(
+        "K-17",
+        "The direction leaps where two points are equally near or deep.",
+        "The force of all contacts, `Proxy`.",
+        "dibs-nostd/src/control/constraint/forbidden.rs",
+    ),
+    anomaly(
+        "K-18",
+        "The controller for an STM32H743 was linked and checked by its binary; it never ran on silicon.",
+        "docs/boards.md says what to check first.",
+        "examples/stm32h743/src/main.rs",
+    ),
+    anomaly(
+        "K-19",
+        "`dibs view --path - --ticks -` reads its input twice, and a commanded push with an unknown outcome is drawn as one by \
+         force.",
+        "A file for one of them.",
+        "dibs-cli/src/view/ticks.rs",
+    ),
+    anomaly(
+        "K-20",
+        "The figures are of {commits} commits, not of one.",
+        "Each row of docs/evidence/guarantees.md says of which.",
+        "tests/prove/src/harness/record.rs",
+    ),
+];
