@@ -1,5 +1,7 @@
 //! Builds the surface's tree, and passes the board's memory map to the linker.
 
+// Requirement: P-12
+
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 

@@ -1,5 +1,7 @@
 //! Records over the line to the host.
 
+// Requirement: P-05
+
 use bytemuck::Zeroable;
 use controller::telemetry::{MAX_FRAMED, Record, Summary, Tick, frame};
 use dibs_nostd::wire::Deframer;

@@ -44,10 +44,15 @@ pub fn build(cross: &Cross, surface: &Surface) -> Result<PathBuf> {
 /// The command that builds the firmware.
 pub fn command(cross: &Cross, surface: &Surface) -> Command {
     let mut cargo = cross.cargo("build");
+    describe(&mut cargo, surface);
+    cargo
+}
+
+/// Completes a `cargo build` of the firmware.
+pub fn describe(cargo: &mut Command, surface: &Surface) {
     cargo.args(["--quiet", "--package", "firmware-example", "--bin", "board"]);
     cargo.args(["--features", "board", "--profile", "firmware"]);
-    surface.describe_to(&mut cargo);
-    cargo
+    surface.describe_to(cargo);
 }
 
 impl Surface {

@@ -11,5 +11,6 @@ pub mod python;
 pub mod qemu;
 pub mod steps;
 pub mod toolchain;
+pub mod twice;
 pub mod valgrind;
 pub mod workspace;

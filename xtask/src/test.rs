@@ -13,6 +13,7 @@ use xtask::process::{quiet, run};
 use xtask::qemu;
 use xtask::steps::{Outcome, Steps};
 use xtask::toolchain::Cross;
+use xtask::twice;
 use xtask::workspace;
 
 use crate::{prove, viewer};
@@ -24,9 +25,10 @@ pub struct Options {
     /// Seconds of the controller's time in the demo.
     #[arg(long, default_value_t = 5)]
     pub demo_seconds: u32,
-    /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the viewer's and its query in
-    /// WebAssembly, the paper's experiments in small, a filter, an embedded organ, modal ticks and a flood on the board,
-    /// other processors, the sanitizers, the fuzzers, and all cases of tests that else try a quarter.
+    /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the firmware once more in
+    /// another folder, the viewer's and its query in WebAssembly, the paper's experiments in small, a filter, an embedded
+    /// organ, modal ticks and a flood on the board, other processors, the sanitizers, the fuzzers, and all cases of tests
+    /// that else try a quarter.
     #[arg(long)]
     pub whole: bool,
     /// Only these steps, for machines that run side by side; by default all.
@@ -141,6 +143,9 @@ fn board(found: Result<Cross>, is_whole: bool) -> Steps {
             steps.run("C interface for the board", || c_interface::has_no_panic_path(&cross));
             if is_whole {
                 steps.run("a new user", || new_user(&cross));
+                steps.run("the same firmware in another folder", || {
+                    twice::same_bytes(&cross).map(|()| Outcome::Passed)
+                });
             }
             steps.run("cycles, as far as an emulator has them", || cycles(&cross));
         }

@@ -68,6 +68,18 @@ impl Cross {
         self.target_dir_apart(folder).join(TARGET).join("release").join(name)
     }
 
+    /// `cargo SUBCOMMAND` for the board in a copy of the workspace, with the copy's target folder.
+    pub fn cargo_of_copy(&self, copy: &Path, subcommand: &str) -> Command {
+        let mut command = self.cargo_in(&copy.join("target"), subcommand);
+        command.current_dir(copy);
+        command
+    }
+
+    /// The path of a program of [`cargo_of_copy`](Self::cargo_of_copy).
+    pub fn program_of_copy(&self, copy: &Path, profile: &str, name: &str) -> PathBuf {
+        copy.join("target").join(TARGET).join(profile).join(name)
+    }
+
     fn target_dir_apart(&self, folder: &str) -> PathBuf {
         self.target_dir().join("apart").join(folder)
     }

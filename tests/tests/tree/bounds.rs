@@ -1,5 +1,7 @@
 //! The peers' bounds on boxes, against a search along the axis.
 
+// Requirement: E-05
+
 use dibs_nostd::{Capsule, Sphere};
 use dibs_tests::baselines::bounds::Axis;
 use dibs_tests::deform::unit;

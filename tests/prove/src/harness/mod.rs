@@ -54,6 +54,10 @@ pub struct Options {
     /// Only checks whose names contain this; the other records stay as they are.
     #[arg(long)]
     only: Option<String>,
+    /// Only checks that are not recorded at this commit and size; each is recorded at its end, so that a run that was stopped
+    /// goes on.
+    #[arg(long, conflicts_with_all = ["only", "quick"])]
+    resume: bool,
     /// Golden figures whose names begin so may be recorded above the lowest that was ever recorded.
     #[arg(long, value_delimiter = ',', requires = "because")]
     raise: Vec<String>,
@@ -74,9 +78,29 @@ pub fn guarantees(options: &Options) -> Result<()> {
     let effort = if options.quick { Effort::TEST } else { Effort::FULL.divided(options.share) };
     let effort = Effort { fuzz_seconds: options.fuzz_seconds, ..effort };
     let raise = Raise { names: &options.raise, because: &options.because };
+    if options.resume {
+        return resume(&effort, raise);
+    }
     let mut steps = Steps::default();
     let measured = run(&effort, only, &mut steps);
     steps.run("documents", || record::write(&measured, raise).map(|()| Outcome::Passed));
+    steps.finish();
+    Ok(())
+}
+
+/// Measures the checks that are not recorded at this commit and size, one after the other.
+fn resume(effort: &Effort, raise: Raise<'_>) -> Result<()> {
+    let mut steps = Steps::default();
+    for check in CHECKS {
+        let now = Run::now(effort.size());
+        ensure!(now.is_whole(), "commit first: the records say of which commit they are");
+        if record::has(&record::committed()?, check, &now) {
+            continue;
+        }
+        let mut measured = Measured::new(now);
+        measured.run_each(effort, |name| name == check.name, &mut steps);
+        steps.run("documents", || record::write(&measured, raise).map(|()| Outcome::Passed));
+    }
     steps.finish();
     Ok(())
 }

@@ -77,6 +77,14 @@ pub fn promises() -> impl Iterator<Item = (&'static Check, &'static Promise)> {
     CHECKS.iter().flat_map(|check| check.promises.iter().map(move |promise| (check, promise)))
 }
 
+/// Whether the records have all figures of a check, each of a run of the same commit, size and machine.
+pub fn has(records: &[Record], check: &Check, run: &Run) -> bool {
+    let is_there = |promise: &Promise| {
+        records.iter().any(|record| record.id == promise.id && record.run.is_of_the_same(run))
+    };
+    check.promises.iter().all(is_there)
+}
+
 /// Writes both documents. A promise that was not measured keeps its record; so does a golden figure that is
 /// above its floor and was not raised, which is an error.
 pub fn write(measured: &Measured, raise: Raise<'_>) -> Result<()> {

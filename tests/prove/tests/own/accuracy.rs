@@ -1,5 +1,7 @@
 //! The accuracy that a demo's answer is compared with.
 
+// Requirement: E-02
+
 use dibs_prove::demo::check::without;
 
 #[test]

@@ -8,4 +8,5 @@ mod processors;
 mod proofs;
 mod records;
 mod root;
+mod twice;
 mod words;

@@ -6,7 +6,7 @@ use std::fs;
 
 use dibs_prove::harness::figures::Figures;
 use dibs_prove::harness::promise::Bound;
-use dibs_prove::harness::record::{Raise, Record, committed, json, merge, promises};
+use dibs_prove::harness::record::{Raise, Record, committed, has, json, merge, promises};
 use dibs_prove::harness::run::{Run, UNKNOWN};
 use dibs_prove::harness::{Measured, markdown};
 
@@ -80,6 +80,21 @@ fn a_partial_recording_does_not_pass_for_a_whole_one() {
         let (records, _) = merge(&[], &measured(commit, &all), Raise::default());
         assert!(head(&records).contains("NOT OF ONE"), "{commit}");
     }
+}
+
+/// A run that was stopped after half of a check's figures.
+#[test]
+fn a_check_is_recorded_once_all_of_its_figures_are_of_the_run() {
+    let (check, _) = promises().find(|(check, _)| check.promises.len() > 2).expect("a check");
+    let all: Vec<(&str, f64)> = check.promises.iter().map(|promise| (promise.id, 1.0)).collect();
+    let (half, _) = merge(&[], &measured("aaaa", &all[1..]), Raise::default());
+    let (whole, _) = merge(&half, &measured("aaaa", &all[..1]), Raise::default());
+    let (mixed, _) = merge(&whole, &measured("bbbb", &all[..1]), Raise::default());
+    let recorded = [&half, &whole, &mixed].map(|records| has(records, check, &run("aaaa")));
+    assert_eq!(recorded, [false, true, false]);
+    let smaller = Run { size: "1/10".into(), ..run("aaaa") };
+    let later = Run { date: "2026-01-02T00:00Z".into(), ..run("aaaa") };
+    assert_eq!([smaller, later].map(|run| has(&whole, check, &run)), [false, true]);
 }
 
 /// The committed head, read by itself, against the committed rows.

@@ -1,5 +1,7 @@
 //! The repository's top folder.
 
+// Requirement: E-02
+
 use std::fs;
 
 use xtask::workspace::root_above;

@@ -339,6 +339,11 @@ pub const REQUIREMENTS: &[Requirement] = &[
         &["examples.run"],
     ),
     requirement(
+        "P-12",
+        "The bytes that a board loads are the same wherever the checkout is that they were built in.",
+        &[],
+    ),
+    requirement(
         "E-01",
         "No figure of instructions rises unnoticed.",
         &["m7.warm.mean", "m7.track.mean", "m7.capsule.mean"],
