@@ -1,5 +1,7 @@
 //! Frames with a rigid pose each, in packets: published with their own pose, or not at all.
 
+// Requirements: F-08, B-01
+
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::guard::{GuardLimits, Posed, Surface};
 use dibs_nostd::wire::{AesCmac, Encoding, Event, FrameEncoder, FrameId, NoMac};

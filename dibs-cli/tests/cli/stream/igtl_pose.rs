@@ -1,5 +1,7 @@
 //! `dibs bridge --pose-device …`: every frame goes out with the pose that came last before it.
 
+// Requirement: B-09
+
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::net::TcpListener;

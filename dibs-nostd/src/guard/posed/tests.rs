@@ -1,5 +1,7 @@
 //! A tool and its motion, led to the mesh, against f64: the stated errors, searched for what breaks them.
 
+// Requirement: F-08
+
 extern crate std;
 
 use std::prelude::rust_2024::*;
