@@ -7,6 +7,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
 /// A triangle's corners: their rows, and their positions.
+#[inline(always)]
 pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,

@@ -308,7 +308,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         Ok(Sample { parameter, along, on_axis, depth, triangle, corners, fit: Fit::Closest })
     }
 
-    /// A function of its own: four places call it, and a depth is no tight loop.
+    /// A function of its own: four places call it, and a tightly coupled memory is small.
+    #[inline(never)]
     fn corners(&self, rows: [u32; 3]) -> Result<[Vec3; 3], QueryError> {
         positions(self.vertices, rows)
     }
