@@ -1423,7 +1423,7 @@ typedef struct {
    */
   float barycentric[3];
   /**
-   * Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`.
+   * Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`, and there in a guard's list.
    */
   dibs_vec3 velocity;
 } dibs_contact;

@@ -71,7 +71,7 @@ pub struct dibs_contact {
     pub corners: [u32; 3],
     /// Weights of the corners at `point_on_surface`.
     pub barycentric: [f32; 3],
-    /// Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`.
+    /// Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`, and there in a guard's list.
     pub velocity: dibs_vec3,
 }
 

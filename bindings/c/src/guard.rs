@@ -262,8 +262,8 @@ pub extern "C" fn dibs_guard_contacts(
     answer: *mut dibs_answer,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let answer = answer.check()?;
         contacts.open()?.fill(|list| {
+            let answer = answer.check()?;
             let (mut guard, now) = (guard.open()?, Millis(now));
             let shape = tool.get_if_any()?.map(Shape::try_from).transpose();
             let found = match &shape {

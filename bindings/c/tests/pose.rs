@@ -1,5 +1,7 @@
 //! Frames with a rigid pose each in C: the same bits as in Rust.
 
+// Requirements: F-08, P-06
+
 use std::fs;
 use std::path::Path;
 use std::process::Command;

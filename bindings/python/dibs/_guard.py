@@ -265,7 +265,10 @@ def _bytes(name: str, value: Any) -> bytes:
 
 
 def _pose(pose: tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[list[float], list[float]]:
-    rotation, shift = pose
+    try:
+        rotation, shift = pose
+    except (TypeError, ValueError):
+        raise ValueError("pose: give a rotation (x, y, z, w) and a shift (x, y, z), not a matrix") from None
     numbers = []
     for name, given, count in (("rotation", rotation, 4), ("shift", shift, 3)):
         array = _arrays.numbers(name, given)

@@ -29,4 +29,4 @@ class Bound:
     _instead: str
 
     def __reduce__(self) -> str:
-        raise TypeError(f"a {type(self).__name__} cannot be pickled: {self._instead}")
+        raise TypeError(f"{type(self).__name__}: it cannot be copied or pickled; {self._instead}")

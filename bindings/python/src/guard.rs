@@ -15,6 +15,7 @@ use dibs_nostd::{
     TreeBytes, constraint, guard,
 };
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::record::push_answer;
@@ -262,7 +263,9 @@ impl Guard {
         let (origin, now) = (self.tree.origin, Millis(now));
         let tool = AnyTool::of(&bytes::doubles(tool), origin);
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
-        let mut list = self.contacts.lock().unwrap_or_else(PoisonError::into_inner);
+        // A thread that waits for the list lets the one that has it come back to Python.
+        let list = self.contacts.lock_py_attached(py);
+        let mut list = list.unwrap_or_else(PoisonError::into_inner);
         let contacts = &mut **list;
         let answer = py.detach(|| {
             with_ends!(self, pair => match &tool {

@@ -10,6 +10,7 @@ use dibs_nostd::{
     TrackerAnswer,
 };
 use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
 use pyo3::types::PyByteArray;
 
 use crate::record::{push_answer, push_contact};
@@ -157,7 +158,9 @@ impl Tracker {
         if let Some(instructions) = instructions {
             options = options.budget(Budget::for_instructions(instructions, cost));
         }
-        let mut list = self.contacts.lock().unwrap_or_else(PoisonError::into_inner);
+        // A thread that waits for the list lets the one that has it come back to Python.
+        let list = self.contacts.lock_py_attached(py);
+        let mut list = list.unwrap_or_else(PoisonError::into_inner);
         let contacts = &mut **list;
         let found = py.detach(|| {
             with_ticks!(&self.ticks, ticks => {

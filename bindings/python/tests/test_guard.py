@@ -81,6 +81,9 @@ class Guards(unittest.TestCase):
             for wrong in ((turn[:3], shift), (turn, shift[:2]), ([0.0, 0.0, 0.0, 1.1], shift), (turn, [np.nan, 0, 0])):
                 with self.assertRaises(ValueError):
                     guard.frame(frame, 2_610, pose=wrong)
+            for wrong in (np.eye(4), 5):
+                with self.assertRaisesRegex(ValueError, "give a rotation"):
+                    guard.frame(frame, 2_610, pose=wrong)
 
     def test_the_answer_is_that_of_the_frame(self):
         for tree, frame, shift, is_serial in [

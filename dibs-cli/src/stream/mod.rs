@@ -82,7 +82,8 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["motion", "unnamed_motion"])]
     device: Option<String>,
     /// Send every frame with the rigid pose that this OpenIGTLink device had last, in TRANSFORM, TDATA or QTDATA: the frame's
-    /// positions are those before it. For controllers that take posed frames; the age is that of the older of both
+    /// positions are those before it. For controllers that take posed frames. The age is that of the older of both, and a frame
+    /// counts as new where positions or pose have changed
     #[arg(long, value_name = "TRACKED", conflicts_with_all = ["motion", "unnamed_motion"])]
     pose_device: Option<String>,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or

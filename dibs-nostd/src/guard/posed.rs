@@ -197,7 +197,7 @@ impl Placed {
     /// Most (mm) by which a point that was led to the mesh is off.
     fn rounding(&self, local: Vec3) -> f32 {
         match &self.step {
-            Some((step, ..)) => step.rounding(local, &self.pose),
+            Some((step, part, _)) => step.rounding(local, &self.pose, *part),
             None => RigidPose::rounding(local),
         }
     }
@@ -205,7 +205,7 @@ impl Placed {
     /// The same of a vector.
     fn rounding_of_vector(&self, local: Vec3) -> f32 {
         match &self.step {
-            Some((step, ..)) => step.rounding_of_vector(local, &self.pose),
+            Some((step, part, _)) => step.rounding_of_vector(local, *part),
             None => RigidPose::rounding(local),
         }
     }

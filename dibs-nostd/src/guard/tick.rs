@@ -134,14 +134,14 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         contacts: &mut Contacts<N, NEAR>,
     ) -> Answer {
         contacts.clear();
-        let (mut off, mut placing) = (0.0, 0.0);
+        let (mut error, mut placing) = (0.0, 0.0);
         let (answer, _) = self.on_latest(
             tool,
             now,
             |tracker, surface, own, flow, options| {
                 placing = flow.placed.map_or(0.0, |placed| placed.error(tool));
-                off = sum_up(sum_up(surface.position_error(), placing), flow.margin());
-                let margin = sum_up(margin, off);
+                error = sum_up(surface.position_error(), placing);
+                let margin = sum_up(margin, sum_up(error, flow.margin()));
                 let tracked = tracker.contacts(surface, own, margin, options, contacts)?;
                 contacts.set_velocities(|corners, weights| {
                     let own = flow.at(corners, weights);
@@ -157,7 +157,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
             },
             |_, _, _, _| (),
         );
-        contacts.widen(sum_up(answer.trust.margin, placing), off);
+        let moved = answer.trust.margin;
+        contacts.widen(sum_up(moved, placing), sum_up(error, moved));
         answer
     }
 

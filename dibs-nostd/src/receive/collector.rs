@@ -344,6 +344,10 @@ impl Collector {
         self.frame_of(packet, mac)?;
         let Some(frame) = &mut self.frame else { return Ok(None) };
         let sequence = packet.sequence;
+        // Before that place there is no pose.
+        if frame.begin.is_posed && sequence <= POSE_SEQUENCE {
+            return Err(ReceiveError::Order { sequence });
+        }
         match frame.commit {
             Some((known, _)) if known == sequence => return Ok(None),
             Some(_) => return Err(ReceiveError::Order { sequence }),

@@ -58,6 +58,7 @@ impl Compared {
     /// What the distance from that extrapolation grows to. With a steady acceleration the error, after a time `b` beyond a
     /// step that took `a`, grows as `b (a + b)`. That seen had the last step's time for `b`; the next one is taken to have
     /// it for both. With `t = b / a` of the one seen the ratio is `2 t / (1 + t)`.
+    #[cfg(feature = "bus")]
     pub(crate) fn growth(&self) -> f32 {
         let growth = 2.0 * self.t / (1.0 + self.t);
         if growth > 1.0 { growth } else { 1.0 }

@@ -84,6 +84,8 @@ pub struct Sender<T, const MTU: usize, M = NoMac> {
     memory: (Vec<Vec3>, Packets),
     since_whole: u32,
     whole_wanted: bool,
+    /// Whether the last frame had a pose: a partial one without would keep it.
+    has_pose: bool,
     /// The last whole frame: until it is acknowledged, requests for a whole frame may be from before it.
     whole: Option<(u32, Duration)>,
     status: Option<Status>,
@@ -142,6 +144,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             memory: Default::default(),
             since_whole: 0,
             whole_wanted: true,
+            has_pose: false,
             whole: None,
             status: None,
             counters: Counters::new(),
@@ -269,6 +272,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
                 }
                 // A receiver refuses a frame of an age that cannot be stated: none can build on it.
                 self.whole_wanted = freshness.age_ms == u16::MAX;
+                self.has_pose = pose.is_some();
                 Ok(Prepared { sent, packets })
             }
             // The receiver's frame is the same as before.
@@ -290,7 +294,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.surface.to_rows_in(positions, rows)?;
         let encoding = self.encoding(rows)?;
         let id = self.next_id();
-        let base = held.as_ref().filter(|_| self.is_partial_wanted());
+        let keeps_pose = self.has_pose && pose.is_none();
+        let base = held.as_ref().filter(|_| self.is_partial_wanted() && !keeps_pose);
         let frame = match base {
             Some((epoch, held)) => {
                 FrameEncoder::partial(id, encoding, &rows[..], *epoch, &held[..])

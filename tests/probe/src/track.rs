@@ -87,8 +87,8 @@ type Follower = Tracker<'static, u16, STACK, OPENED, OPENED>;
 /// The sizes that the documentation states.
 #[cfg(target_pointer_width = "32")]
 const _: () = {
-    assert!(size_of::<Contacts<8>>() == 152 * 8 + 20 * 512 + 32);
-    assert!(size_of::<Contacts<1, 4>>() == 152 + 20 * 4 + 32);
+    assert!(size_of::<Contacts<8>>() == 152 * 8 + 20 * 512 + 28);
+    assert!(size_of::<Contacts<1, 4>>() == 152 + 20 * 4 + 28);
     assert!(size_of::<Follower>() <= 16 * STACK + 56 * OPENED + 1_944);
 };
 

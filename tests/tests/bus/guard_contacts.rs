@@ -112,11 +112,16 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
             let blend = frame.extrapolated();
             // As far as a wall with this margin acts.
             let margin = answer.trust.margin;
-            let wider = sum_up(MARGIN, sum_up(blend.position_error(), margin));
+            let off = sum_up(blend.position_error(), margin);
+            let wider = sum_up(MARGIN, off);
             let found = tracker.contacts(&blend, &tool, wider, &options, &mut expected);
             let found = found.expect("an answer");
             assert_eq!(answer.tracked, Ok(found), "{budget} {tick}");
-            assert_eq!(own.bound().to_bits(), expected.bound().to_bits(), "{budget} {tick}");
+            // Of the true surface: less by all that the searched one may be off.
+            let below = f64::from(expected.bound()) - f64::from(off);
+            let [bound, next] = [own.bound(), own.bound().next_up()].map(f64::from);
+            let is_next = bound <= below && (next > below || below == f64::NEG_INFINITY);
+            assert!(is_next, "{budget} {tick}: {bound} {below}");
             assert_eq!(own.len(), expected.len(), "{budget} {tick}");
             for (one, other) in own.iter().zip(expected.iter()) {
                 assert_eq!(bits(one), bits(other), "{budget} {tick}");
@@ -131,8 +136,8 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
             assert!(!is_outside || own.is_empty() || wider > reach, "{wider} {reach}");
             widest = widest.max(wider);
             if let Ok(all) = own.within(MARGIN) {
-                assert_eq!(all.is_complete(), own.bound() >= wider, "{budget} {tick}");
-                between += usize::from(own.bound() >= MARGIN && own.bound() < wider);
+                assert_eq!(all.is_complete(), expected.bound() >= wider, "{budget} {tick}");
+                between += usize::from(expected.bound() >= MARGIN && expected.bound() < wider);
             }
             listed += own.len();
             cut += usize::from(own.bound() < MARGIN);
@@ -147,7 +152,7 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
     }
     println!("{listed} contacts, {moving} that move; {cut} lists cut; a tick of {most} at most");
     assert!(listed > 5_000 && moving > 3_000 && cut > 500, "{listed} {moving} {cut}");
-    assert!(widest > MARGIN + 0.1 && between > 10, "{widest} {between}");
+    assert!(widest > MARGIN + 0.1 && between > 0, "{widest} {between}");
     assert!(most > 1_200 && acted > 3_000 && opened > 50, "{most} {acted} {opened}");
 }
 

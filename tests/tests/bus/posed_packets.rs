@@ -4,7 +4,7 @@
 
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::guard::{GuardLimits, Posed, Surface};
-use dibs_nostd::wire::{AesCmac, Encoding, Event, FrameEncoder, FrameId, NoMac};
+use dibs_nostd::wire::{AesCmac, Content, Encoding, Event, FrameEncoder, FrameId, NoMac};
 use dibs_nostd::{
     Advance, Millis, PoseError, Progress, ReceiveError, RigidPose, Sphere, StretchError, TreeBytes,
 };
@@ -280,6 +280,12 @@ fn partial_frames_and_fast_ones() {
     let mut without = partial(&line, 7, 6, Some(pose(54.0)));
     without.remove(1);
     assert_eq!(line.give(&without, 7 * PERIOD), (None, false));
+    // A commit in the pose's place, whose digest is the begin's alone.
+    let [begin, _, commit] = &partial(&line, 8, 6, Some(pose(54.0)))[..] else { panic!("three") };
+    let early = edited(commit, SEQUENCE, &[1, 0]);
+    let early = edited(&early, BODY, &contribution(begin).to_le_bytes());
+    let refused = line.give(&[begin.clone(), early], 8 * PERIOD);
+    assert_eq!(refused, (Some(ReceiveError::Order { sequence: 1 }), false));
 }
 
 /// A receiver whose surface has no poses refuses such a frame at its begin. One with a key takes no pose without its tag.
@@ -365,4 +371,9 @@ fn a_sender_sends_poses() {
         }
     }
     assert!(partial > 5, "{partial}");
+    // A frame without one is where the mesh's file has it, and not where the last one was.
+    let sent = sender.send(&heart.mesh.positions).expect("sent");
+    assert_eq!(sent.content, Content::Whole);
+    let sent = sender.send(&heart.mesh.positions).expect("sent");
+    assert!(matches!(sent.content, Content::Partial { .. }), "{:?}", sent.content);
 }

@@ -79,7 +79,7 @@ static void start(const unsigned char *bytes, size_t length) {
     EXPECT(NULL, dibs_guard_acknowledge(NULL));
 
     dibs_contacts *list = NULL;
-    dibs_contacts_facts facts;
+    dibs_contacts_facts listed;
     EXPECT(NULL, dibs_guard_contacts(guard, &tool, 5.0f, 0, NULL, &answer));
     EXPECT(OK, dibs_contacts_init(contacts_memory, sizeof contacts_memory, &list));
     EXPECT(NULL, dibs_guard_contacts(NULL, &tool, 5.0f, 0, list, &answer));
@@ -88,8 +88,8 @@ static void start(const unsigned char *bytes, size_t length) {
     for (int without = 0; without < 2; without++) {
         EXPECT(OK, dibs_guard_contacts(guard, without ? NULL : &tool, 5.0f, 0, list, &answer));
         EXPECT(NO_SURFACE, answer.outcome);
-        EXPECT(OK, dibs_contacts_get_facts(list, &facts));
-        EXPECT_THAT(facts.count == 0 && facts.bound == -INFINITY);
+        EXPECT(OK, dibs_contacts_get_facts(list, &listed));
+        EXPECT_THAT(listed.count == 0 && listed.bound == -INFINITY);
     }
 
     const dibs_filter filter = dibs_filter_of(1.0f, 200.0f);

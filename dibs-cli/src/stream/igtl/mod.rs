@@ -61,7 +61,7 @@ struct Known {
     delay: Duration,
 }
 
-/// Bytes of the largest message with poses: of a thousand instruments.
+/// Bytes of the largest message with poses: of more than a thousand instruments.
 const MOST_POSES: u64 = 1 << 17;
 
 /// A message that is refused.
@@ -231,11 +231,11 @@ impl Igtl {
         let device = self.pose_device.as_deref().unwrap_or_default();
         let read = kind.read(content, device).map_err(|error| match error {
             PoseError::Layout => {
-                (Cause::Layout, "is not as the protocol has it: a list ends early".to_owned())
+                (Cause::Layout, "has not the bytes that its type has".to_owned())
             }
             PoseError::NoRotation => {
                 let why =
-                    "its matrix or quaternion is no rotation: a pose neither scales nor mirrors";
+                    "its matrix or quaternion is no rotation, or a number is not finite: a pose neither scales nor mirrors";
                 (Cause::Pose, why.to_owned())
             }
         })?;

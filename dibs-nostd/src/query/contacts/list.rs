@@ -12,8 +12,6 @@ pub(super) struct List<const N: usize> {
     pub list: Vec<Contact, N>,
     pub bound: f32,
     pub accuracy: f32,
-    /// How far (mm) the surface may be from the one that was searched, where somebody else knows that.
-    pub off: f32,
     pub is_full: bool,
     /// The margin that was asked for.
     pub margin: f32,
@@ -29,7 +27,6 @@ impl<const N: usize> List<N> {
             list: Vec::new(),
             bound: f32::NEG_INFINITY,
             accuracy: 0.0,
-            off: 0.0,
             is_full: false,
             margin: f32::NEG_INFINITY,
             is_open: true,
@@ -42,7 +39,6 @@ impl<const N: usize> List<N> {
         self.list.clear();
         self.bound = f32::NEG_INFINITY;
         self.accuracy = 0.0;
-        self.off = 0.0;
         self.is_full = false;
         self.margin = f32::NEG_INFINITY;
         self.is_open = true;

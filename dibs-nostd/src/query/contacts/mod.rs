@@ -13,7 +13,7 @@ use glam::Vec3;
 
 use super::{Options, Proximity, Query, Side};
 #[cfg(all(feature = "bus", feature = "control"))]
-use crate::math::round::sum_up;
+use crate::math::round::{sum_down, sum_up};
 use crate::unavailable::{QueryError, Unavailable};
 use crate::{Index, Tool, TriangleRow, VertexTable};
 use across::Across;
@@ -84,7 +84,7 @@ impl Contact {
 /// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
 /// contact, and some with no lower vertex next to theirs, at most half of `NEAR`.
 ///
-/// RAM on a 32-bit processor: 152 bytes for each of the `N`, 20 for each of the `NEAR`, and 32.
+/// RAM on a 32-bit processor: 152 bytes for each of the `N`, 20 for each of the `NEAR`, and 28.
 ///
 /// Make it once, in a `static` or at start-up, and use it at every tick.
 ///
@@ -188,8 +188,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin; [`QueryError::Margin`] if the
     /// query's margin was less.
     pub fn within(&self, margin: f32) -> Result<ContactIter<'_>, Unavailable> {
-        let List { bound, is_open, has_no_side, accuracy, off, .. } = self.found;
-        let is_complete = bound >= sum_up(margin, off);
+        let List { bound, is_open, has_no_side, accuracy, .. } = self.found;
+        let is_complete = bound >= margin;
         if is_open && !is_complete {
             return Err(Unavailable::CutShort);
         }
@@ -224,8 +224,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
     }
 
-    /// Every contact whose separation is below this (mm) is in the list. It is the margin, unless the list or `NEAR`
-    /// was too short or the budget ran out; negative infinity if it ran out before the side was known.
+    /// Every contact whose separation is below this (mm) is in the list. It is the margin or a little more, unless the list or
+    /// `NEAR` was too short or the budget ran out; negative infinity if it ran out before the side was known.
     #[must_use]
     pub const fn bound(&self) -> f32 {
         self.found.bound
@@ -295,11 +295,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
     }
 
-    /// Widens the accuracy by a further error (mm) of the surface, which is `off` from the one that was searched by all.
+    /// Widens the accuracy by a further error (mm) of the surface, and lowers the bound by all that the surface may be off from the
+    /// one that was searched.
     #[cfg(all(feature = "bus", feature = "control"))]
     pub(crate) fn widen(&mut self, error: f32, off: f32) {
         self.found.accuracy = sum_up(self.found.accuracy, error);
-        self.found.off = off;
+        self.found.bound = sum_down(self.found.bound, -off);
     }
 }
 

@@ -99,9 +99,9 @@ impl PoseStep {
     /// In halves of a unit: the quaternion of the step is off by 11 at most, so that beyond by 22, which turn by 44; the
     /// product with the last one turns by 16 more. The centre's displacement is off by 46 of its arm, so by 92 beyond, and
     /// what the turn adds to the arm by 30. The shift's sums are rounded, too; and the inverse, as for a pose that came so.
-    pub(crate) fn rounding(&self, local: Vec3, pose: &RigidPose) -> f32 {
-        let turned = self.rounding_of_vector(local, pose);
-        if *pose == self.after {
+    pub(crate) fn rounding(&self, local: Vec3, pose: &RigidPose, part: f32) -> f32 {
+        let turned = self.rounding_of_vector(local, part);
+        if part == 0.0 {
             return turned;
         }
         let parts = 168.0 * size(self.centre) + 4.0 * (size(pose.shift) + size(self.shifted));
@@ -109,8 +109,8 @@ impl PoseStep {
     }
 
     /// The same of a vector, which the shift leaves as it is.
-    pub(crate) fn rounding_of_vector(&self, local: Vec3, pose: &RigidPose) -> f32 {
-        if *pose == self.after {
+    pub(crate) fn rounding_of_vector(&self, local: Vec3, part: f32) -> f32 {
+        if part == 0.0 {
             return RigidPose::rounding(local);
         }
         size(local) * (100.0 * HALF_UNIT)

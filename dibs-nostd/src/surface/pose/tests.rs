@@ -145,7 +145,7 @@ fn a_point_in_the_mesh_is_off_by_no_more_than_its_rounding() {
         let step = PoseStep::between(&case.before, &case.after, case.centre)?;
         let pose = step.beyond(case.part);
         let (off, local) = off(case, case.exact(), &pose);
-        Some(off / f64::from(step.rounding(local, &pose)))
+        Some(off / f64::from(step.rounding(local, &pose, case.part)))
     });
     println!("off by {most} and {beyond} of the bounds");
     assert!(most > 0.02 && beyond > 0.02);

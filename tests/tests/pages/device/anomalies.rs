@@ -62,41 +62,11 @@ pub const ANOMALIES: &[Anomaly] = &[
     ),
     anomaly(
         "K-07",
-        "`ContactIter::is_complete` compares the margin alone, without the answer's accuracy: a wall that is farther than the \
-         margin by less than the accuracy may be missing from a complete list.",
+        "Of the list of a query or a tracker, `ContactIter::is_complete` compares the margin alone, without the answer's accuracy: a \
+         wall that is farther than the margin by less than the accuracy may be missing from a complete list. A guard's list counts \
+         how far its surface may be off.",
         "Ask with a margin larger by the accuracy.",
         "dibs-nostd/src/query/contacts/mod.rs",
-    ),
-    anomaly(
-        "K-08",
-        "The accuracy of an answer with a pose leaves out the rounding of the moved tool's ends: 6 units of 2^-24 of their distance.",
-        "Keep the mesh's origin near the mesh.",
-        "dibs-nostd/src/surface/pose.rs",
-    ),
-    anomaly(
-        "K-09",
-        "`Guard::admit` does not count the rounding of a motion to the mesh and back: 2e-4 mm at 3 m.",
-        "A stand-off larger by that.",
-        "dibs-nostd/src/guard/posed.rs",
-    ),
-    anomaly(
-        "K-10",
-        "Where captures go back within the jitter of a clock, the residual of a pose and that of its rows are of two times.",
-        "Captures that go forward.",
-        "dibs-nostd/src/guard/posed.rs",
-    ),
-    anomaly(
-        "K-11",
-        "The poses of frames are not under the model checker that tries every interleaving; the rows are.",
-        "None.",
-        "dibs-nostd/src/guard/posed.rs",
-    ),
-    anomaly(
-        "K-12",
-        "Packets carry no pose, and the C and Python interfaces have neither poses nor a guard's contacts. A guard gives no \
-         contacts of frames with poses.",
-        "`Bus::frame_at` in Rust.",
-        "dibs-nostd/src/guard/posed.rs",
     ),
     anomaly(
         "K-13",

@@ -35,15 +35,15 @@ pub const ASSUMPTIONS: &[Assumption] = &[
     by(
         "U-01",
         "The surface keeps to the stretch limit of its tree.",
-        "stretch/monitor.rs",
-        "advance",
+        "stretch/rows.rs",
+        "exceeded",
         "StretchError::Exceeded",
     ),
     by(
         "U-02",
         "Elements that carry a surface are not inverted.",
-        "nodes/monitor.rs",
-        "advance",
+        "nodes/measure.rs",
+        "measure",
         "StretchError::Inverted",
     ),
     by(
@@ -158,8 +158,8 @@ pub const ASSUMPTIONS: &[Assumption] = &[
     by(
         "U-21",
         "The receiver's clock goes on, with any start; one that goes back makes a surface old.",
-        "time.rs",
-        "since",
+        "surface/latest.rs",
+        "within",
         "Unavailable::Stale",
     ),
     yours(

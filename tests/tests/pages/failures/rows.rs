@@ -38,9 +38,14 @@ const START: &[Gives] = &[
     ("StretchError", Only(&["NoMetric", "Corrupt"])),
 ];
 /// Of a packet, and of bytes that become packets.
-const PACKET: &[Gives] = &[("ReceiveError", But(&["Pose", "Stretch"])), ("PacketError", All)];
-const BYTES: &[Gives] =
-    &[("ReceiveError", But(&["Pose", "Stretch"])), ("PacketError", All), ("StreamError", All)];
+const PACKET: &[Gives] =
+    &[("ReceiveError", But(&["Stretch"])), ("PacketError", All), ("PoseError", All)];
+const BYTES: &[Gives] = &[
+    ("ReceiveError", But(&["Stretch"])),
+    ("PacketError", All),
+    ("PoseError", All),
+    ("StreamError", All),
+];
 /// Of a frame of this process: the rest are defects of packets.
 const FRAME: &[Gives] =
     &[("ReceiveError", Only(&["RowCount", "NotFinite", "TooFar", "TooOld", "Earlier", "Busy"]))];
@@ -99,7 +104,7 @@ pub const CALLS: &[Call] = &[
     call("Surface::start_with_contacts", "As `start`.", START, SPLIT),
     call(
         "Bus::receive",
-        "Bytes are lost, damaged, forged, repeated, late, in another order, or of another surface. Nothing is returned: \
+        "Bytes are lost, damaged, forged, repeated, late, in another order, or of another surface; a pose is none. Nothing is returned: \
          `counters` has each cause.",
         BYTES,
         PUBLISHED,
@@ -112,7 +117,7 @@ pub const CALLS: &[Call] = &[
     ),
     call(
         "Bus::packet",
-        "The packet is damaged, forged, repeated, late, in another order, or of another surface.",
+        "The packet is damaged, forged, repeated, late, in another order, or of another surface; its pose is none.",
         PACKET,
         PUBLISHED,
     ),
