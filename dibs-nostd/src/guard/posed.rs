@@ -176,7 +176,8 @@ impl Placed {
         tool.with_axis(self.ends(tool))
     }
 
-    /// Its end is where its span leads from its start: so the rounding does not grow with the way to the world's origin.
+    /// The end is the start plus the turned span, so that the span's rounding does not grow with the distance from the world's
+    /// origin.
     fn ends(&self, tool: &impl Tool) -> [Vec3; 2] {
         let start = self.pose.apply_inverse(tool.axis_start());
         [start, start + self.pose.rotate_inverse(tool.axis_span())]

@@ -165,11 +165,18 @@ impl Collector {
     }
 
     /// The numbers that a fail-safe machine watches.
+    ///
+    /// A complete frame counts from before its publication, where it is the worse: a control tick that interrupts the bus
+    /// right after it reads the new surface beside the numbers noted before.
     pub fn health(&self) -> BusHealth {
-        let (transit, source_age) = match &self.published {
+        let (mut transit, mut source_age) = match &self.published {
             Some(published) => (published.transit, Millis(published.source_age.into())),
             None => (Millis::MAX, Millis::MAX),
         };
+        if let Some(frame) = self.frame.as_ref().filter(|frame| frame.is_complete) {
+            transit = transit.max(frame.transit());
+            source_age = source_age.max(Millis(frame.begin.freshness.age_ms.into()));
+        }
         let (rejections, forgeries) = self.trouble.counts(self.now);
         BusHealth {
             packet: self.packet,
@@ -397,17 +404,13 @@ impl Collector {
             Some(Err(Millis(by))) => by as u16,
             _ => 0,
         };
-        let freshness = frame.begin.freshness;
-        // An echo from the future comes from another run of this receiver.
-        let transit = freshness.echo.map(|echo| elapsed(frame.received, Millis(echo)));
-        let transit = transit.filter(|transit| transit.0 <= i32::MAX as u32);
         self.trouble.note_published(self.published.is_none());
         self.published = Some(Published {
             id: frame.id,
             captured: frame.captured(),
             back,
-            source_age: freshness.age_ms,
-            transit: transit.unwrap_or(Millis::MAX),
+            source_age: frame.begin.freshness.age_ms,
+            transit: frame.transit(),
             oldest: Millis(0),
         });
         // The published session is the sender's: a heartbeat of another one was stray.
@@ -482,6 +485,13 @@ impl Frame {
     /// The receiver's clock at the surface's capture, if the begin had no transit.
     pub fn captured(&self) -> Millis {
         self.received.before(Millis(self.begin.freshness.age_ms.into()))
+    }
+
+    /// The time from the status that the begin echoes to its arrival; [`Millis::MAX`] without an echo.
+    fn transit(&self) -> Millis {
+        let transit = self.begin.freshness.echo.map(|echo| elapsed(self.received, Millis(echo)));
+        // An echo from the future comes from another run of this receiver.
+        transit.filter(|transit| transit.0 <= i32::MAX as u32).unwrap_or(Millis::MAX)
     }
 
     /// The position of rows; `None` for a repeated packet.

@@ -29,9 +29,10 @@ pub struct BusHealth {
     /// then the sender did not know the receiver's challenge. Later ones leave it.
     pub forgeries: u32,
     /// Time from the status that the published frame echoes to the arrival of its begin packet: an upper bound on the
-    /// latency of each. [`Millis::MAX`] where it echoes none.
+    /// latency of each. [`Millis::MAX`] where it echoes none. From the moment at which the next frame is complete, the
+    /// greater of both.
     pub transit: Millis,
-    /// Age of the published frame when it was sent, as the sender stated it.
+    /// Age of the published frame when it was sent, as the sender stated it. As with the transit, the greater of both.
     pub source_age: Millis,
 }
 

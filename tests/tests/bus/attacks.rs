@@ -164,6 +164,36 @@ fn delay_shows_whoever_is_delayed() {
     }
 }
 
+/// A control tick may interrupt the bus between a frame's publication and the note of its delay: the delay counts before.
+#[test]
+fn the_worse_delay_counts_from_before_the_publication() {
+    let (mut assembler, _reader) = guarded(mac());
+    let delays = |assembler: &Assembler<'_, _, _>| {
+        let health = assembler.health();
+        [health.transit.0, health.source_age.0]
+    };
+    assert_eq!(delays(&assembler), [u32::MAX; 2], "nothing was published");
+    let mut shown = [u32::MAX; 2];
+    // Each frame's transit and age, one of them better or worse than before.
+    for (epoch, stated) in (1..).zip([[20, 3], [60, 1], [10, 40], [5, 4]]) {
+        let [transit, age_ms] = stated;
+        let now = 1_000 * epoch;
+        let freshness = Freshness { age_ms: age_ms as u16, echo: Some(now - transit) };
+        let packets = tagged(id(epoch), &surface(epoch), freshness);
+        let (last, first) = packets.split_last().unwrap();
+        for packet in first {
+            assembler.accept(packet, Millis(now)).unwrap();
+            assert_eq!(delays(&assembler), shown, "an incomplete frame may never be published");
+        }
+        assembler.accept(last, Millis(now)).unwrap();
+        let worse = [shown[0].max(transit), shown[1].max(age_ms)];
+        assert_eq!(delays(&assembler), worse, "frame {epoch}");
+        assert!(work(&mut assembler).is_some());
+        shown = stated;
+        assert_eq!(delays(&assembler), shown, "frame {epoch}");
+    }
+}
+
 /// The source repeats its last frame, while its sender goes on sending.
 #[test]
 fn a_frozen_source_grows_old() {
