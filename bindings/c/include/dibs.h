@@ -2426,8 +2426,8 @@ dibs_code dibs_frame_init(void *storage, size_t size, dibs_frame **frame);
  * Makes the frame one of these vertices. Its stretch is not measured: queries take the tree's limit.
  *
  * @param frame           The frame; one that a reader holds is released first.
- * @param positions       x, y and z (mm) of each vertex, in the tree's order of rows. Not copied: unchanged until the
- *                        frame is given other vertices or released.
+ * @param positions       x, y and z (mm) of each vertex, in the tree's order of rows, not that of the mesh's file:
+ *                        `dibs_tree_to_rows`. Not copied: unchanged until the frame is given other vertices or released.
  * @param vertices        Their number.
  * @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
  *                        every answer.
@@ -2463,8 +2463,8 @@ dibs_code dibs_frame_set_nodes(dibs_frame *frame,
  * Cost: linear in the triangles.
  *
  * @param stretch  Receives the largest stretch, 1 for none; or null.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, `DIBS_CODE_NO_SURFACE` of an
- *         empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, vertices in the file's order
+ *         among them, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
  */
 dibs_code dibs_frame_measure(dibs_frame *frame,
                              dibs_tree *tree,
@@ -3099,6 +3099,27 @@ dibs_code dibs_tree_get_facts(dibs_tree *tree, dibs_tree_facts *facts);
 dibs_code dibs_tree_rest_position(dibs_tree *tree,
                                   uint32_t row,
                                   dibs_vec3 *position);
+
+/**
+ * Brings positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows, which
+ * frames take. A frame in the file's order gives wrong distances without an error, unless it is measured.
+ *
+ * Cost: linear in the vertices.
+ *
+ * @param tree    The tree.
+ * @param values  x, y and z of each vertex of the mesh's file, in that file's order.
+ * @param count   Their number: `file_vertices` of the tree's facts.
+ * @param rows    Receives x, y and z of each row. Must not overlap `values`.
+ * @param room    Rows that fit there: at least `vertices` of the tree's facts.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` of another number than the file's; `DIBS_CODE_CAPACITY` of too little room;
+ *         `DIBS_CODE_ARGUMENT` where the tree was built without its vertex order, or where nodes carry the surface: their order
+ *         is the volume's; or a misuse.
+ */
+dibs_code dibs_tree_to_rows(dibs_tree *tree,
+                            const float *values,
+                            uint32_t count,
+                            float *rows,
+                            uint32_t room);
 
 /**
  * Label of the triangle in a row, say of its tissue.

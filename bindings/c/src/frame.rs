@@ -167,8 +167,8 @@ pub extern "C" fn dibs_frame_init(
 /// Makes the frame one of these vertices. Its stretch is not measured: queries take the tree's limit.
 ///
 /// @param frame           The frame; one that a reader holds is released first.
-/// @param positions       x, y and z (mm) of each vertex, in the tree's order of rows. Not copied: unchanged until the
-///                        frame is given other vertices or released.
+/// @param positions       x, y and z (mm) of each vertex, in the tree's order of rows, not that of the mesh's file:
+///                        `dibs_tree_to_rows`. Not copied: unchanged until the frame is given other vertices or released.
 /// @param vertices        Their number.
 /// @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
 ///                        every answer.
@@ -238,8 +238,8 @@ pub(crate) fn rows(positions: *const f32, count: u32) -> Result<&'static [[f32; 
 /// Cost: linear in the triangles.
 ///
 /// @param stretch  Receives the largest stretch, 1 for none; or null.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, `DIBS_CODE_NO_SURFACE` of an
-///         empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, vertices in the file's order
+///         among them, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_measure(
     frame: *mut dibs_frame,

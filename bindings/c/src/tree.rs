@@ -8,6 +8,7 @@ use dibs_nostd::{PathKind, Scrub, Tree, TriangleRow};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
+use crate::frame::rows;
 use crate::tool::dibs_vec3;
 
 /// Bytes of a tree's storage.
@@ -134,6 +135,49 @@ pub extern "C" fn dibs_tree_rest_position(
     dibs_code::of(|| {
         let (position, tree) = (position.check()?, &tree.share()?.tree);
         position.set(tree.rest_position(row).ok_or(dibs_code::TreeNoRestShape)?.into());
+        Ok(())
+    })
+}
+
+/// Brings positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows, which
+/// frames take. A frame in the file's order gives wrong distances without an error, unless it is measured.
+///
+/// Cost: linear in the vertices.
+///
+/// @param tree    The tree.
+/// @param values  x, y and z of each vertex of the mesh's file, in that file's order.
+/// @param count   Their number: `file_vertices` of the tree's facts.
+/// @param rows    Receives x, y and z of each row. Must not overlap `values`.
+/// @param room    Rows that fit there: at least `vertices` of the tree's facts.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` of another number than the file's; `DIBS_CODE_CAPACITY` of too little room;
+///         `DIBS_CODE_ARGUMENT` where the tree was built without its vertex order, or where nodes carry the surface: their order
+///         is the volume's; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tree_to_rows(
+    tree: *mut dibs_tree,
+    values: *const f32,
+    count: u32,
+    rows: *mut f32,
+    room: u32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (tree, values) = (tree.share()?, self::rows(values, count)?);
+        let mut places = rows.places((room as usize).checked_mul(3).ok_or(dibs_code::Argument)?)?;
+        let dibs_tree { tree, nodes, .. } = tree;
+        if nodes.is_some() {
+            return Err(dibs_code::Argument);
+        }
+        if count != tree.file_vertex_count() {
+            return Err(dibs_code::VertexCount);
+        }
+        if room < tree.vertex_count() {
+            return Err(dibs_code::Capacity);
+        }
+        for row in 0..tree.vertex_count() {
+            let number = tree.vertex_number(row).ok_or(dibs_code::Argument)?;
+            let value = values.get(number.0 as usize).ok_or(dibs_code::VertexCount)?;
+            value.iter().try_for_each(|&value| places.push(value))?;
+        }
         Ok(())
     })
 }

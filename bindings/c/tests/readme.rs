@@ -1,20 +1,96 @@
-//! The README's programs compile.
+//! The README's programs compile, and its first one gives the right answer.
 
 // Requirements: P-06, P-11
 
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
-use crate::programs::{include, run, tool};
+use dibs_build::{Builder, Mesh, generate};
+use dibs_nostd::glam::Vec3;
+use dibs_nostd::{Interval, Options, Query, Sphere, Tree, measure_stretch};
+
+use crate::programs::{include, library, run, tool};
+
+/// Reads a tree and positions in the file's order, and asks the README's function about a sphere.
+const MAIN: &str = r#"
+#include "expect.h"
+int main(int argc, char **argv) {
+    size_t length, size;
+    const unsigned char *tree = read_file(argv[argc - 2], &length);
+    float *positions = (float *)(void *)read_file(argv[argc - 1], &size);
+    const dibs_tool sphere = {{90, 10, 20}, {90, 10, 20}, 5};
+    EXPECT(OK, distance(tree, length, positions, size / 12, &sphere));
+    EXPECT(VERTEX_COUNT, distance(tree, length, positions, size / 12 - 1, &sphere));
+    /* Positions in an order that is not the rows'. */
+    float *other = malloc(size);
+    for (size_t at = 0; at < size / 4; at++) other[at] = positions[(at + 3) % (size / 4)];
+    EXPECT(STRETCH_EXCEEDED, distance(tree, length, other, size / 12, &sphere));
+    free(other);
+    free(positions);
+    return summary();
+}
+"#;
+
+/// The README's programs.
+fn programs() -> Vec<String> {
+    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    let readme = fs::read_to_string(readme).expect("the README");
+    let blocks = readme.split("```c\n").skip(1).filter_map(|block| block.split("```").next());
+    blocks.map(str::to_owned).collect()
+}
+
+#[test]
+fn the_first_program_gives_the_right_answer() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let heart = generate::heart(1_000).expect("a size").mesh;
+    // No vertex is where the builder puts it, and one is of no triangle.
+    let count = heart.positions.len() as u32;
+    let turned = |vertex: u32| (vertex * 7 + 3) % count;
+    assert_ne!(count % 7, 0, "each number once");
+    let mut mesh: Mesh = heart.clone();
+    for (vertex, at) in (0..).zip(&heart.positions) {
+        mesh.positions[turned(vertex) as usize] = *at;
+    }
+    mesh.triangles = heart.triangles.iter().map(|corners| corners.map(turned)).collect();
+    mesh.positions.push(heart.positions[0]);
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+    let moved: Vec<Vec3> = mesh.positions.iter().map(|&at| at * 1.1).collect();
+
+    let tree = Tree::<u16>::from_bytes(built.blob()).expect("a tree");
+    let rows = built.to_rows(&moved);
+    let stretch = measure_stretch(&tree, rows.as_slice()).expect("within the limit");
+    let mut query = Query::<u16, 512>::new(&tree).expect("a stack");
+    let sphere = Sphere::new(Vec3::new(90.0, 10.0, 20.0), 5.0).expect("a tool");
+    let options = Options::new().stretch(stretch);
+    let found = query.closest(rows.as_slice(), &sphere, &options).expect("an answer");
+    let Interval { lower, upper, .. } = found.interval();
+    let expected = format!(
+        "{:.4} mm from the tool's surface, in truth {lower:.4} to {upper:.4}",
+        found.separation
+    );
+
+    let [tree, positions, source, program] =
+        ["tree", "positions", "first.c", "first"].map(|name| folder.path().join(name));
+    fs::write(&tree, built.blob()).expect("writable");
+    let floats = moved.iter().flat_map(Vec3::to_array);
+    fs::write(&positions, floats.flat_map(f32::to_le_bytes).collect::<Vec<u8>>())
+        .expect("writable");
+    fs::write(&source, programs()[0].clone() + MAIN).expect("writable");
+    let mut gcc = tool("gcc", "gcc");
+    gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror"]);
+    gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
+    gcc.arg("-I").arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs")).arg(&source);
+    run(gcc.arg(library()).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
+    let said = run(Command::new(program).arg(tree).arg(positions));
+    assert_eq!(said.lines().collect::<Vec<_>>(), [expected.as_str(), "3 checks, 0 failures"]);
+}
 
 /// One after the other, without a warning.
 #[test]
 fn the_readme_compiles() {
     let folder = tempfile::tempdir().expect("a folder");
-    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
-    let readme = fs::read_to_string(readme).expect("the README");
-    let blocks = readme.split("```c\n").skip(1).filter_map(|block| block.split("```").next());
-    let blocks: Vec<_> = blocks.collect();
+    let blocks = programs();
     assert!(blocks.len() >= 3, "{} programs", blocks.len());
     let source = folder.path().join("readme.c");
     fs::write(&source, blocks.concat()).expect("writable");
