@@ -2,7 +2,7 @@
  * Runs WallController without ROS: 1,000 ticks a second of simulated time, a tool that approaches the surface, and a stream
  * that falls silent. bindings/c/tests/ros2.rs runs it.
  *
- *     alone TREE PACKETS VERTICES
+ *     alone TREE PACKETS
  *
  * PACKETS  frames, one 33 ms after the other: each is the number of its packets, and each packet its length and its bytes;
  *          numbers are little-endian u32
@@ -30,35 +30,40 @@ void must(dibs_code code) {
     }
 }
 
-std::uint32_t number(std::span<const std::uint8_t> &from) {
+std::uint32_t number(const std::uint8_t *&from) {
     std::uint32_t number = 0;
-    std::memcpy(&number, from.data(), sizeof number);
-    from = from.subspan(sizeof number);
+    std::memcpy(&number, from, sizeof number);
+    from += sizeof number;
     return number;
 }
 
 } // namespace
 
 int main(int argc, char **argv) {
-    if (argc != 4) {
+    if (argc != 3) {
         return EXIT_FAILURE;
     }
     const auto tree = read(argv[1]), stream = read(argv[2]);
     dibs_guard_limits limits = dibs_guard_limits_of(300.0f, 80);
     limits.without_transit = 1;
-    const dibs_wall wall = {.stiffness = 1.0f, .damping = 0.002f, .hold_damping = 0.001f, .max_force = 5.0f, .margin = 5.0f};
+    dibs_wall wall{};
+    wall.stiffness = 1.0f;
+    wall.damping = 0.002f;
+    wall.hold_damping = 0.001f;
+    wall.max_force = 5.0f;
+    wall.margin = 5.0f;
     WallController controller;
-    must(controller.configure(tree, static_cast<std::uint32_t>(std::atoi(argv[3])), limits, wall));
+    must(controller.configure(tree, limits, wall));
 
-    std::span<const std::uint8_t> rest(stream);
+    const std::uint8_t *rest = stream.data(), *const end = rest + stream.size();
     std::uint32_t states[4] = {}, statuses = 0;
     float largest = 0.0f;
     for (std::uint32_t now = 1000; now < 5000; now++) {
-        if (now % 33 == 0 && !rest.empty()) {
+        if (now % 33 == 0 && rest != end) {
             for (std::uint32_t packets = number(rest); packets > 0; packets--) {
                 const std::uint32_t length = number(rest);
-                statuses += !controller.receive(rest.first(length), now).empty();
-                rest = rest.subspan(length);
+                statuses += controller.receive({rest, length}, now).size() > 0;
+                rest += length;
             }
         }
         const float x = 52.0f + (now < 4000 ? 0.05f * static_cast<float>(4000 - now) : 0.0f); /* mm: 50 mm/s */

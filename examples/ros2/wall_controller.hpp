@@ -10,42 +10,34 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
-#include <new>
-#include <span>
+#include <utility>
 #include <vector>
 
 class WallController {
 public:
-    /** `tree` are the bytes of `dibs build`; `vertices` as `dibs inspect` prints them; `limits` of the tissue. */
-    dibs::Code configure(std::span<const std::uint8_t> tree, std::uint32_t vertices, const dibs_guard_limits &limits,
-                         const dibs_wall &of_wall) {
-        /* Until it succeeds, packets and ticks have an error, and the force is the hold. */
-        bus = nullptr;
-        guard = nullptr;
-        bytes.assign(tree.begin(), tree.end());
-        const std::size_t size = DIBS_START_SIZE(std::size_t{vertices});
-        memory.reset(new (std::align_val_t{DIBS_ALIGNMENT}) std::uint8_t[size]);
+    /** `tree` are the bytes of `dibs build`; `limits` of the tissue. Until it succeeds the force is the hold. */
+    dibs::Code configure(std::vector<std::uint8_t> tree, const dibs_guard_limits &limits, const dibs_wall &of_wall) {
+        bytes = std::move(tree);
         wall = of_wall;
-        return dibs_start(memory.get(), size, bytes.data(), bytes.size(), &limits, &bus, &guard);
+        return loop.init(bytes, limits);
     }
 
     /** A datagram of `dibs stream` or of surface_node.py, at a time in ms. Returns the status to send back, which may be empty. */
-    std::span<const std::uint8_t> receive(std::span<const std::uint8_t> packet, std::uint32_t now) {
+    dibs::Span<const std::uint8_t> receive(dibs::Span<const std::uint8_t> packet, std::uint32_t now) {
         /* What is wrong with a packet or a frame is counted, and the surface published last stays. */
-        dibs_bus_packet(bus, packet.data(), packet.size(), now, nullptr);
+        loop.bus.packet(packet, now);
         dibs_advance advance = DIBS_ADVANCE_PENDING;
-        while (dibs_bus_work(bus, 1000, &advance) == DIBS_CODE_OK && advance == DIBS_ADVANCE_PENDING) {}
+        while (loop.bus.work(1000, &advance) == DIBS_CODE_OK && advance == DIBS_ADVANCE_PENDING) {}
         std::size_t length = 0;
-        dibs_bus_status(bus, now, 0, status.data(), status.size(), &length);
-        return std::span(status).first(length);
+        dibs_bus_status(loop.bus, now, 0, status.data(), status.size(), &length);
+        return {status.data(), length};
     }
 
     /** The tool of this tick, and the force on it. After any error the force is the hold. */
     dibs::Code update(const dibs_tool &tool, std::uint32_t now, dibs_force &force) {
         force = {};
         force.state = DIBS_FORCE_STATE_SAFE;
-        const dibs::Code code = dibs_guard_closest(guard, &tool, now, &answer);
+        const dibs::Code code = loop.guard.closest(tool, now, answer);
         return code == DIBS_CODE_OK ? dibs_answer_force(&answer, &wall, &force) : code;
     }
 
@@ -56,17 +48,12 @@ public:
     bool waits() const { return answer.trust.waits_for_acknowledgement != 0; }
 
     /** An operator's acknowledgement: between two ticks, of the same thread. */
-    dibs::Code acknowledge() { return dibs_guard_acknowledge(guard); }
+    dibs::Code acknowledge() { return loop.guard.acknowledge(); }
 
 private:
-    struct Free {
-        void operator()(std::uint8_t *at) const { ::operator delete[](at, std::align_val_t{DIBS_ALIGNMENT}); }
-    };
     std::vector<std::uint8_t> bytes;
-    std::unique_ptr<std::uint8_t[], Free> memory;
+    dibs::Loop loop;
     std::array<std::uint8_t, DIBS_STATUS> status{};
     dibs_wall wall{};
     dibs_answer answer{};
-    dibs_bus *bus = nullptr;
-    dibs_guard *guard = nullptr;
 };

@@ -998,7 +998,8 @@ typedef struct dibs_surface dibs_surface;
 typedef struct dibs_tracker dibs_tracker;
 
 /**
- * A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices.
+ * A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices; the library of
+ * `cargo build -p dibs-c --features large` takes larger trees in place of these.
  *
  * Any number of contexts may use it at once.
  */

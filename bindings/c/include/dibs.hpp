@@ -1,22 +1,43 @@
 /**
  * @file
- * dibs for C++20: objects that own their storage, spans in place of pointers, no exceptions. Every call returns a code.
+ * dibs for C++17: objects that own their storage, spans in place of pointers, no exceptions. Every call returns a code.
  * `init` makes an object of what its function in `dibs.h` takes after the storage. Objects convert to those of `dibs.h`,
  * for its other functions, and do not move: the library keeps their addresses.
  */
 #pragma once
-#include <span>
+#include <iterator>
+#include <new>
 #include <string_view>
+#include <type_traits>
 #include "dibs.h"
 
 namespace dibs {
 using Code = dibs_code;
 using Options = const dibs_options *;
-using Tools = std::span<const dibs_tool>;
+/** Elements side by side in somebody's memory: of a vector, an array, `std::span`, or an address and a number. */
+template <class T> class Span {
+    T *first_element = nullptr;
+    size_t count = 0;
+public:
+    constexpr Span() = default;
+    constexpr Span(T *first, size_t count) : first_element(first), count(count) {}
+    /** Of a container that outlives it. */
+    template <class C, class U = std::remove_pointer_t<decltype(std::data(std::declval<C &>()))>,
+              class = std::enable_if_t<std::is_convertible_v<U (*)[], T (*)[]>>>
+    constexpr Span(C &&of) : first_element(std::data(of)), count(std::size(of)) {}
+    constexpr T *data() const { return first_element; }
+    constexpr size_t size() const { return count; }
+    constexpr T *begin() const { return first_element; }
+    constexpr T *end() const { return first_element + count; }
+    constexpr T &operator[](size_t at) const { return first_element[at]; }
+};
+using Tools = Span<const dibs_tool>;
 /** One sentence about a code. */
 inline std::string_view text(Code code) { return dibs_code_text(code); }
 /** The length of both spans; 0, which every call refuses, if they differ. */
-inline uint32_t common(auto one, auto other) { return one.size() == other.size() ? uint32_t(one.size()) : 0; }
+template <class One, class Other> uint32_t common(One one, Other other) {
+    return one.size() == other.size() ? uint32_t(one.size()) : 0;
+}
 
 /** Storage of an object, and its address: null before it is made, which every call reports. */
 template <class T, size_t Size, auto Make, auto... First> class Object {
@@ -26,32 +47,32 @@ public:
     /** Deletes every move and copy. */
     Object &operator=(Object &&) = delete;
     operator T *() const { return object; }
-    Code init(const auto &...with) { return Make(storage, Size, First..., with..., &object); }
+    template <class... With> Code init(const With &...with) { return Make(storage, Size, First..., with..., &object); }
 };
 /** A validated tree. The bytes outlive it. */
 struct Tree : Object<dibs_tree, DIBS_TREE_SIZE, dibs_tree_init> {
-    Code init(std::span<const uint8_t> tree) { return Object::init(tree.data(), tree.size()); }
+    Code init(Span<const uint8_t> tree) { return Object::init(tree.data(), tree.size()); }
 };
 /** The surface at one moment, released with this object. */
 struct Frame : Object<dibs_frame, DIBS_FRAME_SIZE, dibs_frame_init> {
     ~Frame() { release(); }
     Code release() { return dibs_frame_release(*this); }
     /** x, y and z (mm) of each vertex, which outlive the frame or its release. */
-    Code set(std::span<const float> positions, float error = 0.0f) {
+    Code set(Span<const float> positions, float error = 0.0f) {
         return dibs_frame_set_vertices(*this, positions.data(), uint32_t(positions.size() / 3), error);
     }
     /** x, y and z (mm) of each node that carries the surface, which outlive the frame or its release. */
-    Code set_nodes(dibs_tree *tree, std::span<const float> positions, float error = 0.0f) {
+    Code set_nodes(dibs_tree *tree, Span<const float> positions, float error = 0.0f) {
         return dibs_frame_set_nodes(*this, tree, positions.data(), uint32_t(positions.size() / 3), error);
     }
 };
 /** Contacts of a query, a scene or a tracker. */
 struct Contacts : Object<dibs_contacts, DIBS_CONTACTS_SIZE, dibs_contacts_init> {
     /** Rows for a solver, in `rows`: the first of `room`. */
-    Code rows(dibs_vec3 origin, float stand_off, float gain, std::span<dibs_row> room, std::span<dibs_row> &rows) {
+    Code rows(dibs_vec3 origin, float stand_off, float gain, Span<dibs_row> room, Span<dibs_row> &rows) {
         size_t count = 0;
         const Code code = dibs_contacts_rows(*this, origin, stand_off, gain, room.size(), room.data(), &count);
-        rows = room.first(count);
+        rows = {room.data(), count};
         return code;
     }
 };
@@ -66,7 +87,7 @@ struct Query : Object<dibs_query, DIBS_QUERY_SIZE, dibs_query_init> {
 };
 /** A chain of tools and surfaces: a query and a frame for each. */
 struct Scene : dibs_scene {
-    Scene(std::span<dibs_query *const> queries, std::span<dibs_frame *const> frames, Tools tools)
+    Scene(Span<dibs_query *const> queries, Span<dibs_frame *const> frames, Tools tools)
         : dibs_scene{queries.data(), frames.data(), common(queries, frames), tools.data(), common(tools, tools)} {}
     Code closest(dibs_closest &found, Options options = {}) const { return dibs_scene_closest(this, options, &found); }
     Code contacts(float margin, dibs_contacts *list, Options options = {}) const {
@@ -88,15 +109,15 @@ template <uint32_t Vertices> struct Tracker : Object<dibs_tracker, DIBS_TRACKER_
     }
 };
 /** The closest pair of several trackers, each with a tool. */
-inline Code closest_of(std::span<dibs_tracker *const> trackers, Tools tools, dibs_tracked &pair, Options options = {}) {
+inline Code closest_of(Span<dibs_tracker *const> trackers, Tools tools, dibs_tracked &pair, Options options = {}) {
     return dibs_tracker_closest_of(trackers.data(), tools.data(), common(trackers, tools), options, &pair);
 }
 /** A filter of commands: the motion nearest to a commanded one that keeps a chain of tools out of the tissue. */
 struct Filter : dibs_filter {
     Filter(float stand_off, float speed) : dibs_filter(dibs_filter_of(stand_off, speed)) {}
     /** On the trackers' own surfaces, or on a reader's `frame`. */
-    Code admit(std::span<dibs_tracker *const> trackers, Tools tools, const dibs_motion &command, float period,
-               const dibs_uncertainty &uncertainty, dibs_admitted &admitted, std::span<const dibs_motion_row> rows = {},
+    Code admit(Span<dibs_tracker *const> trackers, Tools tools, const dibs_motion &command, float period,
+               const dibs_uncertainty &uncertainty, dibs_admitted &admitted, Span<const dibs_motion_row> rows = {},
                dibs_frame *frame = nullptr) const {
         return dibs_filter_admit(this, trackers.data(), frame, tools.data(), common(trackers, tools), &command, period,
                                  &uncertainty, rows.data(), uint32_t(rows.size()), &admitted);
@@ -107,26 +128,27 @@ template <uint32_t Vertices> using Surface = Object<dibs_surface, DIBS_SURFACE_S
 /** Buffers for so many vertices, with the frame before, for a bus and a guard. */
 template <uint32_t Vertices>
 using GuardedSurface = Object<dibs_surface, DIBS_GUARDED_SIZE(Vertices), dibs_surface_init, Vertices>;
-/** The bus's end of a guarded surface. */
-struct Bus : Object<dibs_bus, DIBS_BUS_SIZE, dibs_bus_init> {
-    Code receive(std::span<const uint8_t> bytes, uint32_t now) {
+/** The bus's end of a guarded surface: its calls. */
+template <class Base> struct BusOf : Base {
+    Code receive(Span<const uint8_t> bytes, uint32_t now) {
         return dibs_bus_receive(*this, bytes.data(), bytes.size(), now);
     }
-    Code packet(std::span<const uint8_t> packet, uint32_t now, dibs_progress *progress = nullptr) {
+    Code packet(Span<const uint8_t> packet, uint32_t now, dibs_progress *progress = nullptr) {
         return dibs_bus_packet(*this, packet.data(), packet.size(), now, progress);
     }
     /** A frame of this process: x, y and z of each vertex, in the mesh's order. */
-    Code frame(std::span<const float> positions, uint32_t captured, uint32_t now) {
+    Code frame(Span<const float> positions, uint32_t captured, uint32_t now) {
         return dibs_bus_frame(*this, positions.data(), uint32_t(positions.size() / 3), captured, now);
     }
     /** The same, with the mesh as a whole at a pose. */
-    Code frame_at(std::span<const float> positions, const dibs_pose &pose, uint32_t captured, uint32_t now) {
+    Code frame_at(Span<const float> positions, const dibs_pose &pose, uint32_t captured, uint32_t now) {
         return dibs_bus_frame_at(*this, positions.data(), uint32_t(positions.size() / 3), &pose, captured, now);
     }
     Code work(uint32_t work, dibs_advance *outcome = nullptr) { return dibs_bus_work(*this, work, outcome); }
 };
-/** The control tick's end of a guarded surface. */
-struct Guard : Object<dibs_guard, DIBS_GUARD_SIZE, dibs_guard_init> {
+using Bus = BusOf<Object<dibs_bus, DIBS_BUS_SIZE, dibs_bus_init>>;
+/** The control tick's end of a guarded surface: its calls. */
+template <class Base> struct GuardOf : Base {
     Code closest(const dibs_tool &tool, uint32_t now, dibs_answer &answer) {
         return dibs_guard_closest(*this, &tool, now, &answer);
     }
@@ -139,6 +161,44 @@ struct Guard : Object<dibs_guard, DIBS_GUARD_SIZE, dibs_guard_init> {
     }
     Code acknowledge() { return dibs_guard_acknowledge(*this); }
 };
+using Guard = GuardOf<Object<dibs_guard, DIBS_GUARD_SIZE, dibs_guard_init>>;
+/** An object whose storage is somebody else's. */
+template <class T> struct Handle {
+    T *object = nullptr;
+    operator T *() const { return object; }
+};
+/** Bus and guard of a tree with any number of vertices, in memory of the free store. */
+class Loop {
+    static constexpr std::align_val_t Alignment{DIBS_ALIGNMENT};
+    void *memory = nullptr;
+public:
+    BusOf<Handle<dibs_bus>> bus;
+    GuardOf<Handle<dibs_guard>> guard;
+    /** The bytes outlive the loop. `DIBS_CODE_STORAGE_SIZE` where there is no memory. A second call begins anew. */
+    Code init(Span<const uint8_t> tree, const dibs_guard_limits &limits) {
+        release();
+        Tree checked;
+        dibs_tree_facts facts;
+        Code code = checked.init(tree);
+        if (code == DIBS_CODE_OK) code = dibs_tree_get_facts(checked, &facts);
+        if (code != DIBS_CODE_OK) return code;
+        const size_t size = DIBS_START_SIZE(facts.rows);
+        memory = operator new(size, Alignment, std::nothrow);
+        if (memory == nullptr) return DIBS_CODE_STORAGE_SIZE;
+        return dibs_start(memory, size, tree.data(), tree.size(), &limits, &bus.object, &guard.object);
+    }
+    /** Deletes every move and copy. */
+    Loop &operator=(Loop &&) = delete;
+    Loop() = default;
+    ~Loop() { release(); }
+private:
+    void release() {
+        bus.object = nullptr;
+        guard.object = nullptr;
+        operator delete(memory, Alignment);
+        memory = nullptr;
+    }
+};
 /** Sends a surface's frames to a controller, until it goes out of scope. In the library for a computer alone. */
 struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
     ~Sender() { dibs_sender_close(*this); }
@@ -147,7 +207,7 @@ struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
         return Object::init(tree, target, settings);
     }
     /** x, y and z of each vertex, in the mesh's order, so many milliseconds ago. */
-    Code send(std::span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent *sent = nullptr) {
+    Code send(Span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent *sent = nullptr) {
         return dibs_sender_send(*this, positions.data(), uint32_t(positions.size() / 3), age, sent);
     }
     Code poll() { return dibs_sender_poll(*this); }
@@ -155,7 +215,7 @@ struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
 /** Frames of positions that the caller has. */
 struct Writer : Object<dibs_writer, DIBS_WRITER_SIZE, dibs_writer_init> {
     Code begin() { return dibs_writer_begin(*this); }
-    Code push(std::span<const float> positions) {
+    Code push(Span<const float> positions) {
         return dibs_writer_push(*this, positions.data(), uint32_t(positions.size() / 3));
     }
     Code publish(dibs_tree *tree, uint32_t epoch, uint32_t received, float error = 0.0f) {
@@ -164,7 +224,7 @@ struct Writer : Object<dibs_writer, DIBS_WRITER_SIZE, dibs_writer_init> {
 };
 /** The bus's end of a surface. */
 struct Receiver : Object<dibs_receiver, DIBS_RECEIVER_SIZE, dibs_receiver_init> {
-    Code accept(std::span<const uint8_t> packet, uint32_t now, dibs_progress *progress = nullptr) {
+    Code accept(Span<const uint8_t> packet, uint32_t now, dibs_progress *progress = nullptr) {
         return dibs_receiver_accept(*this, packet.data(), packet.size(), now, progress);
     }
     Code advance(uint32_t work, dibs_advance *outcome = nullptr) { return dibs_receiver_advance(*this, work, outcome); }

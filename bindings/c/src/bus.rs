@@ -15,7 +15,7 @@ use crate::limits::dibs_guard_limits;
 use crate::receiver::{DIBS_EVENTS, DIBS_STATUS, dibs_advance, dibs_progress};
 use crate::surface::{OfNodes, OfVertices, dibs_surface};
 use crate::tool::dibs_vec3;
-use crate::tree::dibs_tree;
+use crate::tree::{Row, dibs_tree};
 
 /// Bytes of a bus's storage.
 pub const DIBS_BUS_SIZE: usize = 3_072;
@@ -34,8 +34,8 @@ pub struct dibs_bus(TheBus);
     reason = "its storage has one size, and there is no allocator"
 )]
 enum TheBus {
-    Vertices(Bus<'static, 'static, u16, NoMac, OfVertices>),
-    Nodes(Bus<'static, 'static, u16, NoMac, OfNodes>),
+    Vertices(Bus<'static, 'static, Row, NoMac, OfVertices>),
+    Nodes(Bus<'static, 'static, Row, NoMac, OfNodes>),
 }
 
 /// Calls a function of the bus, of either kind.
@@ -49,8 +49,8 @@ macro_rules! with_bus {
 }
 
 impl TheBus {
-    const STATUS_BYTES: usize = Bus::<'static, 'static, u16>::STATUS_BYTES;
-    const STATUS_FRAMED: usize = Bus::<'static, 'static, u16>::STATUS_FRAMED;
+    const STATUS_BYTES: usize = Bus::<'static, 'static, Row>::STATUS_BYTES;
+    const STATUS_FRAMED: usize = Bus::<'static, 'static, Row>::STATUS_FRAMED;
 
     fn packet(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
         with_bus!(self, |bus| bus.packet(packet, now))

@@ -22,7 +22,7 @@ use crate::reader::{dibs_age, dibs_link};
 use crate::surface::{OfNodes, OfVertices, dibs_surface, dibs_surface_init};
 use crate::tool::{Shape, dibs_tool, dibs_vec3};
 use crate::tracker::{DIBS_OPENED, dibs_tracked};
-use crate::tree::{DIBS_TREE_SIZE, dibs_tree, dibs_tree_init};
+use crate::tree::{DIBS_TREE_SIZE, Row, dibs_tree, dibs_tree_init};
 
 /// Bytes of a guard's storage.
 pub const DIBS_GUARD_SIZE: usize = 25_344;
@@ -33,7 +33,7 @@ pub const DIBS_GUARD_SIZE: usize = 25_344;
 /// One context at a time: the control interrupt, of higher priority than the bus's.
 pub struct dibs_guard(TheGuard);
 
-type OfRows<R> = Guard<'static, 'static, u16, STACK, DIBS_OPENED, R, DIBS_OPENED>;
+type OfRows<R> = Guard<'static, 'static, Row, STACK, DIBS_OPENED, R, DIBS_OPENED>;
 
 /// Of frames of vertices, or of the nodes that carry the surface.
 enum TheGuard {

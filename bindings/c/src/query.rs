@@ -12,7 +12,7 @@ use crate::border::{Handle, Input, Kind, Output, Storage};
 use crate::code::dibs_code;
 use crate::frame::{ask, dibs_frame};
 use crate::tool::{Shape, dibs_tool, dibs_vec3};
-use crate::tree::dibs_tree;
+use crate::tree::{Row, dibs_tree};
 
 /// Bytes of a query's storage.
 pub const DIBS_QUERY_SIZE: usize = 4_864;
@@ -23,7 +23,7 @@ pub(crate) const STACK: usize = 512;
 /// A query on one tree. It starts from its last answer.
 ///
 /// One context at a time.
-pub struct dibs_query(pub(crate) Query<'static, u16, STACK>);
+pub struct dibs_query(pub(crate) Query<'static, Row, STACK>);
 
 impl Kind for dibs_query {
     const MARK: u32 = 0x6462_7108;

@@ -12,7 +12,7 @@ use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
 use crate::surface::dibs_surface;
 use crate::tool::dibs_vec3;
-use crate::tree::dibs_tree;
+use crate::tree::{Row, dibs_tree};
 
 /// Bytes of a receiver's storage.
 pub const DIBS_RECEIVER_SIZE: usize = 3_072;
@@ -32,7 +32,7 @@ const _: () = assert!(DIBS_STATUS == framed_bytes(STATUS));
 ///
 /// One context at a time, of lower priority than the reader's: the bus interrupt.
 pub struct dibs_receiver {
-    assembler: Assembler<'static, StretchMonitor<'static, u16>>,
+    assembler: Assembler<'static, StretchMonitor<'static, Row>>,
     deframer: Deframer<DIBS_MTU>,
     surface: &'static dibs_surface,
     mesh_id: u32,

@@ -9,6 +9,7 @@ use crate::contacts::dibs_contacts;
 use crate::frame::{Table, dibs_frame};
 use crate::query::{STACK, dibs_options, dibs_proximity, dibs_query};
 use crate::tool::{DIBS_TOOLS, chain, dibs_tool};
+use crate::tree::Row;
 
 /// Most surfaces of a scene.
 pub const DIBS_SURFACES: usize = 8;
@@ -61,7 +62,7 @@ struct Scene {
     tools: Vec<Capsule, DIBS_TOOLS>,
 }
 
-type Surface<'s> = (&'s mut Query<'static, u16, STACK>, &'s Table);
+type Surface<'s> = (&'s mut Query<'static, Row, STACK>, &'s Table);
 
 impl Scene {
     fn of(scene: *const dibs_scene) -> Result<Self, dibs_code> {

@@ -19,7 +19,7 @@ use crate::contacts::dibs_contacts;
 use crate::frame::{Table, dibs_frame};
 use crate::query::{STACK, dibs_options, dibs_proximity};
 use crate::tool::{DIBS_TOOLS, Shape, chain, dibs_tool};
-use crate::tree::dibs_tree;
+use crate::tree::{Row, dibs_tree};
 
 /// Bytes of a tracker's storage besides its vertices.
 pub const DIBS_TRACKER_BASE: usize = 24_896;
@@ -44,7 +44,7 @@ pub struct dibs_tracker {
     surface: Option<MovingTable<'static, Copied>>,
 }
 
-pub(crate) type TheTracker = Tracker<'static, u16, STACK, DIBS_OPENED, DIBS_OPENED>;
+pub(crate) type TheTracker = Tracker<'static, Row, STACK, DIBS_OPENED, DIBS_OPENED>;
 
 impl Kind for dibs_tracker {
     const MARK: u32 = 0x6462_6B14;

@@ -14,12 +14,20 @@ use crate::tool::dibs_vec3;
 /// Bytes of a tree's storage.
 pub const DIBS_TREE_SIZE: usize = 640;
 
-/// A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices.
+/// A row's number in a tree's bytes: the library takes trees of one width.
+#[cfg(not(feature = "large"))]
+pub(crate) type Row = u16;
+/// The same, of trees with more than 65,536 vertices.
+#[cfg(feature = "large")]
+pub(crate) type Row = u32;
+
+/// A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices; the library of
+/// `cargo build -p dibs-c --features large` takes larger trees in place of these.
 ///
 /// Any number of contexts may use it at once.
 pub struct dibs_tree {
     /// The view of the bytes.
-    pub(crate) tree: Tree<'static, u16>,
+    pub(crate) tree: Tree<'static, Row>,
     /// The nodes that carry the surface, if any.
     pub(crate) nodes: Option<Nodes<'static>>,
     pub(crate) bytes: &'static [u8],

@@ -2,15 +2,15 @@
 
 // Requirements: P-06, P-11
 
-use std::fs;
 use std::path::Path;
 use std::process::Command;
+use std::{env, fs};
 
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Interval, Options, Query, Sphere, Tree, measure_stretch};
+use dibs_nostd::{Index, Interval, Options, Query, Sphere, Tree, measure_stretch};
 
-use crate::programs::{include, library, run, tool};
+use crate::programs::{include, library, library_with, run, tool};
 
 /// Reads a tree and positions in the file's order, and asks the README's function about a sphere.
 const MAIN: &str = r#"
@@ -40,35 +40,23 @@ fn programs() -> Vec<String> {
     blocks.map(str::to_owned).collect()
 }
 
-#[test]
-fn the_first_program_gives_the_right_answer() {
+/// What the README's first program says of a sphere near a mesh that grew by a tenth, and what the library in Rust does.
+fn first_answer<I: Index>(mesh: &Mesh, library: &Path) -> [String; 2] {
     let folder = tempfile::tempdir().expect("a folder");
-    let heart = generate::heart(1_000).expect("a size").mesh;
-    // No vertex is where the builder puts it, and one is of no triangle.
-    let count = heart.positions.len() as u32;
-    let turned = |vertex: u32| (vertex * 7 + 3) % count;
-    assert_ne!(count % 7, 0, "each number once");
-    let mut mesh: Mesh = heart.clone();
-    for (vertex, at) in (0..).zip(&heart.positions) {
-        mesh.positions[turned(vertex) as usize] = *at;
-    }
-    mesh.triangles = heart.triangles.iter().map(|corners| corners.map(turned)).collect();
-    mesh.positions.push(heart.positions[0]);
-    let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+    let built = Builder::new().stretch(1.5).build(mesh).expect("a tree");
     let moved: Vec<Vec3> = mesh.positions.iter().map(|&at| at * 1.1).collect();
 
-    let tree = Tree::<u16>::from_bytes(built.blob()).expect("a tree");
+    let tree = Tree::<I>::from_bytes(built.blob()).expect("a tree");
     let rows = built.to_rows(&moved);
     let stretch = measure_stretch(&tree, rows.as_slice()).expect("within the limit");
-    let mut query = Query::<u16, 512>::new(&tree).expect("a stack");
+    let mut query = Query::<I, 512>::new(&tree).expect("a stack");
     let sphere = Sphere::new(Vec3::new(90.0, 10.0, 20.0), 5.0).expect("a tool");
     let options = Options::new().stretch(stretch);
     let found = query.closest(rows.as_slice(), &sphere, &options).expect("an answer");
     let Interval { lower, upper, .. } = found.interval();
-    let expected = format!(
-        "{:.4} mm from the tool's surface, in truth {lower:.4} to {upper:.4}",
-        found.separation
-    );
+    let separation = found.separation;
+    let expected =
+        format!("{separation:.4} mm from the tool's surface, in truth {lower:.4} to {upper:.4}");
 
     let [tree, positions, source, program] =
         ["tree", "positions", "first.c", "first"].map(|name| folder.path().join(name));
@@ -76,14 +64,46 @@ fn the_first_program_gives_the_right_answer() {
     let floats = moved.iter().flat_map(Vec3::to_array);
     fs::write(&positions, floats.flat_map(f32::to_le_bytes).collect::<Vec<u8>>())
         .expect("writable");
-    fs::write(&source, programs()[0].clone() + MAIN).expect("writable");
+    fs::write(&source, programs()[0].clone().replace("65536", "99999") + MAIN).expect("writable");
     let mut gcc = tool("gcc", "gcc");
     gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror"]);
     gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
     gcc.arg("-I").arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs")).arg(&source);
-    run(gcc.arg(library()).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
+    run(gcc.arg(library).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
     let said = run(Command::new(program).arg(tree).arg(positions));
-    assert_eq!(said.lines().collect::<Vec<_>>(), [expected.as_str(), "3 checks, 0 failures"]);
+    [said, expected + "\n3 checks, 0 failures\n"]
+}
+
+/// A generated heart whose vertices are in another order, with one of no triangle.
+fn shuffled(triangles: u32) -> Mesh {
+    let heart = generate::heart(triangles).expect("a size").mesh;
+    let count = heart.positions.len() as u32;
+    let turned = |vertex: u32| (vertex * 7 + 3) % count;
+    assert_ne!(count % 7, 0, "each number once");
+    let mut mesh = heart.clone();
+    for (vertex, at) in (0..).zip(&heart.positions) {
+        mesh.positions[turned(vertex) as usize] = *at;
+    }
+    mesh.triangles = heart.triangles.iter().map(|corners| corners.map(turned)).collect();
+    mesh.positions.push(heart.positions[0]);
+    mesh
+}
+
+#[test]
+fn the_first_program_gives_the_right_answer() {
+    let [said, expected] = first_answer::<u16>(&shuffled(1_000), &library());
+    assert_eq!(said, expected);
+}
+
+/// The library of another feature is compiled for this alone.
+#[test]
+fn a_large_tree_is_answered_by_the_library_for_large_trees() {
+    if env::var_os("DIBS_WHOLE").is_none() {
+        println!("skipped: on request, `cargo xtask test --whole`");
+        return;
+    }
+    let [said, expected] = first_answer::<u32>(&shuffled(140_000), &library_with("large"));
+    assert_eq!(said, expected);
 }
 
 /// One after the other, without a warning.

@@ -1,4 +1,4 @@
-//! `include/dibs.hpp`, installed, compiles as C++20 without exceptions, and its queries answer.
+//! `include/dibs.hpp`, installed, compiles as C++17 without exceptions, and its queries answer.
 
 // Requirement: P-06
 
@@ -12,7 +12,7 @@ fn the_wrapper_answers_without_exceptions() {
     let folder = tempfile::tempdir().expect("a folder");
     let program = folder.path().join("wrapper");
     let mut compiler = tool("g++", "g++");
-    compiler.args(["-std=c++20", "-fno-exceptions", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]);
+    compiler.args(["-std=c++17", "-fno-exceptions", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]);
     compiler.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g"]);
     compiler.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/wrapper.cpp"));
     let mut flags = tool("pkg-config", "pkg-config");

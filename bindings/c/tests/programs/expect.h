@@ -27,13 +27,15 @@ static inline void expect(dibs_code expected, dibs_code found, const char *call,
 
 static const dibs_tool tool = {{100.0f, 0.0f, 20.0f}, {140.0f, 0.0f, 50.0f}, 2.5f};
 
+#define LONGEST_FILE ((size_t)1 << 24)
+
 static unsigned char *read_file(const char *path, size_t *length) {
     FILE *file = fopen(path, "rb");
-    unsigned char *bytes = malloc(1 << 20);
+    unsigned char *bytes = malloc(LONGEST_FILE);
     if (file == NULL || bytes == NULL) {
         exit(2);
     }
-    *length = fread(bytes, 1, 1 << 20, file);
+    *length = fread(bytes, 1, LONGEST_FILE, file);
     fclose(file);
     /* The exact length: the sanitizer finds a read behind it. */
     return realloc(bytes, *length);

@@ -26,6 +26,16 @@ pub fn library() -> PathBuf {
     workspace::target().join(folder).join("libdibs_c.a")
 }
 
+/// The library with a feature, in a target folder of its own: the next build of all would compile the other anew.
+pub fn library_with(feature: &str) -> PathBuf {
+    let target = workspace::target().join("c").join(feature);
+    let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.args(["rustc", "--quiet", "--release", "--package", "dibs-c", "--lib"]);
+    cargo.args(["--features", feature, "--crate-type", "staticlib", "--target-dir"]).arg(&target);
+    run(cargo.current_dir(workspace::root()));
+    target.join("release/libdibs_c.a")
+}
+
 /// A folder into which the library is installed.
 pub fn installed(folder: &Path) -> PathBuf {
     let (build, prefix) = (folder.join("library"), folder.join("prefix"));

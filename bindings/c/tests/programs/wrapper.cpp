@@ -110,7 +110,7 @@ int main(int argc, char **argv) {
         dibs_admitted admitted;
         for (int tick = 0; tick < 200; tick++) {
             const dibs_motion command = {at.start, {-0.5f, 0.0f, 0.0f}, {}};
-            MUST(filter.admit(one, std::span(&at, 1), command, 0.001f, still, admitted, {}, frame));
+            MUST(filter.admit(one, dibs::Tools(&at, 1), command, 0.001f, still, admitted, {}, frame));
             EXPECT(true, admitted.least_separation > 0.98f && admitted.reason != DIBS_REASON_NO_SAFE_MOTION);
             MUST(dibs_motion_apply(&admitted.motion, &at, &at));
         }
@@ -119,7 +119,7 @@ int main(int argc, char **argv) {
         EXPECT(true, on_bus.separation > 0.98f && on_bus.separation < 1.1f);
         MUST(query.closest(frame, tool, on_bus));
         EXPECT(DIBS_CODE_ARGUMENT, filter.admit(one, {}, {}, 0.001f, still, admitted));
-        EXPECT(DIBS_CODE_NO_SURFACE, filter.admit(one, std::span(&at, 1), {}, 0.001f, still, admitted));
+        EXPECT(DIBS_CODE_NO_SURFACE, filter.admit(one, dibs::Tools(&at, 1), {}, 0.001f, still, admitted));
     }
     dibs::Frame frame;
     MUST(frame.init());
@@ -139,10 +139,10 @@ int main(int argc, char **argv) {
     EXPECT(true, on_bus.separation == at_rest.separation && at_rest.separation > 0.0f);
 
     std::array<dibs_row, DIBS_CONTACTS> room;
-    std::span<dibs_row> rows;
+    dibs::Span<dibs_row> rows;
     MUST(query.contacts(frame, tool, 60.0f, contacts));
     MUST(contacts.rows(tool.start, 1.0f, 20.0f, room, rows));
-    EXPECT(true, !rows.empty());
+    EXPECT(true, rows.size() > 0);
 
     /* A chain of two tools, and a second surface beside the first. */
     const dibs_tool chain[] = {tool, {tool.start, {100.0f, -40.0f, 20.0f}, 2.5f}};
@@ -162,8 +162,8 @@ int main(int argc, char **argv) {
     EXPECT(true, of_scene.proximity.separation <= at_rest.separation);
     MUST(scene.contacts(60.0f, contacts));
     MUST(contacts.rows(tool.start, 1.0f, 20.0f, room, rows));
-    EXPECT(true, !rows.empty());
-    EXPECT(DIBS_CODE_ARGUMENT, dibs::Scene(queries, std::span(frames, 1), chain).closest(of_scene));
+    EXPECT(true, rows.size() > 0);
+    EXPECT(DIBS_CODE_ARGUMENT, dibs::Scene(queries, dibs::Span<dibs_frame *const>(frames, 1), chain).closest(of_scene));
     EXPECT(DIBS_CODE_ARGUMENT, dibs::Scene(queries, frames, {}).closest(of_scene));
 
     /* The same by trackers, on the first surface. */
@@ -178,7 +178,7 @@ int main(int argc, char **argv) {
     dibs_tracker *both[] = {trackers[0], trackers[1]};
     MUST(dibs::closest_of(both, chain, of_chain));
     EXPECT(true, of_chain.proximity.separation <= at_rest.separation);
-    EXPECT(DIBS_CODE_ARGUMENT, dibs::closest_of(both, std::span(chain, 1), of_chain));
+    EXPECT(DIBS_CODE_ARGUMENT, dibs::closest_of(both, dibs::Tools(chain, 1), of_chain));
 
     /* The loop: the same frames, and an answer on the last of them. */
     static dibs::GuardedSurface<502> guarded;
@@ -193,10 +193,10 @@ int main(int argc, char **argv) {
     MUST(guard.init(guarded, tree, &guard_limits));
     EXPECT(DIBS_CODE_TAKEN, writer.init(guarded));
     for (std::size_t at = 0; at < packets.size(); at++) {
-        MUST(bus.receive(std::span(packets).subspan(at, 1), 0));
+        MUST(bus.receive(dibs::Span<const std::uint8_t>(&packets[at], 1), 0));
         MUST(bus.work(10'000));
     }
-    EXPECT(DIBS_CODE_PACKET_DAMAGED, bus.packet(std::span(packets).first(8), 0));
+    EXPECT(DIBS_CODE_PACKET_DAMAGED, bus.packet(dibs::Span<const std::uint8_t>(packets.data(), 8), 0));
     MUST(guard.closest(tool, 1, answer));
     EXPECT(true, answer.age.is_published == 1 && answer.age.epoch == 2);
     EXPECT(true, answer.searched.outcome == DIBS_CODE_OK && answer.searched.tracked.opened > 0);
@@ -212,6 +212,20 @@ int main(int argc, char **argv) {
     const auto cause = guard.admit(dibs::Filter(1.0f, 200.0f), tool, {tool.start, {}, {}}, 2, admitted, &answer);
     EXPECT(true, cause != DIBS_CODE_OK && cause == answer.trust.cause && answer.age.epoch == 2);
     EXPECT(DIBS_CODE_ACKNOWLEDGE, guard.acknowledge());
+
+    /* The same loop in memory that the wrapper takes for as many vertices as the tree has. */
+    dibs::Loop loop;
+    EXPECT(DIBS_CODE_NULL, loop.guard.closest(tool, 1, answer));
+    EXPECT(DIBS_CODE_TREE_LENGTH, loop.init({bytes.data(), 8}, guard_limits));
+    MUST(loop.init(bytes, guard_limits));
+    MUST(loop.init(bytes, guard_limits));
+    MUST(loop.bus.receive(packets, 0));
+    MUST(loop.bus.work(100'000));
+    dibs_answer of_loop;
+    MUST(loop.guard.closest(tool, 1, of_loop));
+    EXPECT(true, of_loop.age.is_published == 1 && of_loop.searched.tracked.proximity.separation == answer.searched.tracked.proximity.separation);
+    EXPECT(DIBS_CODE_LIMIT_SPEED, loop.init(bytes, dibs_guard_limits_of(-1.0f, 80)));
+    EXPECT(DIBS_CODE_NULL, loop.guard.closest(tool, 1, answer));
 
     /* Positions of the caller's, published. */
     static dibs::Surface<502> written;
