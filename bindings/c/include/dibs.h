@@ -1938,6 +1938,57 @@ typedef struct {
 } dibs_sender_facts;
 
 /**
+ * The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices each move
+ * straight and evenly.
+ */
+typedef struct {
+  /**
+   * The tool at the start.
+   */
+  dibs_tool from;
+  /**
+   * The tool at the end. Between them it has the larger of their radii.
+   */
+  dibs_tool to;
+  /**
+   * The surface at the start and at the end: 0 is the tracker's surface before the last `dibs_tracker_set_frame`, 1 the one
+   * since then.
+   */
+  float share[2];
+  /**
+   * In mm, not negative.
+   */
+  float margin;
+  /**
+   * The most queries; 1 at least is made. An answer within few is the rule.
+   */
+  uint32_t samples;
+} dibs_sweep;
+
+/**
+ * The result of a sweep. Times count in sweeps: 0 is its start, 1 its end.
+ */
+typedef struct {
+  /**
+   * Before this time they are certainly not closer than the margin; 1 or more: at no time.
+   */
+  float clear_until;
+  /**
+   * The first time at which they were found within the margin, or farther by no more than the accuracy; -1 for none. With
+   * none and `clear_until` below 1 the samples were too few to decide.
+   */
+  float contact;
+  /**
+   * The closest pair at the end.
+   */
+  dibs_proximity at_end;
+  /**
+   * Queries made.
+   */
+  uint32_t samples;
+} dibs_swept;
+
+/**
  * Facts about a tree.
  */
 typedef struct {
@@ -2962,6 +3013,23 @@ dibs_code dibs_surface_init(void *storage,
                             size_t size,
                             uint32_t vertices,
                             dibs_surface **surface);
+
+/**
+ * Whether tool and surface come closer than a margin between two ticks, and when first, by conservative advancement: no time is
+ * skipped at any speed. The distance is that to the surface itself, from either side.
+ *
+ * Cost: that of `dibs_tracker_closest` for each sample; the budget is for each.
+ *
+ * @param tracker  The tracker, which has a surface.
+ * @param sweep    The motion.
+ * @param options  Options, or null.
+ * @param swept    Receives the result.
+ * @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a share out of range.
+ */
+dibs_code dibs_tracker_sweep(dibs_tracker *tracker,
+                             const dibs_sweep *sweep,
+                             const dibs_options *options,
+                             dibs_swept *swept);
 
 /**
  * Makes a tracker on a tree, without a surface.

@@ -38,6 +38,7 @@ mod scene;
 #[cfg(not(target_os = "none"))]
 mod sender;
 mod surface;
+mod sweep;
 mod tool;
 mod tracker;
 mod tree;

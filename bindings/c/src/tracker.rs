@@ -8,8 +8,8 @@ use core::ffi::c_void;
 use bytemuck::AnyBitPattern;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Fallback, MeasuredStretch, MovingSurface, MovingTable, Odometer, Options, Proximity, Tracker,
-    TrackerAnswer, VertexTable,
+    Fallback, MeasuredStretch, MovingSurface, MovingTable, Odometer, Options, Proximity, Step,
+    Tracker, TrackerAnswer, VertexTable,
 };
 use heapless::Vec;
 
@@ -42,6 +42,8 @@ pub struct dibs_tracker {
     /// The copies: the surface's, and the one to be written next.
     copies: [&'static Copied; 2],
     surface: Option<MovingTable<'static, Copied>>,
+    /// From the surface before to this one, or from this one to itself where there is none before.
+    step: Option<Step<'static, Copied, Copied>>,
 }
 
 pub(crate) type TheTracker = Tracker<'static, Row, STACK, DIBS_OPENED, DIBS_OPENED>;
@@ -139,6 +141,7 @@ pub extern "C" fn dibs_tracker_init(
                     storage.keep(size, HEADS + size_of::<Copied>(), Copied::new(second))?,
                 ],
                 surface: None,
+                step: None,
             })
         })
     })
@@ -176,6 +179,13 @@ impl dibs_tracker {
         Ok((&mut self.tracker, self.surface.as_ref().ok_or(dibs_code::NoSurface)?))
     }
 
+    /// The core's tracker, and the way from the surface before to its own.
+    pub(crate) fn step(
+        &mut self,
+    ) -> Result<(&mut TheTracker, &Step<'static, Copied, Copied>), dibs_code> {
+        Ok((&mut self.tracker, self.step.as_ref().ok_or(dibs_code::NoSurface)?))
+    }
+
     /// The core's tracker, for another surface.
     pub(crate) const fn core(&mut self) -> &mut TheTracker {
         &mut self.tracker
@@ -184,10 +194,9 @@ impl dibs_tracker {
     fn set<V: VertexTable>(&mut self, from: &V) -> Result<(), dibs_code> {
         let [now, next] = self.copies;
         next.copy(from)?;
-        self.surface = Some(match self.surface {
-            Some(_) => self.odometer.step(now, next).after(),
-            None => self.odometer.start(next),
-        });
+        let before = if self.step.is_some() { now } else { next };
+        let step = self.odometer.step(before, next);
+        (self.surface, self.step) = (Some(step.after()), Some(step));
         self.copies = [next, now];
         Ok(())
     }

@@ -14,4 +14,5 @@ mod readme;
 mod ros2;
 mod script;
 mod sender;
+mod sweep;
 mod wrapper;
