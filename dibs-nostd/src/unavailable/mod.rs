@@ -8,7 +8,7 @@ pub use query::QueryError;
 
 use crate::time::Millis;
 
-/// Why there is no proximity to act on.
+/// Why there is no proximity for a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -25,12 +25,12 @@ pub enum Unavailable {
     Query(QueryError),
     /// The tree's bytes changed since they were validated: [`Scrub`](crate::Scrub).
     CorruptTree,
-    /// No good packet came within the time allowed.
+    /// No good packet was received within the allowed time.
     LinkLost {
         /// Time since the last one.
         silence: Millis,
     },
-    /// No heartbeat came within the time allowed.
+    /// No heartbeat was received within the allowed time.
     HeartbeatLost {
         /// Time since the last one.
         silence: Millis,
@@ -45,7 +45,7 @@ pub enum Unavailable {
         /// From the status that it echoes to its arrival; [`Millis::MAX`] if it echoes none.
         transit: Millis,
     },
-    /// The surface was older than allowed when it was sent: its source stands still.
+    /// The surface was older than allowed when it was sent: its source has stopped.
     SourceStale {
         /// Its age then.
         age: Millis,

@@ -13,14 +13,14 @@ pub enum PacketError {
         /// Bytes received.
         bytes: usize,
     },
-    /// The checksum does not match: damaged on the way, or not a packet at all.
+    /// The checksum does not match: the packet was damaged, or is none.
     Checksum {
         /// In the packet.
         stated: u32,
         /// Of the bytes received.
         computed: u32,
     },
-    /// A version that this receiver does not speak.
+    /// A version that this receiver does not support.
     Version {
         /// In the packet.
         version: u8,
@@ -40,7 +40,7 @@ pub enum PacketError {
         /// In the packet.
         sequence: u16,
     },
-    /// The length does not follow from kind and count.
+    /// The length does not match kind and count.
     Length {
         /// Bytes received.
         bytes: usize,
