@@ -11,7 +11,6 @@ use crate::surface::{MotionUnit, PoseStep};
 use crate::tree::SurfaceFacts;
 use crate::{Millis, RigidPose, VertexTable};
 
-/// Buffers of a guard's surface.
 const BUFFERS: u32 = 3;
 
 /// The gate of rows with poses.

@@ -46,7 +46,6 @@ impl Poses {
         last == RigidPose::IDENTITY && [RigidPose::IDENTITY, no_frame].contains(&before)
     }
 
-    /// The pose of the last frame.
     pub(super) fn last(&self, published: &FrameGuard<'_>) -> RigidPose {
         let [_, (last, _)] = self.of_frames(published);
         last

@@ -49,7 +49,6 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
         self.measured
     }
 
-    /// The weights in these rows.
     fn weights<V: VertexTable + ?Sized>(rows: &V) -> Result<[f32; K], StretchError> {
         let mut weights = [0.0; K];
         for (row, weight) in (0..).zip(&mut weights) {

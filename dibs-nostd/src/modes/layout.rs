@@ -14,7 +14,6 @@ pub const ANCHOR_TAIL_BYTES: usize = 8;
 /// Most anchors.
 pub const MAX_ANCHORS: usize = 65;
 
-/// The header's fields.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Header {
     pub modes: u32,
@@ -28,7 +27,6 @@ pub(super) struct Header {
     pub margin: f32,
 }
 
-/// One mode's record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mode {
     pub low: f32,
@@ -168,7 +166,6 @@ const fn f32_at(bytes: &[u8], at: usize) -> f32 {
     }
 }
 
-/// The record of a mode.
 pub(super) const fn mode(records: &[u8], mode: usize) -> Option<Mode> {
     let Some(at) = mode.checked_mul(MODE_BYTES) else { return None };
     match records.split_at_checked(at) {
@@ -189,7 +186,6 @@ pub(super) const fn decode(r: &[u8; MODE_BYTES]) -> Mode {
     }
 }
 
-/// The displacements of one vertex.
 #[inline(always)]
 pub(super) fn row(rows: &[u8], vertex: u32, modes: usize) -> Option<&[[u8; VERTEX_MODE_BYTES]]> {
     let stride = modes * VERTEX_MODE_BYTES;

@@ -95,7 +95,6 @@ pub struct Modes<'a> {
     mesh_id: u32,
     /// The unit of the surface's motion, with the tree's checksum.
     motion: MotionUnit,
-    /// The tree's stretch limit.
     limit: f32,
 }
 
@@ -264,7 +263,6 @@ impl<'a> Modes<'a> {
         Ok(ModalSurface::new(self, weights.iter().copied()))
     }
 
-    /// The records of all modes.
     fn modes(&self) -> impl Iterator<Item = layout::Mode> {
         self.records.as_chunks::<MODE_BYTES>().0.iter().map(layout::decode)
     }

@@ -22,7 +22,6 @@ pub struct ModalReader<'f, 'a, const K: usize> {
     last: Option<Last<K>>,
 }
 
-/// The last frame read.
 #[derive(Clone, Copy, Debug)]
 struct Last<const K: usize> {
     weights: Weights<K>,

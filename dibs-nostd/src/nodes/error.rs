@@ -88,10 +88,7 @@ impl fmt::Display for NodesError {
                 write!(f, "vertex {vertex} is bound to element {element}, there are {elements}")
             }
             Self::Weights { vertex, sum } => {
-                write!(
-                    f,
-                    "the sizes of the weights of vertex {vertex} sum up to {sum} parts of 65536"
-                )
+                write!(f, "the absolute weights of vertex {vertex} sum up to {sum} parts of 65536")
             }
         }
     }

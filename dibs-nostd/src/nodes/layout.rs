@@ -199,7 +199,6 @@ fn check(parts: &Parts<'_>) -> Result<f32, NodesError> {
     Ok(largest as f32 * (above / WHOLE as f32))
 }
 
-/// The position of a node.
 #[inline(always)]
 pub(super) fn position(
     &[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3]: &[u8; NODE_BYTES],
@@ -211,7 +210,6 @@ pub(super) fn position(
     )
 }
 
-/// The record of an element.
 #[inline(always)]
 pub(super) fn element(record: &[u8; ELEMENT_BYTES]) -> Element {
     let (words, _) = record.as_chunks::<4>();
@@ -252,13 +250,11 @@ pub(super) fn four([a, b, c, d]: &[[u8; ELEMENT_BYTES]; 4]) -> ([[u32; 4]; 4], A
     (corners, AtRest { products, least: last.z_axis })
 }
 
-/// The nodes of an element.
 #[inline(always)]
 pub(super) fn corners(record: &[u8; ELEMENT_BYTES]) -> [u32; 4] {
     element(record).corners
 }
 
-/// The binding of a vertex.
 #[inline(always)]
 pub(super) fn binding(row: &[u8; BINDING_BYTES]) -> Binding {
     let low = u64::from_le_bytes(*row);

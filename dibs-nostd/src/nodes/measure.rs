@@ -9,10 +9,8 @@ use crate::math::vec3x4::Vec3x4;
 use crate::stretch::{LEAST, StretchError, root_up, squared_limit};
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 
-/// The progress of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pass {
-    /// The next element.
     next: u32,
     /// The largest squared stretch so far, and its element.
     squared: f32,

@@ -95,7 +95,6 @@ pub struct Nodes<'a> {
     motion: MotionUnit,
     mesh_id: u32,
     facts: SurfaceFacts,
-    /// The tree's stretch limit.
     limit: f32,
 }
 

@@ -303,7 +303,6 @@ fn nearest_first(nearest: usize, count: usize) -> impl Iterator<Item = usize> {
     [nearest].into_iter().filter(move |&number| number < count).chain(others)
 }
 
-/// The state of a scene's search.
 struct Scene {
     /// The closest pair so far, with the interval and test counts of all pairs.
     best: Option<Closest>,

@@ -17,7 +17,6 @@ pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
     Ok((rows, positions(vertices, rows)?))
 }
 
-/// The positions of three rows.
 #[inline(always)]
 pub(super) fn positions<V: VertexTable + ?Sized>(
     vertices: &V,

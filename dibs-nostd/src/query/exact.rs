@@ -54,7 +54,6 @@ struct Seen<P: Precision> {
     /// Edge `e` leads from corner `e` to the next one.
     edges: [P::Vector; 3],
     normal: P::Vector,
-    /// Square of the normal's length.
     square: P,
     /// Height of the point above the plane, times the normal's length; and its error.
     height: P,
@@ -211,7 +210,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         }
     }
 
-    /// The least row of the triangles around a corner.
     fn first_around(&self, row: u32, corner: u32) -> Result<u32, NoSide> {
         let (mut first, mut at, mut corner) = (row, row, corner);
         for _ in 0..MAX_RING {
@@ -276,7 +274,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
 }
 
 impl<P: Precision> Seen<P> {
-    /// A triangle from the point `start + along`.
     #[inline(always)]
     fn new(corners: [P::Vector; 3], start: P::Vector, along: P::Vector) -> Self {
         let [a, b, c] = corners;

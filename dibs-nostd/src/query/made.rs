@@ -2,7 +2,6 @@
 
 use super::{Budget, Proximity};
 
-/// Test counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tests {
     pub node_tests: u32,

@@ -50,7 +50,6 @@ use separation::signed;
 pub struct Query<'t, I, const STACK: usize> {
     tree: Tree<'t, I>,
     stack: [Waiting; STACK],
-    /// The triangle of the last answer.
     triangle: Option<TriangleRow>,
     ties: Ties,
 }
@@ -128,7 +127,6 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
 }
 
 impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
-    /// The search of the closest pair.
     #[inline(always)]
     fn search<'s, V: VertexTable + ?Sized, T: Tool>(
         &'s mut self,

@@ -153,7 +153,6 @@ pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
     Ok([position(a)?, position(b)?, position(c)?])
 }
 
-/// The next corner.
 pub(super) const fn after(corner: u32) -> u32 {
     if corner == 2 { 0 } else { corner + 1 }
 }

@@ -42,7 +42,6 @@ impl Budget {
         self.tests
     }
 
-    /// The same, but at most `most`.
     pub(super) const fn at_most(self, most: u32) -> Self {
         if self.tests < most { self } else { Self { tests: most } }
     }

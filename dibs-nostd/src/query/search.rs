@@ -53,13 +53,11 @@ enum Step {
 /// The nearest pin so far: a pin is a point of the surface, so it gives an upper bound from the first node on.
 #[derive(Clone, Copy)]
 struct NearestPin {
-    /// Its row in the vertex table.
     row: u32,
     /// Its distance from the tool's axis.
     distance: f32,
 }
 
-/// The state of one search.
 pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     tree: &'s Tree<'t, I>,
     vertices: &'s V,

@@ -17,7 +17,6 @@ use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
-/// A query's arguments.
 pub(super) struct Asked<'a, 't, I, V: ?Sized, T> {
     pub tree: &'a Tree<'t, I>,
     pub vertices: &'a V,

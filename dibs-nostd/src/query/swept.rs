@@ -188,7 +188,6 @@ impl Sample {
     }
 }
 
-/// After the end.
 const ALWAYS: f32 = 2.0;
 /// Factor on a time that covers the rounding of its quotient.
 const ROUND_DOWN: f32 = 1.0 - 8.0 / 16_777_216.0;

@@ -13,7 +13,6 @@ struct Contig {
     /// Sequence numbers, `from..to`; empty where the slot is free.
     from: u16,
     to: u16,
-    /// Rows, `first..end`.
     first: u32,
     end: u32,
 }

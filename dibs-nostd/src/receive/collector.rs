@@ -20,7 +20,6 @@ use crate::wire::{
 
 pub use heartbeats::LastHeartbeat;
 
-/// The frame being received.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub id: FrameId,
@@ -40,7 +39,6 @@ pub(super) struct Frame {
     pub is_complete: bool,
 }
 
-/// The last published frame.
 #[derive(Clone, Copy, Debug)]
 struct Published {
     id: FrameId,

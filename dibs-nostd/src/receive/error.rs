@@ -194,7 +194,7 @@ impl fmt::Display for ReceiveError {
                 write!(f, "the sender's surface has {sent}; the receiver's has {here}")
             }
             Self::Forged { epoch } => write!(f, "a packet of frame {epoch} has no genuine tag"),
-            Self::Stale { epoch } => write!(f, "frame {epoch} is not later than what is here"),
+            Self::Stale { epoch } => write!(f, "frame {epoch} is not later than the last one"),
             Self::Earlier { by } => {
                 write!(f, "the surface was captured {by} before the published one")
             }
@@ -227,12 +227,12 @@ impl fmt::Display for ReceiveError {
                 )
             }
             Self::RowCount { rows } => write!(f, "the frame has {rows} rows"),
-            Self::Encoding => write!(f, "not the content or encoding that is received here"),
+            Self::Encoding => write!(f, "the content or encoding is not accepted"),
             Self::OutOfRange { first, count } => {
                 write!(f, "{count} rows from {first} are outside the surface")
             }
             Self::Order { sequence } => {
-                write!(f, "packet {sequence} of the frame does not go with the others")
+                write!(f, "the rows of packet {sequence} are out of order")
             }
             Self::Gaps { sequence } => {
                 write!(f, "packet {sequence} of the frame leaves too many gaps")

@@ -124,7 +124,6 @@ impl Trouble {
     }
 }
 
-/// A leaky bucket.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
     level: u32,

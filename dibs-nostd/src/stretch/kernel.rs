@@ -187,7 +187,6 @@ pub(crate) fn squared_limit(limit: f32) -> f32 {
     limit * limit * (1.0 - 2.0 * U)
 }
 
-/// The root of a square, rounded up.
 pub(crate) fn root_up(squared: f32) -> f32 {
     sqrt(squared) * (1.0 + 4.0 * U)
 }

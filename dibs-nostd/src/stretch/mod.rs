@@ -125,7 +125,7 @@ impl fmt::Display for StretchError {
                 write!(f, "the region of triangle {triangle} shrank below {limit} of its size")
             }
             Self::InsideOut { volume, reference } => {
-                write!(f, "the surface encloses {volume} where it should {reference}: inside out")
+                write!(f, "the surface is inside out: its volume is {volume}, expected {reference}")
             }
             Self::TooFast { vertex, step, limit } => {
                 write!(

@@ -78,7 +78,6 @@ pub struct StretchMonitor<'t, I, const SURFACES: usize = 1> {
     passes: [Pass; SURFACES],
     /// The stretch of the current frame's extrapolation; NaN unless measured and within the limit.
     ahead: f32,
-    /// The extrapolation is beyond the limit.
     is_beyond: bool,
     speed: f32,
     recovery: f32,

@@ -8,7 +8,6 @@ use super::{StretchError, rows};
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 use crate::tree::{Index, Tree, TriangleRow};
 
-/// No row.
 const NONE: u32 = u32::MAX;
 
 /// All regions, one bit each.
@@ -118,7 +117,6 @@ impl Pass {
     }
 }
 
-/// The rows of a region's triangles.
 fn rows_of<I: Index>(tree: &Tree<'_, I>, region: u32) -> Range<u32> {
     let rows = region_rows(tree);
     let triangles = tree.triangle_count();

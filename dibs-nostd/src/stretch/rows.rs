@@ -155,7 +155,6 @@ fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits>(
 
 /// An undecoded row of the metric section.
 trait MetricBits {
-    /// The bits of its numbers.
     fn bits(&self) -> [u32; 3];
 }
 
@@ -184,7 +183,6 @@ struct Before {
     edge: Vec3,
     /// The edge's slack under the largest square so far.
     left: f32,
-    /// The edge's square.
     square: f32,
 }
 

@@ -105,7 +105,6 @@ impl Volume {
     }
 }
 
-/// The rest shape of a tree.
 struct Rest<'r, 't, I>(&'r Tree<'t, I>);
 
 impl<I: Index> VertexTable for Rest<'_, '_, I> {

@@ -96,7 +96,6 @@ pub struct Head {
     stretch: [AtomicU32; MeasuredStretch::WORDS],
     /// The odometer's reading, all zero if there is none.
     motion: [AtomicU32; MotionReading::WORDS],
-    /// The numbers of [`PredictionCheck`].
     ahead: [AtomicU32; 4],
 }
 

@@ -133,7 +133,6 @@ impl MeasuredStretch {
         [self.sigma.to_bits(), self.tree, self.triangle]
     }
 
-    /// The inverse of [`to_words`](Self::to_words).
     pub(crate) const fn from_words(
         [sigma, tree, triangle]: [u32; MeasuredStretch::WORDS],
         epoch: u32,
@@ -141,7 +140,6 @@ impl MeasuredStretch {
         Self::new(f32::from_bits(sigma), tree, triangle, Some(epoch), [u8::MAX; REGIONS])
     }
 
-    /// Number of words of a measurement.
     pub(crate) const WORDS: usize = 3;
 }
 

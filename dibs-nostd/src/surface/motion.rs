@@ -324,7 +324,6 @@ pub struct Odometer {
     tree: u32,
     /// Number of rows in a frame.
     vertices: usize,
-    /// Number of vertices of the surface.
     surface: usize,
     motion: Option<MotionReading>,
     /// Digest of the last measured frame.

@@ -199,7 +199,6 @@ impl MovingSurface for FrameGuard<'_> {
 /// The step from a published frame to the next.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LastStep {
-    /// Readings of the odometer.
     from: MotionReading,
     motion: MotionReading,
     units: u64,
@@ -283,7 +282,6 @@ pub struct FrameView<'f> {
 }
 
 impl<'f> FrameView<'f> {
-    /// The view of a labelled buffer.
     pub(super) const fn published(buffer: Buffer<'f>) -> Self {
         Self { buffer, is_published: true }
     }
@@ -293,7 +291,6 @@ impl<'f> FrameView<'f> {
         self.buffer.head.label()
     }
 
-    /// Its odometer's reading.
     pub(crate) fn motion(&self) -> Option<MotionReading> {
         self.buffer.head.motion()
     }

@@ -208,7 +208,6 @@ impl Candidate {
     }
 }
 
-/// A set of the triangle's edges.
 #[derive(Clone, Copy)]
 struct Edges(u32);
 

@@ -33,7 +33,6 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
-    /// The row of the triangle across an edge.
     #[inline]
     pub(crate) const fn row_across(&self, triangle: u32, edge: u32) -> Option<u32> {
         // If no two rows share a code, it is the row itself.
@@ -49,7 +48,6 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
-    /// The triangle across an edge, and the number of that edge in it.
     #[inline]
     pub(crate) const fn across(&self, triangle: u32, edge: u32) -> Option<(u32, u32)> {
         let Some(code) = format::neighbour_code::<I>(self.sections.adjacency, triangle, edge)

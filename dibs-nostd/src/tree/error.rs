@@ -162,7 +162,10 @@ impl fmt::Display for FormatError {
             Self::Radius { node, code } => write!(f, "node {node} has radius code {code}"),
             Self::Leaf { first } => write!(f, "the leaf at triangle {first} is out of order"),
             Self::Patch { triangle, vertex } => {
-                write!(f, "corner {vertex} of triangle {triangle} is not where its leaf needs it")
+                write!(
+                    f,
+                    "corner {vertex} of triangle {triangle} is new to its leaf, but not third"
+                )
             }
             Self::Corner { triangle, vertex } => {
                 write!(f, "triangle {triangle} uses missing vertex {vertex}")

@@ -63,7 +63,6 @@ impl Header {
     }
 }
 
-/// The largest code of a unit.
 const MAX_UNIT: u32 = Unit::Micrometre.code() as u32;
 
 /// A header field. The length has been checked, so it exists.

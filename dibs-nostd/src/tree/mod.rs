@@ -366,21 +366,18 @@ impl<'a, I: Index> Tree<'a, I> {
         format::whole_node::<I>(self.sections.nodes, row)
     }
 
-    /// As [`several::copy_nodes`].
     #[cfg(feature = "wide")]
     #[inline(always)]
     pub(crate) fn copy_nodes(&self, first: u32, count: u32, to: &mut [u8]) -> Option<()> {
         several::copy_nodes::<I>(self.sections.nodes, first, count, to)
     }
 
-    /// As [`several::leaf_vertices`].
     #[cfg(feature = "wide")]
     #[inline(always)]
     pub(crate) fn leaf_vertices(&self, first: u32, count: u32) -> Option<[u32; 12]> {
         several::leaf_vertices::<I>(self.sections.triangles, first, count)
     }
 
-    /// As [`several::four_triangles`].
     #[cfg(feature = "wide")]
     #[inline(always)]
     pub(crate) fn four_triangles(&self, first: u32, count: u32) -> Option<[[u32; 4]; 3]> {

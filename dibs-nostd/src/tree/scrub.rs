@@ -145,7 +145,6 @@ mod tests {
         }
     }
 
-    /// Every bit of the decoded header, and every section offset.
     #[test]
     fn every_flipped_bit_of_the_decoded_header_is_found() {
         let mesh = dibs_build::generate::heart(320).expect("a valid size").mesh;

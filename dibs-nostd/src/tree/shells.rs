@@ -57,7 +57,6 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
-    /// The root above a triangle.
     pub(crate) fn root_of(&self, triangle: u32) -> u32 {
         let mut found = 0;
         for root in 1..=self.header.other_roots {

@@ -244,7 +244,6 @@ const fn is_metric<I: Index>(parts: &Parts<'_, I>, row: u32) -> bool {
         && is_joined
 }
 
-/// The corners of a triangle, its centre first.
 const fn centre_first<I: Index>(parts: &Parts<'_, I>, row: u32) -> Option<[u32; 3]> {
     match (parts.metric(row), parts.triangle(row)) {
         (Some(metric), Some(corners)) => Some(metric.centre_first(corners)),

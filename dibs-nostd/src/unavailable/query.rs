@@ -96,7 +96,7 @@ impl fmt::Display for QueryError {
             Self::Uncovered { pin } => {
                 write!(
                     f,
-                    "no triangle found within reach of vertex {pin}: over-stretched or corrupt"
+                    "no triangle is as close as vertex {pin}: over-stretched or corrupt"
                 )
             }
             Self::NoAdjacency => f.write_str(
@@ -104,7 +104,7 @@ impl fmt::Display for QueryError {
                  it was built without adjacency",
             ),
             Self::Contacts { capacity, near } => {
-                write!(f, "a list cannot hold {capacity} contacts and look at {near} triangles")
+                write!(f, "a list cannot hold {capacity} contacts and compare {near} triangles")
             }
             Self::Margin { bits } => write!(f, "a margin cannot be {}", f32::from_bits(bits)),
             Self::BlendTime { bits } => {

@@ -83,14 +83,14 @@ impl fmt::Display for PacketError {
                     "the packet states checksum {stated:#010x}, its bytes have {computed:#010x}"
                 )
             }
-            Self::Version { version } => write!(f, "protocol version {version} is not spoken here"),
+            Self::Version { version } => write!(f, "protocol version {version} is not supported"),
             Self::Kind { kind } => write!(f, "packet kind {kind} does not exist"),
             Self::Reserved { offset } => write!(f, "the field at byte {offset} must be zero"),
             Self::Sequence { sequence } => {
-                write!(f, "sequence number {sequence} does not go with the packet's kind")
+                write!(f, "sequence number {sequence} does not fit the packet's kind")
             }
             Self::Length { bytes, expected } => {
-                write!(f, "the packet has {bytes} bytes where its kind and count make {expected}")
+                write!(f, "the packet has {bytes} bytes, its kind and count require {expected}")
             }
             Self::Empty => write!(f, "a packet of vertices or weights without any"),
             Self::Content { content } => write!(f, "frame content {content} does not exist"),

@@ -182,7 +182,6 @@ impl<'a> Packet<'a> {
     }
 }
 
-/// Bytes of a status before its counters.
 pub(super) const STATUS_BYTES: usize = 20;
 
 /// Bit of a begin's form, and of a heartbeat's: the word before the body is an echo.

@@ -162,7 +162,6 @@ impl SpringDamper {
         Ok(self)
     }
 
-    /// The damping of the hold.
     const fn held(&self) -> f32 {
         match self.hold_damping {
             Some(damping) => damping,

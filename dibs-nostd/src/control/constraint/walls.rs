@@ -12,13 +12,11 @@
 
 use glam::Vec3;
 
-/// Most walls.
 pub(super) const MOST: usize = 8;
 
 /// Fraction of its depth by which a wall yields under its force, so that two contacts with one wall share the force.
 pub(super) const COMPLIANCE: f32 = 1.0 / 16.0;
 
-/// Most steps.
 const STEPS: u32 = 32;
 
 /// One wall, and the tool's depth in it.
@@ -56,7 +54,6 @@ impl Wall {
     }
 }
 
-/// The displacement.
 pub(super) fn displacement(mut walls: [Wall; MOST]) -> Vec3 {
     let mut at = Vec3::ZERO;
     let mut is_refined = false;

@@ -71,7 +71,6 @@ fn seen(now: u32, epoch: u32, age: u32) -> Observation {
     }
 }
 
-/// A machine in a state, after frame 100.
 fn machine(state: State, limits: Limits) -> FailSafe {
     let mut machine = FailSafe::new(limits);
     for epoch in 0..=100 {

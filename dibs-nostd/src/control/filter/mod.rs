@@ -81,13 +81,11 @@ pub use row::MotionRow;
 use session::Session;
 pub use uncertainty::Uncertainty;
 
-/// Most pairs of tool and surface.
 const MOST_PAIRS: usize = 8;
 
 /// By how much (mm) a verified separation may be below the stand-off.
 const EPSILON: f32 = 0.01;
 
-/// Least lever (mm).
 const LEAST_LEVER: f32 = 1.0;
 
 /// Instructions of a tick's queries by default.

@@ -70,7 +70,6 @@ impl Motion {
         [t.x, t.y, t.z, r.x, r.y, r.z]
     }
 
-    /// The inverse of [`to_vector`](Self::to_vector).
     pub(super) fn from_vector(about: Vec3, vector: &Vector, lever: f32) -> Self {
         let [x, y, z, a, b, c] = *vector;
         Self {

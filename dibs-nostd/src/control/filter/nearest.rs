@@ -37,7 +37,6 @@ impl HalfSpace {
     }
 }
 
-/// The nearest point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nearest {
     pub point: Vector,
@@ -141,7 +140,6 @@ fn drop_row(active: &mut Vec<Active, UNKNOWNS>, at: usize) {
     *active = kept;
 }
 
-/// The scalar product.
 pub(super) fn dot(a: &Vector, b: &Vector) -> f32 {
     let mut sum = 0.0;
     for (a, b) in a.iter().zip(b) {
@@ -150,7 +148,6 @@ pub(super) fn dot(a: &Vector, b: &Vector) -> f32 {
     sum
 }
 
-/// Adds a multiple of `b`.
 pub(super) fn add(a: &mut Vector, b: &Vector, factor: f32) {
     for (a, b) in a.iter_mut().zip(b) {
         *a += b * factor;

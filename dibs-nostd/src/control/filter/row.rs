@@ -12,7 +12,6 @@ use crate::math::sqrt::sqrt;
 /// Most rows of one solution.
 const MOST: usize = 16;
 
-/// Most rows of the caller.
 pub(super) const MOST_OWN: usize = 8;
 
 /// Shortfall (mm) of a caller's row that is ignored.
@@ -68,16 +67,13 @@ impl MotionRow {
 /// The wall of a pair, found at one pose and used for poses near it.
 #[derive(Clone, Copy)]
 struct Wall {
-    /// The pair's index.
     pair: usize,
-    /// Unit factors.
     factors: Vector,
     /// The smallest sum that keeps the pair at distance 0, and the length of the factors before normalisation.
     zero: f32,
     length: f32,
 }
 
-/// The rows of a period.
 pub(super) struct Rows {
     own: Vec<HalfSpace, MOST_OWN>,
     walls: Vec<Wall, MOST>,

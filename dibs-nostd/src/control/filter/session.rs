@@ -28,7 +28,6 @@ const LEAST_TESTS: u32 = 32;
 /// A pair's distance at a pose.
 #[derive(Clone, Copy)]
 struct Known {
-    /// Ends of the axis.
     ends: [Vec3; 2],
     /// Lower bound on the axis' distance from the surface; negative inside.
     distance: f32,

@@ -87,7 +87,6 @@ impl Case {
     }
 }
 
-/// The exact inverse of a pose.
 fn inverse(pose: &RigidPose, point: DVec3) -> DVec3 {
     let rotation = pose.rotation().as_dquat().normalize();
     rotation.inverse() * (point - pose.shift().as_dvec3())

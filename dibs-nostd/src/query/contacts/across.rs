@@ -64,7 +64,6 @@ impl Across {
     };
 }
 
-/// A point of the axis.
 #[derive(Clone, Copy)]
 struct Place {
     /// Its distance (mm) from the deepest point, in the direction in which the deepest point's triangle recedes.

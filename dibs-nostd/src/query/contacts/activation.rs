@@ -30,10 +30,8 @@ pub(super) fn least_ridge(distance: f32, (most, error): (f32, f32)) -> f32 {
     (if ridge < most { ridge } else { most }) + error
 }
 
-/// A path to a triangle.
 #[derive(Clone, Copy)]
 struct Path {
-    /// The largest height along it.
     height: f32,
     entry: u16,
 }

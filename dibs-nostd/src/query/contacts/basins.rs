@@ -41,7 +41,6 @@ pub(super) struct Place(u32);
 impl Place {
     /// No direction, and no edge.
     pub const NONE: Self = Self(0);
-    /// Bits of the direction.
     const DIRECTION: u32 = (1 << 27) - 1;
     /// Largest distance of two unit vectors in nearly the same direction: 7 degrees.
     const ALIKE: f32 = 0.125;
@@ -102,7 +101,6 @@ impl Key {
     }
 }
 
-/// No entry.
 const NONE: u16 = u16::MAX;
 
 /// The nearest low triangles, at most half of `N`; then the triangles that floods have reached.
@@ -122,7 +120,6 @@ pub(super) struct Basins<const N: usize> {
     count: usize,
 }
 
-/// The outcome of a flood.
 enum Flood {
     /// It has reached everything below its level; the lowest triangle. If that is beyond a ridge and in another
     /// direction, also the lowest before the ridge.
@@ -336,12 +333,10 @@ impl<const N: usize> Basins<N> {
         Ok(Some((self.count - 1) as u16))
     }
 
-    /// An entry's triangle.
     pub(super) fn at(&self, entry: u16) -> Option<Near> {
         self.near.get(usize::from(entry)).map(|key| key.near())
     }
 
-    /// An entry's distance.
     pub(super) fn height(&self, entry: u16) -> Option<f32> {
         self.at(entry).map(|near| sqrt(near.square))
     }

@@ -6,7 +6,6 @@ use heapless::Vec;
 
 use super::Contact;
 
-/// Up to `N` contacts.
 #[derive(Clone, Debug)]
 pub(super) struct List<const N: usize> {
     pub list: Vec<Contact, N>,

@@ -66,7 +66,6 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     options: Options,
     /// The closest pair; if the axis crosses, it is on the surface.
     closest: &'s Proximity,
-    /// The whole axis is inside.
     is_inside: bool,
     /// The intersections of the axis with the surface.
     touches: Touches,
@@ -75,9 +74,7 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     deepest: f32,
     /// Its parameter; NaN if no point is inside.
     deepest_at: f32,
-    /// Points searched.
     looks: u32,
-    /// A tracker's memory.
     remembered: Option<Remembered<'s>>,
     /// Roots of the shells that decide.
     roots: RootSet,
@@ -155,7 +152,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.finish(bound)
     }
 
-    /// Remembers the parts.
     fn keep(&mut self, parts: &mut Parts, deepest: f32) {
         let Some(searched) = self.searched() else { return };
         while parts.count() > Points::MOST && parts.join([deepest, searched], f32::INFINITY) {}

@@ -327,7 +327,6 @@ impl Parts {
     }
 }
 
-/// Square of the distance from a point to a triangle.
 pub(super) fn square(point: Vec3, corners: &[Vec3; 3]) -> f32 {
     let pair = AxisPoint(point).closest_on_triangle(corners, f32::INFINITY);
     pair.map_or(f32::INFINITY, |pair| pair.distance_squared)

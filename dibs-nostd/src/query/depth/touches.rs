@@ -15,7 +15,6 @@ const PLACES: usize = 8;
 /// triangle is found by bisection.
 const INCLINED: f32 = 1.0 / 256.0;
 
-/// Number of bisections.
 const HALVINGS: u32 = 8;
 
 /// The disjoint intervals in which an axis may meet the surface.

@@ -8,7 +8,6 @@ use crate::tool::Tool;
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
 
-/// Most steps.
 const STEPS: u32 = 4;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {

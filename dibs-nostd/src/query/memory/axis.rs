@@ -6,7 +6,6 @@ use crate::Tool;
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
 
-/// An earlier axis.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Axis {
     start: Vec3,

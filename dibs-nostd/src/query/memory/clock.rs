@@ -12,7 +12,6 @@ pub(in crate::query) struct MotionClock {
     now: u64,
 }
 
-/// A reading of a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::query) struct Reading(u64);
 

@@ -28,7 +28,6 @@ pub(in crate::query) struct Point {
     pub triangle: TriangleRow,
 }
 
-/// The last depth.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct KnownDepth<const STACK: usize> {
     state: State,
@@ -66,7 +65,6 @@ pub(in crate::query) struct Remembered<'m> {
     pub between: [f32; 2],
 }
 
-/// The points of the last depth.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Points {
     points: Vec<Point, KEPT>,

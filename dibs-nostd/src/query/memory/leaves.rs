@@ -6,10 +6,8 @@ use heapless::{Vec, VecView};
 
 use super::waiting::Waiting;
 
-/// Most leaves.
 pub(in crate::query) const MOST: usize = 48;
 
-/// The leaves around a point.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Leaves {
     leaves: Vec<Leaf, MOST>,
@@ -21,7 +19,6 @@ pub(in crate::query) struct Leaves {
     beyond: f32,
     /// The same for the leaves skipped so far during collection.
     passed: f32,
-    /// A collection is in progress.
     is_gathering: bool,
     /// The point's parameter on its axis: 0 at the start, 1 at the end.
     parameter: f32,
@@ -29,7 +26,6 @@ pub(in crate::query) struct Leaves {
     step: f32,
 }
 
-/// A leaf.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Leaf {
     pub link: u32,

@@ -36,7 +36,6 @@ use separation::KnownSeparation;
 const LONGEST_WAIT: u32 = 1 << 29;
 const _: () = assert!(LONGEST_WAIT < (1 << 31) - FAR as u32 - 1);
 
-/// A tracker's memory.
 #[derive(Clone, Debug)]
 pub(super) struct Memory<const STACK: usize, const OPENED: usize, const RANGE: usize> {
     pub clock: MotionClock,

@@ -26,7 +26,6 @@ const FLAT: f32 = 1.0 / 256.0;
 
 /// A triangle as seen from the axis.
 struct Seen {
-    /// The slot of its lowest corner.
     lowest: Place,
     /// Lower bound on the square of its distance.
     low: f32,
@@ -311,12 +310,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 }
 
-/// The next corner or edge.
 const fn after(corner: u32) -> u32 {
     if corner == 2 { 0 } else { corner + 1 }
 }
 
-/// The previous corner or edge.
 const fn before(corner: u32) -> u32 {
     if corner == 0 { 2 } else { corner - 1 }
 }

@@ -27,7 +27,6 @@ use crate::{Index, Proximity, Tool, TriangleRow, VertexTable};
 /// A motion of more units than this, at most a 64th of the root sphere's radius, may invalidate most of the front.
 const LARGE_STEP: u32 = 1 << 18;
 
-/// The outcome of a tick.
 pub(in crate::query) enum Outcome {
     /// No unsearched part of the surface is closer to the axis than `lower`. `is_complete`: every due bound was tested;
     /// `restarted`: the front was started anew.
@@ -36,7 +35,6 @@ pub(in crate::query) enum Outcome {
     Full { tests: Tests },
 }
 
-/// One tick.
 pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
     search: Search<'s, 't, I, V, T>,
     front: FrontMut<'f>,
@@ -182,7 +180,6 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(Visit::Done)
     }
 
-    /// The node in a slot.
     #[inline(always)]
     fn record(&mut self, place: Place) -> Option<Node> {
         match Link::decode(self.front.node(place.node)?.link) {

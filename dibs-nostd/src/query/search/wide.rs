@@ -31,7 +31,6 @@ const MOST_NODE_BYTES: usize = node_bytes::<u32>();
 /// a large stack.
 const MOST_WAITING: usize = 128;
 
-/// A search in batches.
 pub(in crate::query) struct WideSearch<'s, 't, I, V: ?Sized, T> {
     search: Search<'s, 't, I, V, T>,
     /// Most entries that a batch of several subtrees may leave: the rest of the stack suffices for one subtree at a

@@ -225,7 +225,6 @@ impl Certain {
         Self { lower: self.lower, upper: self.upper, ..Self::of(found, 0.0) }
     }
 
-    /// Sets the ends of an answer.
     #[inline(always)]
     fn set_ends(&self, found: &mut Proximity, radius: f32) {
         found.lower = sum_down(sum_down(self.lower, -radius), found.accuracy);

@@ -21,7 +21,6 @@ use crate::{
     VertexTable, measure_stretch,
 };
 
-/// A bound in the front.
 struct Bound {
     /// The opened node's slot, and the child.
     place: (u16, u32),

@@ -48,9 +48,7 @@ pub(crate) struct PoseStep {
     centre: Vec3,
     /// The vector from the mesh's origin to the centre, rotated as at the end.
     arm: Vec3,
-    /// Half of the rotation vector.
     half: Vec3,
-    /// The centre's displacement.
     shifted: Vec3,
 }
 

@@ -153,7 +153,6 @@ fn a_point_in_the_mesh_is_off_by_no_more_than_its_rounding() {
     assert!(most > 0.02 && beyond > 0.02);
 }
 
-/// The velocity is the derivative of the position.
 #[test]
 fn a_velocity_is_that_of_the_points() {
     let mut rng = Rng::with_seed(5);

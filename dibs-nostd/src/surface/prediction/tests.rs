@@ -22,7 +22,6 @@ use crate::{
 /// Vertices of the heart of 320 triangles.
 const ROWS: usize = 162;
 
-/// Kinds of motion of the frames.
 #[derive(Clone, Copy, PartialEq)]
 enum Motion {
     /// Velocities change a little from frame to frame, at steady rates of frames and ticks.

@@ -227,7 +227,6 @@ impl Link {
     }
 }
 
-/// A stored node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     pub pin: u32,

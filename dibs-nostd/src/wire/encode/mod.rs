@@ -185,7 +185,6 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         self.put_u24(surface.triangles);
     }
 
-    /// The body of a begin packet.
     fn begin(&mut self, begin: &Begin) {
         let [_, _, high @ ..] = begin.session.to_le_bytes();
         self.put(&high);
