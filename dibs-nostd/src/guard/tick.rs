@@ -122,7 +122,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     /// margin has each contact as soon as it must act.
     ///
     /// A guard from [`start_with_contacts`](super::Surface::start_with_contacts) remembers the nodes that a search for
-    /// contacts opened; without it each tick searches anew. The list is empty if there is no surface, or the query
+    /// contacts opened; without it each tick searches from the root. The list is empty if there is no surface, or the query
     /// failed. Its [accuracy](Contacts::accuracy) covers the same errors as the pair's.
     ///
     /// Cost: the budget at most, plus about a thousand instructions, and some hundred for each contact.
@@ -299,7 +299,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
 
     /// The answer of a tick without a tool pose: the state is safe, with the cause [`Unavailable::NoPose`] while there
     /// is a surface. The constraint's output is the hold, with zero force as no velocity is known to damp. The next
-    /// tick's velocity starts anew.
+    /// tick's velocity restarts.
     pub fn without_pose(&mut self, now: Millis) -> Answer {
         self.before = None;
         let Self { notes, reader, tree, tracker, failsafe, .. } = self;

@@ -346,7 +346,7 @@ impl<P: Precision> Seen<P> {
         is_clear.then_some(self.height > P::from(0.0))
     }
 
-    /// Whether the point's sine to this plane is larger than to `other`'s for any rounding.
+    /// Whether the point's sine to this plane is certainly larger than to `other`'s, despite rounding.
     fn has_larger_sine_than(&self, other: &Self) -> bool {
         let least = self.height.absolute() - self.doubt;
         let most = other.height.absolute() + other.doubt;

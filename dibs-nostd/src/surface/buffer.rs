@@ -23,7 +23,7 @@ pub struct FrameLabel {
     pub stretch: Option<MeasuredStretch>,
 }
 
-/// The extrapolation of a frame, and the frame's distance from the previous one.
+/// The stretch of a frame's extrapolation, and the frame's distance from the previous extrapolation.
 #[derive(Clone, Copy, Debug)]
 pub struct PredictionCheck {
     /// The largest stretch at the end of its extrapolation; NaN unless measured, and within the tree's limit.

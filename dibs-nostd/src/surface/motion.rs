@@ -300,7 +300,7 @@ impl<V: VertexTable + ?Sized> MovingSurface for MovingTable<'_, V> {
 /// Measures how far a surface moves from one frame to the next.
 ///
 /// Only a measurement of consecutive frames creates a [`MotionReading`]. If `before` is not the last measured frame, by
-/// a digest of all its positions, the odometer starts anew, and so do trackers.
+/// a digest of all its positions, the odometer restarts, and so do trackers.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -360,7 +360,7 @@ impl Odometer {
     }
 
     /// Measures the step from `before`, which must be the last measured frame, to `after`. Otherwise the odometer
-    /// starts anew.
+    /// restarts.
     ///
     /// Cost: one pass over the vertices of both, some 15 floating point operations each.
     pub fn step<'v, V: VertexTable + ?Sized, W: VertexTable + ?Sized>(

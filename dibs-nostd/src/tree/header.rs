@@ -20,7 +20,7 @@ pub(crate) struct Header {
     pub position_error: f32,
     /// 1 if there is an origin section, else 0.
     pub origin: u32,
-    /// Roots besides the first. The roots are the first rows of the node table.
+    /// Number of roots less one. The roots are the first rows of the node table.
     pub other_roots: u32,
     /// Rows of the section table.
     pub sections: u32,

@@ -50,7 +50,7 @@ pub enum Unavailable {
         /// Its age then.
         age: Millis,
     },
-    /// More packets were forged than allowed since the last publication.
+    /// More packets were forged than allowed.
     Forgeries {
         /// Packets without a genuine tag.
         count: u32,

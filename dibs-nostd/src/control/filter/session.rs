@@ -57,7 +57,7 @@ struct State {
     start: Known,
     /// The last pose searched after the start.
     end: Option<Known>,
-    /// Separation is the distance minus this, for any tissue position at the start.
+    /// The distance minus this is a lower bound on the separation at the start.
     reach: f32,
     /// The least distance allowed during the motion.
     least: f32,

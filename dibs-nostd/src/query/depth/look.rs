@@ -113,7 +113,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 }
                 return search.gather(gathered, waiting).map(Some);
             }
-            // A bound that barely suffices now would not at the next tick.
+            // No early end: a bound that barely suffices now would not at the next tick.
             limit = EXACT;
         }
         let found = search.run::<UNTIL>(limit)?;

@@ -2,12 +2,12 @@
 //!
 //! A child of an opened node is opened itself, or a leaf within the range, or farther: all farther children of a node
 //! share one deadline. Leaves within the range are visited in every tick, farther children once the deadline has
-//! passed. Opened nodes stay open until no slot is free; then the front starts anew.
+//! passed. Opened nodes stay open until no slot is free; then the front restarts.
 
 use super::clock::{Deadline, MotionClock, Reading};
 use crate::tree::format::{Link, MAX_CHILDREN};
 
-/// After a motion of more units than this, a 16th to a 32nd of the root sphere's radius, the front starts anew.
+/// After a motion of more units than this, a 16th to a 32nd of the root sphere's radius, the front restarts.
 const JUMP: u32 = 1 << 20;
 
 /// A node whose children are handled separately.
@@ -78,7 +78,7 @@ impl<const M: usize> RangeFront<M> {
 
 impl RangeFrontMut<'_> {
     /// Ends the search. Nodes that the budget did not reach are unchanged and stay due; as deadlines wrap, the front
-    /// starts anew if that lasts too long.
+    /// restarts if that lasts too long.
     pub fn keep(&mut self, is_whole: bool) {
         self.state.searched = Some(if is_whole { self.clock.now() } else { self.searched });
     }

@@ -29,7 +29,7 @@ const LARGE_STEP: u32 = 1 << 18;
 
 pub(in crate::query) enum Outcome {
     /// No unsearched part of the surface is closer to the axis than `lower`. `is_complete`: every due bound was tested;
-    /// `restarted`: the front was started anew.
+    /// `restarted`: the front was restarted.
     Ended { lower: f32, is_complete: bool, restarted: bool },
     /// The front has no free slot; the tests made until then.
     Full { tests: Tests },

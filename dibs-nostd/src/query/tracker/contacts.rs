@@ -12,7 +12,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     /// The closest pair, and all contacts within `margin` (mm), as in [`Query::contacts`](crate::Query::contacts).
     ///
     /// Where the surface is within the margin, a range search finds the other contacts. The tracker remembers up to
-    /// `RANGE` nodes that it opened, and how long their other children stay beyond the margin. This memory starts anew
+    /// `RANGE` nodes that it opened, and how long their other children stay beyond the margin. This memory restarts
     /// for another surface, for a tool that moved by a 16th of the root sphere's radius, and once all slots are used
     /// ([`opened_in_range`](Self::opened_in_range)). If the budget ends, the list's bound can be lower than a query's,
     /// which searches near parts first.

@@ -141,7 +141,7 @@ pub enum Fallback {
     Surface,
     /// Tool or surface moved so far that more than half of the front's bounds ran out.
     Jump,
-    /// More nodes had to be opened than there are slots. The next tick starts anew. If this occurs often, a tracker
+    /// More nodes had to be opened than there are slots. The next tick restarts. If this occurs often, a tracker
     /// costs more than a query: it has too few slots for this surface and these poses. `dibs track` counts the slots
     /// needed.
     Full,
@@ -194,7 +194,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     }
 
     /// Number of nodes that the last search for [contacts](Self::contacts) left open, of `RANGE` slots. Once all are
-    /// used, the next search starts anew; nodes without a slot are searched as in a query.
+    /// used, the next search restarts; nodes without a slot are searched as in a query.
     #[must_use]
     pub const fn opened_in_range(&self) -> u32 {
         self.memory.range.opened()

@@ -87,7 +87,7 @@ fn no_bound_exceeds_the_distance() {
         let [before, after] = pair else { unreachable!() };
         let step = odometer.step(before.as_slice(), after.as_slice());
         for tick in 0..8 {
-            // Sometimes so far that the front starts anew.
+            // Sometimes so far that the front restarts.
             let size = if tick == 7 { 10.0 } else { 0.5 };
             (tip, span) = (tip * 0.999 + vector(size), span * 0.999 + vector(size));
             let tool = Capsule::new(tip, tip + span, 2.0).expect("a valid capsule");

@@ -14,7 +14,7 @@ impl Odometer {
     /// The frame `after`, which is held until the next one; `before` is the frame held until now.
     ///
     /// A measured motion saves a tracker at most one whole query at each new frame. If a query costs less than
-    /// measuring the rows, as on any large surface, the odometer starts anew instead, and so do trackers; if it costs
+    /// measuring the rows, as on any large surface, the odometer restarts instead, and so do trackers; if it costs
     /// more, this is [`step`](Self::step) and [`Step::after`](super::super::Step::after). For several tools, or for a
     /// surface that moves between frames, measure the step.
     ///

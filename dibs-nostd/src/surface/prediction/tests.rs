@@ -204,7 +204,7 @@ fn a_course_is_not_cut_to_the_numbers_that_fit() {
     assert_ne!(Prediction::new((1 << 32) - 1, &ahead, 1.0), Prediction::NONE);
 }
 
-/// An odometer whose counter would overflow starts anew.
+/// An odometer whose counter would overflow restarts.
 #[test]
 fn a_reading_that_does_not_fit_is_a_start() {
     let start = MotionReading::start(7);

@@ -83,7 +83,7 @@ pub mod field {
     pub const POSITION_ERROR: usize = 36;
     /// 1 if the tree has an origin section, else 0.
     pub const ORIGIN: usize = 40;
-    /// Roots besides the first.
+    /// Number of roots less one.
     pub const OTHER_ROOTS: usize = 44;
     /// Rows of the section table.
     pub const SECTIONS: usize = 48;
