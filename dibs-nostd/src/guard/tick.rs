@@ -122,8 +122,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     /// margin has each contact as soon as it must act.
     ///
     /// A guard from [`start_with_contacts`](super::Surface::start_with_contacts) remembers the nodes that a search for
-    /// contacts opened; without it each tick searches from the root. The list is empty if there is no surface, or the query
-    /// failed. Its [accuracy](Contacts::accuracy) covers the same errors as the pair's.
+    /// contacts opened; other guards search from the root at each tick. The list is empty if there is no surface, or
+    /// the query failed. Its [accuracy](Contacts::accuracy) covers the same errors as the pair's.
     ///
     /// Cost: the budget at most, plus about a thousand instructions, and some hundred for each contact.
     pub fn contacts<T: Tool, const N: usize, const NEAR: usize>(

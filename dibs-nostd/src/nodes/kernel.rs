@@ -81,7 +81,7 @@ pub(super) struct Now<T> {
 }
 
 impl<T: Lanes> Now<T> {
-    /// From the coordinates of its four nodes.
+    /// The shape from the coordinates of its four nodes.
     #[inline(always)]
     pub fn of([a, b, c, d]: [[T; 3]; 4]) -> Self {
         let (first, second, third) = (minus(b, a), minus(c, b), minus(d, c));

@@ -59,7 +59,7 @@ pub enum ReceiveError {
         /// The event by which its begin, or the frame, was refused.
         cause: Event,
     },
-    /// As unexpected; its tag cannot be verified because no begin of its session was received.
+    /// As [`Unexpected`](Self::Unexpected); its tag cannot be verified because no begin of its session was received.
     Unverifiable {
         /// The packet's epoch.
         epoch: u32,

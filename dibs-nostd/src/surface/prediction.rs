@@ -23,7 +23,7 @@ pub(crate) struct Prediction {
 }
 
 impl Prediction {
-    /// Of a surface that is not extrapolated.
+    /// No extrapolation.
     pub const NONE: Self = Self { units: 0, passed: 0, off: 0 };
 
     /// The prediction of a surface extrapolated by `t` of the step, `units` long, to a frame whose label has `ahead`.

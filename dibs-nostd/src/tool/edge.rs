@@ -48,7 +48,6 @@ pub(super) fn edge_to_point(corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
 /// axis.
 pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
     let (corner_along, edge_along) = (corner.dot(axis.direction), edge.dot(axis.direction));
-    // The edge projected along the axis.
     let corner_across = corner - corner_along * axis.direction;
     let edge_across = edge - edge_along * axis.direction;
     let across_squared = edge_across.dot(edge_across);

@@ -46,7 +46,6 @@ pub(super) const fn well_formed<I: Index>(
 /// rows to which no earlier link points. This proves a tree that includes every node.
 const fn nodes<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let header = parts.header;
-    // The first level is the roots.
     let roots = header.other_roots + 1;
     let (mut level_end, mut next_node) = (roots, roots);
     let (mut stack, mut most_siblings) = (roots, 1);

@@ -42,7 +42,7 @@ pub enum Unavailable {
     },
     /// The transit of the surface was longer than allowed, or is unknown.
     Delayed {
-        /// From the status that it echoes to its arrival; [`Millis::MAX`] if it echoes none.
+        /// Time from the status that the frame echoes to its arrival; [`Millis::MAX`] if it echoes none.
         transit: Millis,
     },
     /// The surface was older than allowed when it was sent: its source has stopped.
