@@ -10,13 +10,13 @@
 //!
 //! Let `u = 2^-24`, and `X` be `L M - G` as computed. The entries of `G` come from differences of coordinates: those on
 //! the diagonal have errors of at most `5 u` of themselves, others of `5 u |ei| |ej|`; a difference `L m - g` adds two
-//! roundings. So, for `X` positive definite, `X` has an error of at most `6.1 u L m_ii` on the diagonal and `12.1 u L
-//! sqrt(m_ii m_jj)` elsewhere. The minors are those of a matrix near `X`, as in an error analysis of Cholesky's
-//! factorisation: `x11 x22 - x12^2` is exact for an `x22` changed by `2 u` of itself, `x11 x23 - x12 x13` for an `x23`
-//! changed likewise, and the comparison of the products for an `x33` changed by `9 u`. In total `F^T F` is at most `L`
-//! for an `M` larger by at most `44 u` of its diagonal; storing the entries adds `3 u`. With the least eigenvalue `c`
-//! of `M` scaled to a diagonal of ones, its diagonal is at most `M / c`. So the builder divides `M` by `1 + 50 u / c`
-//! ([`MARGIN`](super::MARGIN)), and an element that passes is not stretched beyond `sqrt(L)`.
+//! roundings. So, for `X` positive definite, `X` has an error of at most `6.1 u L m_ii` on the diagonal and
+//! `12.1 u L sqrt(m_ii m_jj)` elsewhere. The minors are those of a matrix near `X`, as in an error analysis of
+//! Cholesky's factorisation: `x11 x22 - x12^2` is exact for an `x22` changed by `2 u` of itself, `x11 x23 - x12 x13`
+//! for an `x23` changed likewise, and the comparison of the products for an `x33` changed by `9 u`. In total `F^T F` is
+//! at most `L` for an `M` larger by at most `44 u` of its diagonal; storing the entries adds `3 u`. With the least
+//! eigenvalue `c` of `M` scaled to a diagonal of ones, its diagonal is at most `M / c`. So the builder divides `M` by
+//! `1 + 50 u / c` ([`MARGIN`](super::MARGIN)), and an element that passes is not stretched beyond `sqrt(L)`.
 //!
 //! The volume `e1 . (e2 x e3)` has an error of at most `8 u sqrt(2) |e1| |e2| |e3|`, and no edge is longer than the
 //! stretch limit times its rest length. So the builder stores `12 u s^3` times the product of the rest lengths: a

@@ -9,14 +9,14 @@
 //!
 //! # Rounding
 //!
-//! Let `u = 2^-24`. The entries of `G` come from differences of coordinates: the diagonal's have errors of at most `5
-//! u` of themselves, the other of `5 u |f1| |f2|`. A difference `x = L a - g` adds two roundings, the comparison of the
-//! products two. If it holds, then, with `a` and `d` the diagonal of `M`, `G` is below `L (M + E)` with `|E11| <= 6.1 u
-//! a`, `|E22| <= 6.1 u d` and `|E12| <= 12.1 u sqrt(a d)`, so below `L (M + 18.2 u diag(a, d))`. Storing the
-//! off-diagonal entry of `M`, whose lowest bit is a flag, adds `2 u sqrt(a d)`. And `diag(a, d)` is below `M / (1 -
-//! |cos|)`, `cos` that of the angle at the centre. So the builder divides `M` by `1 + 21 u / (1 - |cos|)`, rounding
-//! down, and a triangle that passes is not stretched beyond `sqrt(L)`. It chooses the centre that makes this small. For
-//! edges the error is only 6.1 u.
+//! Let `u = 2^-24`. The entries of `G` come from differences of coordinates: the diagonal's have errors of at most
+//! `5 u` of themselves, the other of `5 u |f1| |f2|`. A difference `x = L a - g` adds two roundings, the comparison of
+//! the products two. If it holds, then, with `a` and `d` the diagonal of `M`, `G` is below `L (M + E)` with
+//! `|E11| <= 6.1 u a`, `|E22| <= 6.1 u d` and `|E12| <= 12.1 u sqrt(a d)`, so below `L (M + 18.2 u diag(a, d))`.
+//! Storing the off-diagonal entry of `M`, whose lowest bit is a flag, adds `2 u sqrt(a d)`. And `diag(a, d)` is below
+//! `M / (1 - |cos|)`, `cos` that of the angle at the centre. So the builder divides `M` by `1 + 21 u / (1 - |cos|)`,
+//! rounding down, and a triangle that passes is not stretched beyond `sqrt(L)`. It chooses the centre that makes this
+//! small. For edges the error is only 6.1 u.
 //!
 //! The builder avoids products that overflow or underflow; where it cannot, it stores a metric of zeros, which no
 //! triangle passes.

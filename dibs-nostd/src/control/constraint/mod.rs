@@ -169,8 +169,8 @@ impl SpringDamper {
         }
     }
 
-    /// The device's own damping (N s/mm) must exceed this for a passive wall at a sampling period of `tick` seconds: `K
-    /// T / 2 + B` (Colgate and Schenkel 1997), or the hold's damping if larger.
+    /// The device's own damping (N s/mm) must exceed this for a passive wall at a sampling period of `tick` seconds:
+    /// `K T / 2 + B` (Colgate and Schenkel 1997), or the hold's damping if larger.
     ///
     /// ```
     /// use dibs_nostd::constraint::SpringDamper;

@@ -51,8 +51,8 @@ impl defmt::Format for Wrench {
 /// depth by which it would move the proxy alone. The deepest contact has 1. Another has less if it is less than a 16th
 /// as deep, and 0 at the margin's edge; and less where it begins or ends next to a deeper one, at the edge of its wall:
 /// 0 within some 7 degrees of that edge, seen from the tool's axis, and 1 from 10 degrees on. So a contact begins and
-/// ends without force, and where two tie both have 1. Next to a wall's edge the force changes by up to `45 K depth /
-/// distance` of the axis per mm, for a stiffness `K`.
+/// ends without force, and where two tie both have 1. Next to a wall's edge the force changes by up to
+/// `45 K depth / distance` of the axis per mm, for a stiffness `K`.
 ///
 /// Steps of the force remain in these cases:
 /// - Two walls less than 15 degrees apart, which may be one contact: up to a quarter of the force, a twelfth in size,

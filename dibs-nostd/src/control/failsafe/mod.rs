@@ -39,10 +39,10 @@
 //! # Time
 //!
 //! Times are [`Millis`] on the receiver's clock, which wraps; a count of control [`Ticks`](crate::Ticks) is converted
-//! by its rate. If a surface is received at `r` and nothing after it, the first safe step is the first one at `r + safe
-//! + 1` or later, where `safe` is the second limit on age, unless another input requires it earlier. Ages of surface,
-//! packets and heartbeats follow one rule, that of [`FrameAge`]: a stamp up to 16 ms ahead of the clock is new, one
-//! farther ahead is old, and a stamp once found old stays old when the clock wraps.
+//! by its rate. If a surface is received at `r` and nothing after it, the first safe step is the first one at
+//! `r + safe + 1` or later, where `safe` is the second limit on age, unless another input requires it earlier. Ages of
+//! surface, packets and heartbeats follow one rule, that of [`FrameAge`]: a stamp up to 16 ms ahead of the clock is
+//! new, one farther ahead is old, and a stamp once found old stays old when the clock wraps.
 
 // Requirement: C-01
 

@@ -6,8 +6,8 @@
 //! jumps when two contacts change their order; the activation falls with the difference in height.
 //!
 //! A change of all heights by `e` changes a ridge by at most `2 e` (persistence: Cohen-Steiner, Edelsbrunner & Harer
-//! 2007). So an activation changes by at most `256 / distance` of the motion. Between flat walls it is at most `45 /
-//! distance`, since a ridge there grows by the sine of the 10 degrees.
+//! 2007). So an activation changes by at most `256 / distance` of the motion. Between flat walls it is at most
+//! `45 / distance`, since a ridge there grows by the sine of the 10 degrees.
 
 use super::add::Pair;
 use super::basins::{Basins, Near};

@@ -7,8 +7,8 @@
 //! Nor is it if its lowest point is on an edge and the opposite vertex of the edge's other triangle is lower. All other
 //! triangles may be local minima.
 //!
-//! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, at most `ridge
-//! / 2` above the first one.
+//! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, at most
+//! `ridge / 2` above the first one.
 
 use glam::Vec3;
 
