@@ -1,4 +1,4 @@
-//! One error type for all errors of this crate, by `?`.
+//! One error type for all errors of this crate, for `?`.
 
 use core::fmt;
 
@@ -61,7 +61,7 @@ errors! {
     Tool(crate::ToolError),
     /// A query gave no answer.
     Query(crate::QueryError),
-    /// There is no proximity to act on.
+    /// There is no proximity for a constraint.
     Unavailable(crate::Unavailable),
     /// A packet, or the frame that it would have finished, was rejected.
     #[cfg(feature = "bus")]

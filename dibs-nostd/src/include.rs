@@ -4,19 +4,19 @@
 
 /// Includes the module of a tree that a build script emitted: `include_tree!("heart")` gives `mod heart`.
 ///
-/// The module has every item that follows from the tree:
+/// The module has the items that depend on the tree:
 ///
 /// | item | is |
 /// |---|---|
 /// | `TREE` | the bytes in flash, a [`TreeBytes`](crate::TreeBytes): `TREE.validate()` gives the `Tree` |
-/// | `Surface`, `start` | the vertices as they are now and their two ends, `Bus` and `Guard`: [`guard`](crate::guard); `start_with_contacts` for [contacts](crate::guard::Guard::contacts) |
-/// | `Frames` | a double buffer for its vertices, a [`Frames`](crate::Frames), for a loop of your own |
+/// | `Surface`, `start` | the current vertices and their two ends, `Bus` and `Guard`: [`guard`](crate::guard); `start_with_contacts` for [contacts](crate::guard::Guard::contacts) |
+/// | `Frames` | a double buffer for its vertices, a [`Frames`](crate::Frames), for your own loop |
 /// | `Receiver` | the bus's end of it (feature `bus`), an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
 /// | `Reader` | the control loop's end of it |
 /// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; with the feature `wide`, `WideQuery` for large processors |
-/// | `Tracker` | a [`Tracker`](crate::Tracker) with that stack; its front is yours to choose |
-/// | `VERTICES`, `STACK`, `Index` | the sizes, for types of your own |
-/// | `CENTRE`, `REACH` | the rest shape's bounding box, where the tree carries its rest shape |
+/// | `Tracker` | a [`Tracker`](crate::Tracker) with that stack; you choose the size of its front |
+/// | `VERTICES`, `STACK`, `Index` | the sizes, for your own types |
+/// | `CENTRE`, `REACH` | the rest shape's bounding box, if the tree has its rest shape |
 ///
 /// A tree with modes adds `MODES`, their number, and with the feature `modes` a module `modal` with the types for
 /// surfaces of that many weights.

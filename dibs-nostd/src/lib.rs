@@ -3,8 +3,8 @@
 //!
 //! Deformation invariant bounding spheres (Bowyer & Rodriguez y Baena, Proc IMechE Part H 228(4), 2014): each sphere of
 //! a [`Tree`] is pinned to a mesh vertex, and its radius is the largest distance along the surface to the vertices
-//! below it, times a limit on stretch. When the vertices move, the tree still holds without a change, so it can lie in
-//! flash.
+//! below it, times a stretch limit. When the vertices move, the tree stays valid without a change, so it can be stored
+//! in flash.
 //!
 //! `no_std`, no allocation, no panic, no recursion, no unbounded loop. `unsafe` only for the hardware
 //! square root. The same bits on host and target.
@@ -15,7 +15,7 @@
 //! |---|---|---|
 //! | bytes become packets | [`wire::Deframer`] | bus interrupt |
 //! | packets become complete, checked frames | [`Assembler`], [`StretchMonitor`] | bus interrupt |
-//! | frames change hands, never torn | [`Frames`] | both |
+//! | frames are handed over, never torn | [`Frames`] | both |
 //! | a frame is searched | [`Query`], [`Sphere`], [`Capsule`] | control interrupt |
 //! | the answer and its certainty | [`Proximity`] | control interrupt |
 //! | whether the surface may be trusted | [`failsafe`] | control interrupt |
@@ -36,7 +36,7 @@
 //! let tree = Tree::<u16>::from_bytes(built.blob())?;
 //! let mut query = Query::<_, 32>::new(&tree)?;
 //!
-//! // At each tick: the vertices as they are now, in the tree's order.
+//! // At each tick: the current vertices, in the tree's order.
 //! let vertices = built.to_rows(&motion.frames[9]);
 //! let tool = Capsule::new(Vec3::new(70.0, 0.0, 20.0), Vec3::new(120.0, 0.0, 60.0), 2.5)?;
 //! let measured = measure_stretch(&tree, vertices.as_slice())?;
@@ -52,12 +52,12 @@
 //! - `wide`: `Query::closest_wide`, which tests several subtrees at once, for large processors.
 //! - `defmt`: `defmt::Format` for every public value and error.
 //! - `serde`: `Serialize` for answers, limits and states; `Deserialize` for [`Budget`], [`Cost`], [`SurfaceLimits`] and times,
-//!   which are checked where they are used. Other limits are made by calls that check them.
-//! - `mint`: points of other mathematics crates become `glam`'s, so that `Bus::frame` takes them.
+//!   which are checked when used. Other limits are made by calls that check them.
+//! - `mint`: points of other mathematics crates convert to `glam`'s, so that `Bus::frame` takes them.
 //! - `embedded-io`: `guard`'s `Bus` on any byte stream.
-//! - `portable-atomic`: processors without compare-and-swap; interrupts are masked for the few instructions of each publication
-//!   and read of a frame, by the program's `critical-section` implementation.
-//! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver takes only packets with a genuine tag.
+//! - `portable-atomic`: for processors without compare-and-swap; interrupts are masked for the few instructions of each
+//!   publication and read of a frame, by the program's `critical-section` implementation.
+//! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver accepts only packets with a genuine tag.
 
 // Requirement: P-01
 

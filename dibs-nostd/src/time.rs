@@ -1,13 +1,13 @@
 //! Time: the receiver's clock, the count of control ticks, and the age of a stamp on a clock that wraps.
 //!
-//! One rule serves frames, heartbeats and packets. A stamp is the clock's reading at an event. Its age is the time since
-//! then, wrapping, with two exceptions:
+//! One rule applies to frames, heartbeats and packets. A stamp is the clock's reading at an event. Its age is the time
+//! since then, wrapping, with two exceptions:
 //!
 //! - A stamp up to [`AHEAD`] in the future has age 0: the core that wrote it may have read its clock a little later. A
-//!   stamp up to half the clock's range ahead has an age of at least 2^31, beyond any limit that a
-//!   [`Watch`](crate::failsafe::Watch) may have. So a flipped bit does not keep an old surface alive.
-//! - A stamp never grows younger: when the clock comes around, its age stays [`Millis::MAX`]. This requires a reading of
-//!   its age at least once in 2^31 ms.
+//!   stamp up to half the clock's range ahead has an age of at least 2^31, beyond any limit of a
+//!   [`Watch`](crate::failsafe::Watch). So a flipped bit does not keep an old surface valid.
+//! - A stamp never grows younger: when the clock wraps around, its age stays [`Millis::MAX`]. This requires reading its
+//!   age at least once in 2^31 ms.
 
 // Requirement: B-05
 
@@ -16,8 +16,7 @@ use core::num::NonZeroU32;
 
 /// A reading of the receiver's clock, or a time on it, in milliseconds.
 ///
-/// The clock wraps after 2^32 ms, 49.7 days. Two readings give the right time between them if they are less than that
-/// apart.
+/// The clock wraps after 2^32 ms, 49.7 days. The time between two readings is right if it is less than that.
 ///
 /// ```
 /// use dibs_nostd::Millis;
@@ -30,7 +29,7 @@ use core::num::NonZeroU32;
 pub struct Millis(pub u32);
 
 impl Millis {
-    /// The longest time: also of a time that is not known, or that has no end.
+    /// The longest time; also a time that is unknown or has no end.
     pub const MAX: Self = Self(u32::MAX);
 
     /// The time from an earlier reading to this one, wrapping.
@@ -51,7 +50,7 @@ impl Millis {
         Self(self.0.wrapping_sub(time.0))
     }
 
-    /// The sum of two times; [`MAX`](Self::MAX) where it is longer.
+    /// The sum of two times, at most [`MAX`](Self::MAX).
     #[must_use]
     pub const fn plus(self, time: Self) -> Self {
         Self(self.0.saturating_add(time.0))
@@ -66,7 +65,7 @@ impl fmt::Display for Millis {
 
 /// A count of control ticks since the start. 64 bits never wrap.
 ///
-/// Ticks become a reading of the receiver's clock by their rate alone: nothing takes them for milliseconds.
+/// A type of its own, so that ticks are not mistaken for milliseconds: [`at_rate`](Self::at_rate) converts them.
 ///
 /// ```
 /// use core::num::NonZeroU32;
@@ -88,14 +87,14 @@ impl Ticks {
         Self(self.0.wrapping_sub(earlier.0))
     }
 
-    /// The count so many ticks later, wrapping.
+    /// The count this many ticks later, wrapping.
     #[must_use]
     pub const fn after(self, ticks: Self) -> Self {
         Self(self.0.wrapping_add(ticks.0))
     }
 
-    /// The reading of a clock in milliseconds that began with the first tick, at so many ticks a second: rounded down,
-    /// and wrapping as that clock does.
+    /// The reading of a millisecond clock that started with the first tick, at this many ticks per second: rounded
+    /// down, and wrapping like that clock.
     #[must_use]
     pub const fn at_rate(self, ticks_a_second: NonZeroU32) -> Millis {
         let rate = ticks_a_second.get() as u64;
@@ -112,7 +111,7 @@ impl Ticks {
     }
 }
 
-/// Most that a stamp may lie ahead of the clock.
+/// How far a stamp may be ahead of the clock.
 pub(crate) const AHEAD: Millis = Millis(16);
 
 /// Time from `stamp` to `now`; 0 for a stamp at most [`AHEAD`] in the future.
@@ -121,7 +120,7 @@ pub(crate) const fn elapsed(now: Millis, stamp: Millis) -> Millis {
     if elapsed.0 > u32::MAX - AHEAD.0 { Millis(0) } else { elapsed }
 }
 
-/// The greatest age that a stamp was found to have.
+/// The greatest age found for a stamp.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Ageing {
     pub stamp: Millis,
@@ -133,11 +132,11 @@ impl Ageing {
     #[must_use]
     pub const fn at(self, now: Millis, stamp: Millis) -> Self {
         let (is_same, oldest) = (stamp.0 == self.stamp.0, self.oldest.0);
-        // A stamp that was found old lies in the past, even just before the clock comes around to it.
+        // A stamp once found old is in the past, even just before the clock wraps around to it.
         let is_past = is_same && oldest > i32::MAX as u32;
         let age = if is_past { now.since(stamp) } else { elapsed(now, stamp) };
         let fall = if is_same { oldest.saturating_sub(age.0) } else { 0 };
-        // A large fall: the clock came around.
+        // A large decrease: the clock wrapped around.
         let oldest = if fall > i32::MAX as u32 { Millis::MAX } else { age.plus(Millis(fall)) };
         Self { stamp, oldest }
     }

@@ -8,26 +8,27 @@ use crate::constraint::{ConstraintForce, ForbiddenRegion, Guidance};
 use crate::failsafe::{Link, Verdict};
 use crate::{ContactIter, Contacts, FrameAge, Millis, Proximity, TrackerAnswer, Unavailable};
 
-/// The answer of a tick: what a constraint may act on, and how it came about.
+/// The answer of a tick: the input of a constraint, and how it was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Answer {
-    /// The closest pair to act on, or why there is none. Its accuracy covers the frame's error, the extrapolation's,
-    /// and the tissue's motion where the surface lags; where its side is not known it is the last one whose side was.
+    /// The closest pair for a constraint, or why there is none. Its accuracy covers the errors of the frame and of the
+    /// extrapolation, and the tissue's motion while the surface lags. If its side is unknown, it is the last pair with
+    /// a known side.
     pub closest: Result<Proximity, Unavailable>,
-    /// Velocity of the tool's point of the pair relative to the surface's (mm/s); without a pair that of the middle of
-    /// the axis. Zero at the first tick, and not a number without a tool.
+    /// Velocity of the tool's point of the pair relative to the surface's (mm/s); without a pair that of the axis'
+    /// middle. Zero at the first tick, NaN without a tool.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub velocity: Vec3,
     /// The trust in the surface.
     pub trust: Verdict,
     /// The health of the bus.
     pub link: Link,
-    /// The surface that was searched; `None` before the first.
+    /// The surface that was searched; `None` before the first frame.
     pub searched: Option<Searched>,
-    /// The answer on that surface, trusted or not.
+    /// The answer on that surface, even if the surface is not trusted.
     pub tracked: Result<TrackerAnswer, Unavailable>,
 }
 
@@ -37,20 +38,20 @@ pub struct Answer {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Searched {
-    /// The frame published last, and its age.
+    /// The last published frame, and its age.
     pub frame: FrameAge,
-    /// Epoch of the frame before; the same for a surface that is held.
+    /// Epoch of the previous frame; the last frame's own if the surface is held.
     pub before: u32,
-    /// Its time in steps: 0 is the frame before, 1 the last frame, 3 the end of the extrapolation.
+    /// The surface's time in steps: 0 is the previous frame, 1 the last frame, 3 the end of the extrapolation.
     pub t: f32,
-    /// Error of each position (mm), that of the extrapolation included.
+    /// Error of each position (mm), including that of the extrapolation.
     pub position_error: f32,
-    /// The distance (mm) of the last frames from their extrapolation; `None` for a surface that is held.
+    /// The distance (mm) of the last frames from their extrapolation; `None` if the surface is held.
     pub residual: Option<f32>,
-    /// Its velocity at the pair (mm/s): from one frame to the next, zero for a surface that is held.
+    /// The surface's velocity at the pair (mm/s): from one frame to the next, zero if the surface is held.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub velocity: Vec3,
-    /// The time by which it is behind the present, as far as its error does not cover it.
+    /// How far the surface is behind the present, beyond what its error covers.
     pub lag: Option<Millis>,
 }
 
@@ -61,12 +62,11 @@ impl Answer {
         wall.force(&self.closest, self.velocity)
     }
 
-    /// Of the list that [`Guard::contacts`](super::Guard::contacts) filled in this tick, the contacts that a
-    /// [`Proxy`](crate::constraint::Proxy) with this margin (mm) may act on, or why there are none: see
-    /// [`Contacts::within`].
+    /// The contacts of the list filled by [`Guard::contacts`](super::Guard::contacts) in this tick, for a
+    /// [`Proxy`](crate::constraint::Proxy) with this margin (mm), or why there are none: see [`Contacts::within`].
     ///
     /// # Errors
-    /// That of the [closest](Self::closest) pair, and those of [`Contacts::within`].
+    /// The error of the [closest](Self::closest) pair, and those of [`Contacts::within`].
     pub fn contacts<'c, const N: usize, const NEAR: usize>(
         &self,
         contacts: &'c Contacts<N, NEAR>,

@@ -12,50 +12,50 @@ use crate::{
     Scrub, Tree, TreeBytes,
 };
 
-/// Largest packet on a byte stream; a network's packets can be larger.
+/// Largest packet on a byte stream; a network's packets may be larger.
 const MTU: usize = 1_024;
 
-/// Largest status, in bytes: 13 counters, so that three statuses carry all.
+/// Largest status, in bytes: it holds 13 counters, so three statuses hold all of them.
 const STATUS: usize = 96;
 
-/// Time between two statuses, unless a frame was published or refused before.
+/// Time between two statuses, unless a frame is published or refused earlier.
 const INTERVAL: Millis = Millis(100);
 
-/// Bytes of the tree that an idle slice checks for each unit of its work.
+/// Bytes of the tree checked in an idle slice for each unit of its work.
 const SCRUBBED: u32 = 2;
 
 type Receiver<'s, 't, I, M, R> = Assembler<'s, <R as Rows>::Gate<'s, 't, I>, M>;
 
 /// The bus's end of a [`Surface`](super::Surface): it takes packets, checks complete frames in slices, publishes them,
-/// watches the tree's bytes, and makes the statuses that go back.
+/// checks the tree's bytes, and makes the statuses for the sender.
 ///
-/// Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
-/// control tick's priority. RAM: less than 3 kB.
+/// Two contexts may use it, one at a time: an interrupt that receives bytes, and an idle loop that calls
+/// [`work`](Self::work). Both have a lower priority than the control tick. RAM: less than 3 kB.
 #[derive(Debug)]
 pub struct Bus<'s, 't, I: Index, M: Mac = NoMac, R: Rows = Vertices> {
     notes: &'s Notes<R::Poses>,
     deframer: Deframer<MTU>,
     assembler: Receiver<'s, 't, I, M, R>,
-    /// The mesh's numbers of the rows, by which a frame of this process is read.
+    /// The mesh's vertex number of each row, to read a frame of this process.
     order: VertexOrder<'t, I>,
     scrub: Scrub<'t>,
     /// Time of the last status.
     reported: Millis,
-    /// A frame was published or refused since, or the sender asks.
+    /// A frame was published or refused since then, or the sender asked for a status.
     has_news: bool,
 }
 
 impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
-    /// Bytes of a status on a byte stream before its framing, and room enough on a network.
+    /// Bytes of a status on a byte stream before framing; enough on a network, too.
     pub const STATUS_BYTES: usize = STATUS;
 
     /// Bytes of the longest status on a byte stream.
     pub const STATUS_FRAMED: usize = framed_bytes(STATUS);
 
-    /// The bus's end of buffers in anybody's memory.
+    /// The bus's end of buffers in the caller's memory.
     ///
     /// # Errors
-    /// [`Error`]: the tree measures no stretch, or a limit is out of range.
+    /// [`Error`]: the tree has no data to measure stretch, or a limit is out of range.
     #[doc(hidden)]
     #[inline(always)]
     pub fn new(
@@ -78,10 +78,10 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
         })
     }
 
-    /// Takes bytes of a serial line or another stream, at the time `now`. [`counters`](Self::counters) has their
-    /// outcomes, by cause.
+    /// Takes bytes of a serial line or another stream, at the time `now`. The outcomes are counted by cause in
+    /// [`counters`](Self::counters).
     ///
-    /// Cost: O(bytes). [`work`](Self::work) must keep up: a complete frame is dropped where the next one begins before it
+    /// Cost: O(bytes). [`work`](Self::work) must keep up: a complete frame is dropped if the next one begins before it
     /// was checked.
     pub fn receive(&mut self, bytes: &[u8], now: Millis) {
         for &byte in bytes {
@@ -97,31 +97,31 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
         }
     }
 
-    /// Takes one packet, from a bus that keeps packets apart.
+    /// Takes one packet, from a bus that delivers whole packets.
     ///
     /// Cost: O(bytes).
     ///
     /// # Errors
-    /// [`ReceiveError`] names why the packet or its frame was not taken; the event has been counted.
+    /// [`ReceiveError`] tells why the packet or its frame was rejected; the event has been counted.
     pub fn packet(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
         let outcome = self.assembler.accept(packet, now);
         self.note(outcome.ok());
         outcome
     }
 
-    /// Takes a whole frame from this process, say from a solver's own thread: the positions (mm) of all vertices of the
-    /// mesh's file, or of all nodes, in that file's order, that the surface had at `captured` on the receiver's clock.
-    /// [`work`](Self::work) then checks and publishes it, as one that came in packets.
+    /// Takes a whole frame from this process, for example from a solver's thread: the positions (mm) of all vertices of
+    /// the mesh's file, or of all nodes, in that file's order, captured at `captured` on the receiver's clock.
+    /// [`work`](Self::work) then checks and publishes it like a frame of packets.
     ///
-    /// The call counts as a sign of life, and its transit time is 0. One source at a time: a frame of packets that is in
-    /// work is abandoned.
+    /// The call counts as a sign of life, and its transit time is 0. Use one source at a time: a frame of packets that
+    /// is still being received is abandoned.
     ///
-    /// Cost: O(rows), several readings each. No lock: the control tick reads the last surface meanwhile.
+    /// Cost: O(rows), several reads of each row. There is no lock: the control tick reads the last surface meanwhile.
     ///
     /// # Errors
     /// [`ReceiveError`], as [`Assembler::frame`]: it has been counted, and the last good surface stays.
-    /// [`RowCount`](ReceiveError::RowCount) for another number of positions than
-    /// [`Tree::file_vertex_count`](crate::Tree::file_vertex_count), or nodes.
+    /// [`RowCount`](ReceiveError::RowCount) if the number of positions is not
+    /// [`Tree::file_vertex_count`](crate::Tree::file_vertex_count), or the number of nodes.
     pub fn frame<P: Copy + Into<Vec3>>(
         &mut self,
         positions: &[P],
@@ -153,16 +153,16 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
         self.notes.of_all.link.set(&self.assembler.health());
     }
 
-    /// Does a slice of the checks: at most `work` rows and triangles of the frame that arrives, and publishes it once
-    /// it is complete and admitted. Without a frame it checks the tree's bytes. `Ok(Advance::Pending)` if more is due
-    /// at once.
+    /// Does a slice of the checks: at most `work` rows and triangles of the frame being received, and publishes it once
+    /// it is complete and admitted. Without a frame it checks the tree's bytes. `Ok(Advance::Pending)` if there is more
+    /// work to do at once.
     ///
     /// Cost: O(`work`).
     ///
     /// # Errors
-    /// [`ReceiveError::Stretch`] when a surface is refused; it has been counted.
+    /// [`ReceiveError::Stretch`] if a surface is refused; it has been counted.
     // Not inlined: in a large loop its branches would become jumps through a register, whose targets no check of the
-    // binary can see.
+    // binary finds.
     #[inline(never)]
     pub fn work(&mut self, work: u32) -> Result<Advance, ReceiveError> {
         let outcome = self.assembler.advance(work);
@@ -182,8 +182,9 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
         }
     }
 
-    /// The status that is due for the sender, of at most `BYTES`; `None` unless there is news, or 100 ms went by. The
-    /// sender's next frame echoes it, which measures the transit of frames.
+    /// The status that is due for the sender, of at most `BYTES`; `None` unless a frame was published or refused, the
+    /// sender asked, or 100 ms have passed. The sender's next frame echoes it, which measures the transit time of
+    /// frames.
     pub fn status<'b, const BYTES: usize>(
         &mut self,
         now: Millis,
@@ -215,30 +216,30 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
         self.assembler.counters()
     }
 
-    /// The frame published last.
+    /// The last published frame.
     #[must_use]
     pub fn surface(&self) -> Option<FrameView<'_>> {
         self.assembler.surface()
     }
 
-    /// Whole rounds of the check of the tree's bytes; wraps.
+    /// Completed passes of the check of the tree's bytes; wraps.
     #[must_use]
     pub const fn rounds(&self) -> u32 {
         self.scrub.rounds()
     }
 
-    /// Registers the surface anew, as [`Assembler::register`] does: only an operator decides that.
+    /// Registers the surface anew, as [`Assembler::register`]: only an operator may decide this.
     pub const fn register(&mut self) {
         self.assembler.register();
     }
 }
 
 impl<I: Index, M: Mac, R: Rows<Poses = ()>> Bus<'_, '_, I, M, Posed<R>> {
-    /// The same as [`frame`](Self::frame), with the mesh as a whole elsewhere: a position `p` is at `rotation p + shift`.
-    /// A frame without a pose is where the mesh's file has it.
+    /// As [`frame`](Self::frame), with a pose of the whole mesh: a position `p` is at `rotation p + shift`. A frame
+    /// without a pose is in the coordinates of the mesh's file.
     ///
     /// # Errors
-    /// Also [`ReceiveError::Pose`] for numbers that are no [`RigidPose`].
+    /// Also [`ReceiveError::Pose`] if the rotation and shift are not a [`RigidPose`].
     pub fn frame_at<P: Copy + Into<Vec3>>(
         &mut self,
         positions: &[P],

@@ -1,4 +1,4 @@
-//! The limits of a controller: numbers that only its user knows.
+//! The limits of a controller: values that only its user knows.
 
 // Requirement: C-07
 
@@ -6,10 +6,10 @@ use super::Rows;
 use crate::failsafe::{LimitError, Limits, Watch};
 use crate::{Budget, Index, Millis, Options, SurfaceLimits, Tree};
 
-/// How far a surface is trusted, and how a tick asks.
+/// The limits on the surface, and the options of a tick's query.
 ///
-/// From two numbers, the tissue's largest speed and the largest age, follow the limits of [`Bus`](super::Bus) and
-/// [`Guard`](super::Guard); each can be given on its own.
+/// The limits of [`Bus`](super::Bus) and [`Guard`](super::Guard) follow from two numbers, the tissue's largest speed
+/// and the largest age; each limit can also be set on its own.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct GuardLimits {
@@ -25,16 +25,16 @@ pub struct GuardLimits {
     pub(super) options: Options,
 }
 
-/// The reach by default, in sizes of the rest shape: half its largest extent.
+/// The default reach, in units of half the largest extent of the rest shape.
 const ROOM: f32 = 4.0;
 
 impl GuardLimits {
     /// Limits for tissue of at most this speed (mm/s), and surfaces of at most this age: about two periods of the
-    /// source and the transit time. From three quarters of the age on the state is degraded, beyond it safe.
+    /// source plus the transit time. From three quarters of the age on the state is degraded, beyond it safe.
     ///
     /// By default the control loop runs at 1 kHz, an operator acknowledges the end of a safe state, the transit time is
-    /// watched by the status that each frame echoes ([`Bus::status`](super::Bus::status)), rows keep within four
-    /// sizes of the rest shape, and a tick's budget is not limited.
+    /// measured by the status that each frame echoes ([`Bus::status`](super::Bus::status)), rows stay within four sizes
+    /// of the rest shape, and a tick's budget is not limited.
     #[must_use]
     pub const fn new(speed_mm_per_s: f32, age: Millis) -> Self {
         Self {
@@ -49,14 +49,14 @@ impl GuardLimits {
         }
     }
 
-    /// Ticks of the control loop a second, above 0: velocities count from it.
+    /// Control ticks per second, above 0: velocities are computed from it.
     #[must_use]
     pub const fn ticks_a_second(mut self, rate: u32) -> Self {
         self.rate = rate as f32;
         self
     }
 
-    /// The most work of a tick: [`Budget::for_instructions`].
+    /// The work limit of a tick: [`Budget::for_instructions`].
     #[must_use]
     pub const fn budget(mut self, budget: Budget) -> Self {
         self.options = self.options.budget(budget);
@@ -77,23 +77,23 @@ impl GuardLimits {
         self
     }
 
-    /// Leaves out the transit time, for a line on which no status goes back: a delayed frame is then taken for a new
-    /// one, and no margin covers the delay.
+    /// Leaves out the transit time, for a line without statuses to the sender: a delayed frame then counts as new, and
+    /// no margin covers the delay.
     #[must_use]
     pub const fn without_transit(mut self) -> Self {
         self.has_transit = false;
         self
     }
 
-    /// The fail-safe machine's limits, instead of those that follow from speed and age. [`automatic`](Self::automatic)
-    /// and [`without_transit`](Self::without_transit) change these, too.
+    /// Sets the fail-safe machine's limits, instead of those that follow from speed and age.
+    /// [`automatic`](Self::automatic) and [`without_transit`](Self::without_transit) change these, too.
     #[must_use]
     pub const fn trust(mut self, limits: Limits) -> Self {
         self.trust = Some(limits);
         self
     }
 
-    /// The published surfaces' limits, instead of those that follow from the speed and the tree's rest shape.
+    /// Sets the published surfaces' limits, instead of those that follow from the speed and the tree's rest shape.
     #[must_use]
     pub const fn surfaces(mut self, limits: SurfaceLimits) -> Self {
         self.surface = Some(limits);
@@ -126,7 +126,7 @@ impl GuardLimits {
     }
 }
 
-/// The farthest coordinate of rows that move by their own size.
+/// The largest coordinate of rows that move by the size of their rest shape.
 fn reach<I: Index, R: Rows>(tree: &Tree<'_, I>, rows: &R::Of<'_>) -> Result<f32, LimitError> {
     let mut corners = None;
     for row in 0..R::count(tree, rows) {

@@ -1,4 +1,4 @@
-//! The bus's end on a byte stream of the embedded ecosystem.
+//! The bus's end on a byte stream with the `embedded-io` traits.
 
 // Requirement: B-09
 
@@ -8,17 +8,17 @@ use super::{Bus, Rows};
 use crate::wire::Mac;
 use crate::{Index, Millis};
 
-/// Bytes that are read at once: the depth of a serial line's buffer, and little of a stack.
+/// Bytes read at once: the depth of a serial line's buffer, and little stack.
 const CHUNK: usize = 64;
 
 impl<I: Index, M: Mac, R: Rows> Bus<'_, '_, I, M, R> {
-    /// Reads once from a serial line or another byte stream and takes what came, as [`receive`](Self::receive): at most 64
-    /// bytes, whose number is returned, 0 at the stream's end. Blocks where `line` does: ask its `ReadReady` before.
+    /// Reads once from a serial line or another byte stream and takes the bytes as [`receive`](Self::receive) does: at
+    /// most 64, whose number is returned; 0 at the stream's end. Blocks if `line` does: check its `ReadReady` first.
     ///
     /// Cost: O(bytes).
     ///
     /// # Errors
-    /// The stream's own; nothing was taken.
+    /// The stream's error; nothing was taken.
     ///
     /// ```
     /// # use dibs_build::{Builder, generate};
@@ -43,18 +43,19 @@ impl<I: Index, M: Mac, R: Rows> Bus<'_, '_, I, M, R> {
     ) -> Result<usize, L::Error> {
         let mut bytes = [0; CHUNK];
         let count = line.read(&mut bytes)?;
-        // A stream that claims more than it had room for is believed as far as the room.
+        // A count beyond the buffer, from a faulty stream, is limited to the buffer.
         self.receive(bytes.get(..count).unwrap_or(&bytes), now);
         Ok(count)
     }
 
-    /// Writes the status that is due, framed, to a byte stream, and does not flush it. Returns the bytes written: 0 without
-    /// news, as [`status`](Self::status). A status that the stream takes only in part is lost; the next is due in 100 ms.
+    /// Writes the status that is due, framed, to a byte stream, without a flush. Returns the bytes written: 0 if no
+    /// status is due, as [`status`](Self::status). A status that the stream takes only in part is lost; the next is due
+    /// in 100 ms.
     ///
     /// Cost: at most [`STATUS_FRAMED`](Self::STATUS_FRAMED) bytes, and as many calls of `write`.
     ///
     /// # Errors
-    /// The stream's own.
+    /// The stream's error.
     pub fn send_status_to<L: Write + ?Sized>(
         &mut self,
         line: &mut L,
@@ -63,7 +64,7 @@ impl<I: Index, M: Mac, R: Rows> Bus<'_, '_, I, M, R> {
         let mut framed = [0; _];
         let mut rest = self.status_framed(now, &mut framed).unwrap_or_default();
         let mut written = 0_usize;
-        // Not `write_all`, which panics where a stream takes nothing.
+        // Not `write_all`, which panics if a stream accepts no bytes.
         while !rest.is_empty() {
             let count = line.write(rest)?;
             let Some(after) = rest.get(count..).filter(|_| count > 0) else { break };

@@ -1,8 +1,8 @@
 //! A controller's two ends of a moving surface: [`Bus`] takes packets, [`Guard`] answers the control tick.
 //!
-//! They join the layers of this crate as most controllers need them, and carry what the library knows itself: the
-//! reach, the stretch, the age, the extrapolation and its error, the fail-safe state, the last side, the velocities.
-//! Every layer stays public, for another arrangement.
+//! They combine the layers of this crate as most controllers need them, and derive what the library can: the reach, the
+//! stretch, the age, the extrapolation and its error, the fail-safe state, the last side, the velocities. Every layer
+//! stays public, for other combinations.
 //!
 //! ```
 //! use dibs_build::{Builder, generate};

@@ -11,7 +11,6 @@ use crate::surface::{MotionUnit, PoseStep};
 use crate::tree::SurfaceFacts;
 use crate::{Millis, RigidPose, VertexTable};
 
-/// Buffers of a guard's surface.
 const BUFFERS: u32 = 3;
 
 /// The gate of rows with poses.
@@ -21,16 +20,16 @@ pub struct PoseGate<'s, G> {
     rows: G,
     poses: &'s Poses,
     centre: Vec3,
-    /// A vertex is no farther from the centre than so many times the farthest row.
+    /// A vertex is no farther from the centre than the farthest row times this.
     amplification: f32,
-    /// That of the frame in work, its farthest row from the centre, and the next row to be looked at.
+    /// The pose of the frame being checked, its farthest row from the centre, and the next row to be examined.
     pose: RigidPose,
     farthest: (u32, f32),
     next_row: u32,
-    /// Those of the last two frames published.
+    /// The poses of the last two published frames.
     last: Option<RigidPose>,
     before: Option<RigidPose>,
-    /// The buffer that the frame in work is in: they take turns, and the first frame is in the second.
+    /// The buffer of the frame being checked: buffers alternate, and the first frame is in the second.
     buffer: u32,
 }
 
@@ -50,13 +49,13 @@ impl<'s, G> PoseGate<'s, G> {
         }
     }
 
-    /// Whether poses move any point: where they are all the same, no lever counts.
+    /// Whether poses move any point: if all are the same, the lever arm is not needed.
     fn moves(&self) -> bool {
         let is_other = |pose: &Option<RigidPose>| pose.is_some_and(|pose| pose != self.pose);
         is_other(&self.last) || is_other(&self.before)
     }
 
-    /// Looks for the row farthest from the centre among those that have come. Returns the work left.
+    /// Searches the received rows for the one farthest from the centre. Returns the work left.
     fn look<V: VertexTable + ?Sized>(&mut self, surface: &V, ready: u32, work: u32) -> u32 {
         let waiting = ready.saturating_sub(self.next_row);
         let rows = if waiting < work { waiting } else { work };
@@ -73,14 +72,14 @@ impl<'s, G> PoseGate<'s, G> {
         work.saturating_sub(rows)
     }
 
-    /// Most (mm) that a vertex of the frame in work is away from the centre.
+    /// Upper bound (mm) on the distance of any vertex of the frame from the centre.
     fn lever(&self) -> f32 {
         let (_, square) = self.farthest;
         sqrt(square) * (self.amplification * (1.0 + 8.0 * f32::EPSILON))
     }
 
-    /// The largest distance (mm) of a vertex from the extrapolation of the two poses before, by the part of their step that the
-    /// rows' own extrapolation added, and grown as that; NaN where the rows were not extrapolated.
+    /// The largest distance (mm) of a vertex from the extrapolation of the two previous poses. It uses the fraction of
+    /// a step that the rows' extrapolation added, and grows like it; NaN if the rows were not extrapolated.
     fn shown(&self, compared: &Compared) -> f32 {
         let (Some(before), Some(last)) = (&self.before, &self.last) else { return f32::NAN };
         PoseStep::between(before, last, self.centre).map_or(f32::NAN, |step| {
@@ -91,7 +90,8 @@ impl<'s, G> PoseGate<'s, G> {
 }
 
 impl<G: Gate> PoseGate<'_, G> {
-    /// A vertex moves by at most its row's step in the mesh and that of the pose at where it is now, turned and shifted.
+    /// A vertex moves by at most its row's step in the mesh plus the step of the pose, turned and shifted, at its
+    /// current position.
     fn check_speed(&self, compared: &Compared, elapsed: Millis) -> Result<(), StretchError> {
         let Some(last) = &self.last else { return Ok(()) };
         let limit = self.rows.farthest(elapsed) * self.amplification;
@@ -142,7 +142,7 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
         if admission == Admission::Pending || is_waiting {
             return Ok(Admission::Pending);
         }
-        // A registration is compared with nothing.
+        // A registration is not compared with an earlier frame.
         let mut shown = f32::NAN;
         if let (Some((_, elapsed)), Some(compared)) = (before, &compared) {
             self.check_speed(compared, elapsed)?;

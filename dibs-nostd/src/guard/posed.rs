@@ -1,4 +1,4 @@
-//! Frames with a rigid pose each: the tool is moved by its inverse, and nothing below knows.
+//! Frames with a rigid pose each: the tool is moved by the inverse pose, so that the layers below need no poses.
 
 // Requirement: F-08
 
@@ -19,16 +19,18 @@ use crate::{
     TrackerAnswer, Tree, Unavailable, VertexTable,
 };
 
-/// Frames of rows `R`, each with a rigid pose: where the mesh is as a whole, say by a tracker of the patient, beside what
-/// its deformation is. [`Bus::frame_at`](super::Bus::frame_at) takes them; tools, answers and commands are in the world.
+/// Frames of rows `R`, each with a rigid pose: the position of the mesh as a whole, for example from a tracker of the
+/// patient, besides its deformation. [`Bus::frame_at`](super::Bus::frame_at) takes them; tools, answers and commands
+/// are in world coordinates.
 ///
-/// A frame without a pose is where the mesh's own frame is; one that changes a part of another keeps its pose. The limits on
-/// [speed](crate::SurfaceLimits::speed) and [recovery](crate::SurfaceLimits::recovery_mm) hold for the rows' step and the
-/// pose's together, also where one undoes the other: a mesh that moves far in a silence is registered anew. The
-/// [reach](crate::SurfaceLimits::reach_mm) is that of the rows alone. [`FrameEncoder::with_pose`](crate::wire::FrameEncoder::with_pose) makes packets of a frame with its pose.
+/// A frame without a pose is in the mesh's own coordinates; a partial frame keeps the pose of the frame that it
+/// changes. The limits on [speed](crate::SurfaceLimits::speed) and [recovery](crate::SurfaceLimits::recovery_mm) apply
+/// to the sum of the rows' step and the pose's, even if one cancels the other: a mesh that moved far without frames is
+/// registered anew. The [reach](crate::SurfaceLimits::reach_mm) limits the rows alone.
+/// [`FrameEncoder::with_pose`](crate::wire::FrameEncoder::with_pose) makes packets of a frame with its pose.
 ///
-/// Between frames the mesh goes on by its last step: its centre straight, turning evenly. Where a step turns by more
-/// than half a radian, the surface is held.
+/// Between frames the mesh continues its last step: its centre in a straight line, with a constant turn rate. After a
+/// step of more than half a radian the surface is held.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -54,12 +56,12 @@ pub struct Posed<R = Vertices>(PhantomData<R>);
 
 impl<R: Rows<Poses = ()>> sealed::Sealed for Posed<R> {}
 
-/// What a tree says of rows with poses.
+/// The facts of a tree about rows with poses.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct PosedOf<T> {
     of: T,
-    /// The middle of the rest shape, about which the mesh turns between frames.
+    /// The centre of the rest shape, about which the mesh turns between frames.
     centre: Vec3,
 }
 
@@ -75,7 +77,7 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
         let rest = (0..R::count(tree, &of)).map_while(|row| R::rest(tree, &of, row));
         let corners =
             rest.map(|at| (at, at)).reduce(|(low, high), (at, _)| (low.min(at), high.max(at)));
-        // Any centre will do: the farther it is from the mesh, the looser the bound on a turn's way.
+        // Any centre is valid: the farther it is from the mesh, the looser the bound on the motion of a turn.
         let centre = corners.map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5);
         Ok(PosedOf { of, centre })
     }
@@ -118,7 +120,7 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
         R::velocity(&of.of, rows, corners, weights)
     }
 
-    /// Where no pose is known for later, the rows are held as well.
+    /// If no pose is known for later times, the rows are held as well.
     fn now<'f>(of: &Self::Of<'_>, poses: &Poses, published: &'f FrameGuard<'f>) -> Blend<'f> {
         if poses.are_none(published) || poses.step(published, of.centre).is_some() {
             published.extrapolated()
@@ -133,7 +135,7 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
         published: &FrameGuard<'_>,
         rows: &Blend<'_>,
     ) -> Option<Placed> {
-        // Frames that never had one are as those of rows alone, to the bit.
+        // Frames that never had a pose are treated exactly as rows alone, to the bit.
         if poses.are_none(published) {
             return None;
         }
@@ -144,14 +146,14 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
     }
 }
 
-/// Where the surface is at a tick.
+/// The pose of the surface at a tick.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Placed {
     pose: RigidPose,
-    /// The step that goes on, the part of it beyond the last frame, and steps a second.
+    /// The step that continues, the fraction of it beyond the last frame, and steps per second.
     step: Option<(PoseStep, f32, f32)>,
-    /// The error of the extrapolation (mm), and what it grows from.
+    /// The error of the extrapolation (mm), and the residual from which it grows.
     error: f32,
     shown: f32,
 }
@@ -171,23 +173,22 @@ impl Placed {
         }
     }
 
-    /// The tool as it is to the mesh.
+    /// The tool in the mesh's coordinates.
     pub(super) fn tool<T: Tool>(&self, tool: &T) -> T {
         tool.with_axis(self.ends(tool))
     }
 
-    /// The end is the start plus the turned span, so that the span's rounding does not grow with the distance from the world's
-    /// origin.
+    /// The end is the start plus the turned span: so rounding does not grow with the distance to the world's origin.
     fn ends(&self, tool: &impl Tool) -> [Vec3; 2] {
         let start = self.pose.apply_inverse(tool.axis_start());
         [start, start + self.pose.rotate_inverse(tool.axis_span())]
     }
 
-    /// Most (mm) by which a point of the tool's axis is off, beside the rows' own errors.
+    /// Upper bound (mm) on the error of a point of the tool's axis, besides the rows' own errors.
     ///
-    /// The end is off by as much as the start, and by the turned span. Besides, in halves of a unit: by 1 of its coordinates, a
-    /// sum, and by 6 of the span, for what the tool keeps of it (a difference, a division, and a product as often as it is
-    /// read). Points between are off by no more than both ends.
+    /// The end has the start's error plus that of the turned span. In halves of a unit: 1 for its coordinates, a sum,
+    /// and 6 for the span as the tool stores it (a difference, a division, and a product at each read). Points between
+    /// have at most the larger error of the ends.
     pub(super) fn error(&self, tool: &impl Tool) -> f32 {
         let [start, end] = self.ends(tool);
         let span = end - start;
@@ -195,7 +196,7 @@ impl Placed {
         self.rounding(start) + self.rounding_of_vector(span) + kept + self.error
     }
 
-    /// Most (mm) by which a point that was led to the mesh is off.
+    /// Upper bound (mm) on the rounding of a point that was transformed to the mesh.
     fn rounding(&self, local: Vec3) -> f32 {
         match &self.step {
             Some((step, part, _)) => step.rounding(local, &self.pose, *part),
@@ -203,7 +204,7 @@ impl Placed {
         }
     }
 
-    /// The same of a vector.
+    /// The same for a vector.
     fn rounding_of_vector(&self, local: Vec3) -> f32 {
         match &self.step {
             Some((step, part, _)) => step.rounding_of_vector(local, *part),
@@ -211,11 +212,11 @@ impl Placed {
         }
     }
 
-    /// Most (mm) by which a point of a tool on the mesh is off besides while a motion goes on there that a filter admits for a
-    /// period: the robot executes it in the world.
+    /// Upper bound (mm) on the additional error of a tool's point in mesh coordinates during a motion that a filter
+    /// admits for a period: the robot executes it in the world.
     ///
-    /// A translation is off by its rounding as it is turned. A rotation moves a point by as much as its vector is off, times
-    /// the arm; where the reference point is off, by that times the angle.
+    /// A translation has the rounding of its turned vector. A rotation moves a point by the error of its vector times
+    /// the arm; an error of the reference point adds that error times the angle.
     pub(super) fn error_of_motion<T: Tool>(
         &self,
         tool: &T,
@@ -230,12 +231,12 @@ impl Placed {
                 arm = far;
             }
         }
-        // The sum of a vector's coordinates is at most the square root of three times its length.
+        // The sum of a vector's coordinates is at most its length times the square root of three.
         let turned = self.rounding_of_vector(Vec3::X * (1.75 * (shift + turn * arm)));
         turned + turn * self.rounding(motion.about)
     }
 
-    /// What was searched and the answer of the moved tool, as they are in the world.
+    /// The searched surface and the answer for the moved tool, in world coordinates.
     pub(super) fn led_back(
         &self,
         tool: &impl Tool,
@@ -263,7 +264,7 @@ impl Placed {
         (Some(searched), tracked.map_err(Unavailable::Query))
     }
 
-    /// The velocity (mm/s) that the pose gives a point of a triangle, as it is to the mesh.
+    /// The velocity (mm/s) of a point of a triangle due to the pose, in mesh coordinates.
     pub(super) fn flow(
         &self,
         surface: &impl VertexTable,
@@ -278,7 +279,7 @@ impl Placed {
         self.pose.rotate_inverse(step.velocity(part, self.pose.apply(point)) * rate)
     }
 
-    /// Contacts of the moved tool, as they are in the world.
+    /// The contacts of the moved tool, in world coordinates.
     pub(super) fn lead_back<const N: usize, const NEAR: usize>(
         &self,
         contacts: &mut Contacts<N, NEAR>,
@@ -286,7 +287,7 @@ impl Placed {
         contacts.place(|point| self.pose.apply(point), |vector| self.pose.rotate(vector));
     }
 
-    /// The motion as it is to the mesh.
+    /// The motion in mesh coordinates.
     pub(super) fn motion(&self, motion: &Motion) -> Motion {
         Motion {
             about: self.pose.apply_inverse(motion.about),
@@ -295,7 +296,7 @@ impl Placed {
         }
     }
 
-    /// The admitted motion in the world; the command where it is that.
+    /// The admitted motion in world coordinates; the command itself if that was admitted.
     pub(super) fn admitted(&self, admitted: Admitted, command: &Motion) -> Admitted {
         let motion = match admitted.reason {
             Reason::Commanded => *command,

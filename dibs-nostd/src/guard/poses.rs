@@ -1,7 +1,7 @@
 //! The poses of the buffers' frames, from the bus to the control tick.
 //!
-//! The state word that hands a frame over hands its pose over as well: the writer stores a pose before it publishes, and only
-//! for the buffer that nobody reads. (`tests/soundness` tries every order.)
+//! The state word that publishes a frame publishes its pose as well: the writer stores a pose before it publishes, and
+//! only for the buffer that nobody reads. (`tests/soundness` tries every order.)
 
 use glam::{Quat, Vec3};
 
@@ -10,7 +10,7 @@ use crate::surface::PoseStep;
 use crate::surface::{AtomicU32, Ordering};
 use crate::{FrameGuard, RigidPose};
 
-/// The poses of the three buffers, and the error (mm) that each showed of the extrapolation before it.
+/// The poses of the three buffers, and the distance (mm) of each from the extrapolation before it.
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Poses([[AtomicU32; 8]; 3]);
@@ -30,7 +30,7 @@ impl Shared for Poses {
 }
 
 impl Poses {
-    /// Stores that of the buffer with this number.
+    /// Stores the pose of the buffer with this number.
     pub fn set(&self, buffer: u32, pose: &RigidPose, shown: f32) {
         let ([x, y, z, w], [a, b, c]) = (pose.rotation().to_array(), pose.shift().to_array());
         let Some(words) = self.0.get(buffer as usize) else { return };
@@ -39,29 +39,28 @@ impl Poses {
         }
     }
 
-    /// Whether neither the frame before nor the last one has another pose than the mesh's own frame.
+    /// Whether both the previous frame and the last one are without a pose.
     pub(super) fn are_none(&self, published: &FrameGuard<'_>) -> bool {
         let [(before, _), (last, _)] = self.of_frames(published);
         let no_frame = RigidPose::kept(Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), Vec3::ZERO);
         last == RigidPose::IDENTITY && [RigidPose::IDENTITY, no_frame].contains(&before)
     }
 
-    /// The pose of the last frame.
     pub(super) fn last(&self, published: &FrameGuard<'_>) -> RigidPose {
         let [_, (last, _)] = self.of_frames(published);
         last
     }
 
-    /// The step that goes on, and the larger of the errors that the last two frames showed; `None` where it does not go on.
+    /// The step to extrapolate, and the larger residual of the last two frames; `None` if there is no extrapolation.
     pub(super) fn step(&self, published: &FrameGuard<'_>, centre: Vec3) -> Option<(PoseStep, f32)> {
         let [(before, earlier), (last, shown)] = self.of_frames(published);
         let step = PoseStep::between(&before, &last, centre)?;
-        // The change of the motion may have been none by chance. False for NaN.
+        // A single small residual may be by chance. False for NaN.
         let shown = if earlier > shown { earlier } else { shown };
         (shown >= 0.0).then_some((step, shown))
     }
 
-    /// Those of the frame before and of the published one.
+    /// The poses of the previous frame and of the published one.
     pub fn of_frames(&self, published: &FrameGuard<'_>) -> [(RigidPose, f32); 2] {
         let last = published.number();
         let before = if last == 0 { 2 } else { last - 1 };

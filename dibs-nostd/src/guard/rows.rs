@@ -1,4 +1,4 @@
-//! What a guard's frames may consist of: vertices or nodes, with a pose or without.
+//! The content of a guard's frames: vertices or nodes, with or without a pose.
 
 use glam::Vec3;
 
@@ -10,21 +10,21 @@ use crate::{
     Tree,
 };
 
-/// Rows between the last two frames, or beyond.
+/// The rows between the last two frames, or extrapolated.
 pub(super) type Blend<'f> = SurfaceBlend<'f, FrameView<'f>, FrameView<'f>>;
 
-/// What the rows of a [`Surface`](super::Surface)'s frames are.
+/// The kind of rows in a [`Surface`](super::Surface)'s frames.
 #[doc(hidden)]
 pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
-    /// What a tree says of its rows.
+    /// The facts of a tree about its rows.
     type Of<'t>: Copy + core::fmt::Debug;
     /// The check of a frame.
     type Gate<'s, 't, I: Index>: Gate + core::fmt::Debug;
     /// The surface that rows make.
     type Surface<'f>: MovingSurface;
-    /// Room for it, where the rows are not the surface.
+    /// Memory for the surface, if the rows are not the surface.
     type Room<'f>: Default;
-    /// What the two ends share of frames besides their rows.
+    /// Data of frames besides their rows that the two ends share.
     type Poses: Shared;
 
     /// Reads a tree.
@@ -39,11 +39,11 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     #[doc(hidden)]
     fn rest<I: Index>(tree: &Tree<'_, I>, of: &Self::Of<'_>, row: u32) -> Option<Vec3>;
 
-    /// The order of a frame of this process.
+    /// The row order for a frame of this process.
     #[doc(hidden)]
     fn order<'t, I: Index>(tree: &Tree<'t, I>, of: &Self::Of<'t>) -> VertexOrder<'t, I>;
 
-    /// A vertex may be so many times as far from a point as the farthest row is, and may move so many times as far.
+    /// Upper bound on the ratio of a vertex's distance from a point to that of the farthest row, and of their motions.
     #[doc(hidden)]
     fn amplification(_: &Self::Of<'_>) -> f32 {
         1.0
@@ -58,14 +58,14 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
         poses: &'s Self::Poses,
     ) -> Result<Self::Gate<'s, 't, I>, Error>;
 
-    /// The rows now.
+    /// The current rows.
     #[doc(hidden)]
     #[inline(always)]
     fn now<'f>(_: &Self::Of<'_>, _: &Self::Poses, published: &'f FrameGuard<'f>) -> Blend<'f> {
         published.extrapolated()
     }
 
-    /// Where they are, where frames say that.
+    /// The current pose, if frames have poses.
     #[doc(hidden)]
     #[inline(always)]
     fn placed(
@@ -90,14 +90,14 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     fn velocity(of: &Self::Of<'_>, rows: &Blend<'_>, corners: [u32; 3], weights: [f32; 3]) -> Vec3;
 }
 
-/// What the two ends share of frames besides their rows.
+/// Data of frames besides their rows that the two ends share.
 #[doc(hidden)]
 pub trait Shared: core::fmt::Debug + 'static {
-    /// That of no frame.
+    /// Before the first frame.
     #[cfg(not(loom))]
     const NEW: Self;
 
-    /// That of no frame.
+    /// Before the first frame.
     #[cfg(loom)]
     fn new() -> Self;
 }
@@ -175,7 +175,7 @@ impl Rows for Vertices {
     }
 }
 
-/// Frames of the nodes that carry an embedded surface.
+/// Frames of the nodes that move an embedded surface.
 #[cfg(feature = "nodes")]
 impl Rows for crate::nodes::Nodes<'static> {
     type Of<'t> = crate::nodes::Nodes<'t>;

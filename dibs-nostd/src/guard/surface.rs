@@ -11,12 +11,12 @@ use crate::failsafe::{LinkStatus, State};
 use crate::wire::{Mac, NoMac};
 use crate::{Error, Frames, Index, QueryError, TreeBytes};
 
-/// The `N` vertices of a surface as they are now, and the notes of its two ends for one another. Meant for a `static`; the
-/// module that [`include_tree!`](crate::include_tree) includes has its type as `Surface`.
+/// The current `N` vertices of a surface, and the data that its two ends exchange. Meant for a `static`; the module
+/// that [`include_tree!`](crate::include_tree) includes has its type as `Surface`.
 ///
-/// With [`Nodes`](crate::nodes::Nodes)`<'static>` as `R` the rows are the nodes that carry the surface.
+/// With [`Nodes`](crate::nodes::Nodes)`<'static>` as `R` the rows are the nodes that move the surface.
 ///
-/// Neither end waits for the other. RAM: 36 bytes a row, and less than 400.
+/// Neither end waits for the other. RAM: 36 bytes for each row, plus less than 400.
 #[derive(Debug)]
 pub struct Surface<const N: usize, R: Rows = Vertices> {
     frames: Frames<N, 3>,
@@ -25,7 +25,7 @@ pub struct Surface<const N: usize, R: Rows = Vertices> {
 }
 
 impl<const N: usize, R: Rows> Surface<N, R> {
-    /// No frame was published yet.
+    /// Before the first frame.
     #[cfg(not(loom))]
     #[must_use]
     #[expect(clippy::new_without_default, reason = "it is too large for a stack")]
@@ -33,14 +33,14 @@ impl<const N: usize, R: Rows> Surface<N, R> {
         Self { frames: Frames::new(), notes: Notes::new(), rows: PhantomData }
     }
 
-    /// Validates the tree, and makes the two ends, once. `STACK` is the tree's [`TreeBytes::stack`] at least, and the
+    /// Validates the tree and makes the two ends, once. `STACK` must be at least the tree's [`TreeBytes::stack`]; the
     /// guard has slots for `OPENED` opened nodes: see [`Tracker`](crate::Tracker).
     ///
     /// Cost: linear in the tree, for start-up.
     ///
     /// # Errors
-    /// [`Error`], with the damage of the tree, its number of rows where that is not `N`, the limit that is out of
-    /// range, or that the ends were taken before.
+    /// [`Error`]: the tree is damaged, it does not have `N` rows, a limit is out of range, or the ends were taken
+    /// before.
     #[inline(always)]
     pub fn start<'t, I: Index, const STACK: usize, const OPENED: usize>(
         &self,
@@ -53,7 +53,7 @@ impl<const N: usize, R: Rows> Surface<N, R> {
     /// The same, for packets with tags.
     ///
     /// # Errors
-    /// Those of [`start`](Self::start).
+    /// Same as [`start`](Self::start).
     #[inline(always)]
     pub fn start_with_mac<'t, I: Index, M: Mac, const STACK: usize, const OPENED: usize>(
         &self,
@@ -64,10 +64,10 @@ impl<const N: usize, R: Rows> Surface<N, R> {
         self.start_with_contacts(tree, limits, mac)
     }
 
-    /// The same, for [`Guard::contacts`]: the guard has slots for `RANGE` opened nodes besides, some hundred as a rule.
+    /// The same, for [`Guard::contacts`]: the guard also has slots for `RANGE` opened nodes, usually some hundred.
     ///
     /// # Errors
-    /// Those of [`start`](Self::start).
+    /// Same as [`start`](Self::start).
     #[inline(always)]
     pub fn start_with_contacts<
         't,
@@ -88,7 +88,7 @@ impl<const N: usize, R: Rows> Surface<N, R> {
         if expected != found {
             return Err(QueryError::VertexCount { expected, found }.into());
         }
-        // A start that fails on a limit takes no end.
+        // If a limit is out of range, no end is taken.
         limits.failsafe()?;
         let (writer, reader) = self.frames.split()?;
         let bus = Bus::new(&self.notes, writer, (&tree, bytes, &rows), &limits, mac)?;
@@ -101,18 +101,18 @@ impl<const N: usize, R: Rows> Surface<N, R> {
 type Ends<'s, 't, I, M, R, const STACK: usize, const OPENED: usize, const RANGE: usize = 0> =
     (Bus<'s, 't, I, M, R>, Guard<'s, 't, I, STACK, OPENED, R, RANGE>);
 
-/// The notes of the two ends for one another. Public for surfaces of a size that no type has: see
+/// The data that the two ends exchange. Public for surfaces of a size that no type has: see
 /// [`Buffers`](crate::Buffers).
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Notes<P = ()> {
     pub(super) of_all: Common,
-    /// Of frames besides their rows.
+    /// Data of frames besides their rows.
     pub(super) poses: P,
 }
 
 impl<P: Shared> Notes<P> {
-    /// Nothing is known yet.
+    /// Before the first frame.
     #[cfg(not(loom))]
     #[expect(clippy::new_without_default, reason = "as its surface")]
     #[must_use]
@@ -132,14 +132,14 @@ impl<P: Shared> Notes<P> {
     }
 }
 
-/// Those of frames of any kind.
+/// The data for frames of any kind.
 #[derive(Debug)]
 pub(super) struct Common {
     /// The health of the bus.
     pub link: LinkStatus,
     /// As [`Status::safety`](crate::wire::Status::safety).
     safety: AtomicU32,
-    /// Never cleared: flash that read wrong once is not trusted.
+    /// Never cleared: flash that was once read wrong is not trusted.
     is_tree_corrupt: AtomicBool,
 }
 

@@ -1,4 +1,4 @@
-//! The control tick's end: pose in, answer out.
+//! The control tick's end: tool pose in, answer out.
 
 // Requirements: C-01, C-07
 
@@ -16,11 +16,11 @@ use crate::{
     TrackerAnswer, Tree, TreeBytes, Unavailable, VertexTable,
 };
 
-/// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the surface as it is now,
-/// and the trust in it.
+/// The control tick's end of a [`Surface`](super::Surface): the closest pair of one tool on the current surface, and
+/// the trust in it.
 ///
-/// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` slots and `RANGE` for
-/// [contacts](Self::contacts), and less than 500 bytes.
+/// Keep it in a `static` or in a task's memory. RAM: that of a [`Tracker`] with `OPENED` slots and `RANGE` slots for
+/// [contacts](Self::contacts), plus less than 500 bytes.
 #[derive(Debug)]
 pub struct Guard<
     's,
@@ -37,9 +37,9 @@ pub struct Guard<
     tracker: Tracker<'t, I, STACK, OPENED, RANGE>,
     failsafe: FailSafe,
     options: Options,
-    /// Ticks a second.
+    /// Ticks per second.
     rate: f32,
-    /// The tissue's largest speed, in mm a millisecond.
+    /// The tissue's largest speed (mm/ms).
     speed: f32,
     before: Option<Pose>,
     rows: R::Of<'t>,
@@ -58,11 +58,11 @@ impl Pose {
         Self { start: tool.axis_start(), end: tool.axis_point(1.0), at }
     }
 
-    /// Velocity (mm/s) of the axis' point at a parameter since an earlier pose. Where the clock shows that ticks were
-    /// left out, as slow as they make it.
+    /// Velocity (mm/s) of the axis' point at a parameter since an earlier pose. If the clock shows that ticks were
+    /// skipped, the longer time is used.
     fn velocity(&self, before: &Self, rate: f32, parameter: f32) -> Vec3 {
         let (start, end) = (self.start - before.start, self.end - before.end);
-        // Two readings of a clock in milliseconds are up to one less apart than they seem.
+        // Two readings of a clock in milliseconds may be up to 1 ms closer than their difference.
         let elapsed = self.at.since(before.at).0.saturating_sub(1) as f32;
         let rate = if elapsed * rate > 1_000.0 { 1_000.0 / elapsed } else { rate };
         (start + (end - start) * parameter) * rate
@@ -72,7 +72,7 @@ impl Pose {
 impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const RANGE: usize>
     Guard<'s, 't, I, STACK, OPENED, R, RANGE>
 {
-    /// The control tick's end of buffers in anybody's memory, of which there are three.
+    /// The control tick's end of three buffers in the caller's memory.
     ///
     /// # Errors
     /// [`Error`]: the stack is too small for the tree, or a limit is out of range.
@@ -100,11 +100,11 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
 
     /// The answer of this tick. `now` is the receiver's clock.
     ///
-    /// The surface is the one published last, moved on to now
-    /// ([`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated)). Errors of the query are in the answer, and lead
-    /// to the safe state.
+    /// The surface is the last published one, extrapolated to `now`
+    /// ([`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated)). Query errors are in the answer, and lead to the
+    /// safe state.
     ///
-    /// Cost: the budget at most, and about a thousand instructions.
+    /// Cost: the budget at most, plus about a thousand instructions.
     pub fn closest<T: Tool>(&mut self, tool: &T, now: Millis) -> Answer {
         self.on_latest(
             tool,
@@ -115,17 +115,17 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         .0
     }
 
-    /// The answer of this tick, and all contacts within `margin` (mm): those of [`Tracker::contacts`], in the one budget,
-    /// with the velocity of the surface at each. [`Answer::contacts`] gives those that a constraint may act on.
+    /// The answer of this tick, and all contacts within `margin` (mm), as [`Tracker::contacts`] finds them, in one
+    /// budget, with the surface's velocity at each. [`Answer::contacts`] selects those on which a constraint may act.
     ///
-    /// They are looked for as much farther as the surface may be off, by its error and its age, so that a constraint with this
-    /// margin has a contact from where it begins to act.
+    /// The search margin includes the surface's error and the motion during its age, so that a constraint with this
+    /// margin has each contact as soon as it must act.
     ///
-    /// A guard of [`start_with_contacts`](super::Surface::start_with_contacts) remembers what a search for contacts opened;
-    /// for others each tick searches anew. The list is empty where there is no surface, or the query failed. Its
-    /// [accuracy](Contacts::accuracy) covers what the pair's does.
+    /// A guard from [`start_with_contacts`](super::Surface::start_with_contacts) remembers the nodes that a search for
+    /// contacts opened; other guards search from the root at each tick. The list is empty if there is no surface, or
+    /// the query failed. Its [accuracy](Contacts::accuracy) covers the same errors as the pair's.
     ///
-    /// Cost: the budget at most, about a thousand instructions, and some hundred for each contact.
+    /// Cost: the budget at most, plus about a thousand instructions, and some hundred for each contact.
     pub fn contacts<T: Tool, const N: usize, const NEAR: usize>(
         &mut self,
         tool: &T,
@@ -162,14 +162,14 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         answer
     }
 
-    /// The answer of this tick, and the motion nearest to `command` that keeps the tool out of the tissue until the next one.
-    /// After an error nothing is admitted: the tool stays at rest.
+    /// The answer of this tick, and the motion nearest to `command` that keeps the tool out of the tissue until the
+    /// next tick. After an error nothing is admitted: the tool stays at rest.
     ///
-    /// The filter states the stand-off and the robot's speed; the period, the tissue's speed, and the uncertainty by lag and
-    /// transit are known here. The surface is extrapolated: its residual is an estimate, and the [filter](crate::filter)
-    /// says what that means. Nothing is admitted in the safe state.
+    /// The filter has the stand-off and the robot's speed; the guard adds the period, the tissue's speed, and the
+    /// uncertainty by lag and transit. The surface is extrapolated, and its residual is an estimate: see
+    /// [filter](crate::filter) for the consequences. Nothing is admitted in the safe state.
     ///
-    /// Cost: that of [`closest`](Self::closest) and of [`Filter::admit`].
+    /// Cost: that of [`closest`](Self::closest) plus that of [`Filter::admit`].
     pub fn admit<T: Tool>(
         &mut self,
         filter: &Filter,
@@ -197,7 +197,8 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
                         &[],
                     );
                 };
-                // The surface's own motion is that in the world, so the pose stands still for the period.
+                // The tissue's speed limit is in the world and includes the pose's motion, so the pose is fixed for the
+                // period.
                 let (own, motion) = (placed.tool(tool), placed.motion(command));
                 let moved = placed.error_of_motion(&own, &motion, (filter, period));
                 let tissue = tissue.error(placed.error(tool) + moved);
@@ -210,7 +211,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         (answer, admitted.unwrap_or(none))
     }
 
-    /// The answer of this tick, by `search`, and what `then` makes of the surface that was searched and of the trust in it.
+    /// The answer of this tick by `search`, and the result of `then` for the searched surface and the trust in it.
     #[inline(always)]
     fn on_latest<T: Tool, A>(
         &mut self,
@@ -250,7 +251,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
             }
             None => tool,
         };
-        // The fail-safe machine decides how old a surface may be.
+        // The fail-safe machine decides the age limit of a surface.
         let (searched, tracked) = match (frame, surface) {
             (Some(frame), Ok((blend, surface))) => {
                 let notes = &notes.of_all;
@@ -296,9 +297,9 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         (answer, after)
     }
 
-    /// The answer of a tick whose tool has no pose: the state is safe, with [`Unavailable::NoPose`] as its cause while
-    /// there is a surface, and the constraint's output is the hold, without a force where nothing is known to damp. The
-    /// next tick's velocity starts anew.
+    /// The answer of a tick without a tool pose: the state is safe, with the cause [`Unavailable::NoPose`] while there
+    /// is a surface. The constraint's output is the hold, with zero force as no velocity is known to damp. The next
+    /// tick's velocity restarts.
     pub fn without_pose(&mut self, now: Millis) -> Answer {
         self.before = None;
         let Self { notes, reader, tree, tracker, failsafe, .. } = self;
@@ -309,7 +310,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         judge(&notes.of_all, failsafe, is_corrupt, found, Vec3::NAN, now)
     }
 
-    /// An operator's acknowledgement, which ends the safe state once every input is good again.
+    /// An operator's acknowledgement, which ends the safe state once every input is within its limits again.
     ///
     /// # Errors
     /// [`AcknowledgeError`] unless the last tick waited for it.
@@ -324,7 +325,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     }
 }
 
-/// How the surface that is searched moves, and how late it is.
+/// The velocity and lag of the searched surface.
 struct Flow<'a, 'f, 't, R: Rows> {
     rows: &'f R::Of<'t>,
     blend: &'f Blend<'f>,
@@ -341,16 +342,16 @@ impl<R: Rows> Flow<'_, '_, '_, R> {
         self.failsafe.margin(self.frame, self.blend.lag(), &self.notes.link.read(self.now))
     }
 
-    /// At a point of a triangle (mm/s).
+    /// The velocity of a point of a triangle (mm/s).
     fn at(&self, corners: [u32; 3], weights: [f32; 3]) -> Vec3 {
         R::velocity(self.rows, self.blend, corners, weights)
     }
 }
 
-/// A frame, the surface that was searched, and the pair on it.
+/// The frame, the searched surface, and the pair on it.
 type Found = (Option<FrameAge>, Option<Searched>, Result<TrackerAnswer, Unavailable>);
 
-/// The tick's answer, by the trust in what was found.
+/// The tick's answer, by the trust in the searched surface.
 fn judge(
     notes: &Common,
     failsafe: &mut FailSafe,

@@ -1,10 +1,11 @@
-//! An infinite limit in formats that have no infinity, as JSON: none.
+//! An infinite limit in formats without infinity, such as JSON: `null`.
 
 use serde::de::{Deserialize, Deserializer};
 use serde::ser::{Error, Serialize, Serializer};
 
 pub fn serialize<S: Serializer>(limit: &f32, serializer: S) -> Result<S::Ok, S::Error> {
-    // Of NaN and negative infinity, which JSON has not either, none would make no limit of one that refuses all.
+    // JSON has no NaN and no negative infinity either; as `null`, such a limit, which refuses all, would become no
+    // limit.
     if limit.is_nan() || *limit == f32::NEG_INFINITY {
         return Err(S::Error::custom("a limit that refuses every frame"));
     }

@@ -1,18 +1,18 @@
 //! Sums rounded up or down.
 
-/// `a + b`, rounded down; NaN where the sum is.
+/// `a + b`, rounded down; NaN if the sum is.
 pub(crate) fn sum_down(a: f32, b: f32) -> f32 {
     let (sum, error) = two_sum(a, b);
     if error < 0.0 { sum.next_down() } else { sum }
 }
 
-/// `a + b`, rounded up; NaN where the sum is.
+/// `a + b`, rounded up; NaN if the sum is.
 pub(crate) fn sum_up(a: f32, b: f32) -> f32 {
     let (sum, error) = two_sum(a, b);
     if error > 0.0 { sum.next_up() } else { sum }
 }
 
-/// A sum to nearest, and what it lacks (Knuth's two-sum, exact unless the sum overflows).
+/// A sum rounded to nearest, and its rounding error (Knuth's two-sum, exact unless the sum overflows).
 fn two_sum(a: f32, b: f32) -> (f32, f32) {
     let sum = a + b;
     let rest = sum - a;

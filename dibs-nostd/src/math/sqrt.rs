@@ -1,7 +1,7 @@
-//! The square root, correctly rounded, by the hardware's own instruction where there is one.
+//! The square root, correctly rounded, by a hardware instruction if there is one.
 //!
-//! `core` has no stable square root, and the portable one in software takes tens of instructions on a Cortex-M7 whose
-//! FPU needs a single one. All ways below round correctly, so that host and target agree in every bit.
+//! `core` has no stable square root, and the portable software version takes tens of instructions on a Cortex-M7 whose
+//! FPU needs one. All versions below round correctly, so that host and target agree in every bit.
 
 // Requirements: A-11, P-01
 
@@ -15,7 +15,7 @@ pub(crate) fn sqrt(x: f32) -> f32 {
 
 /// A hard-float ABI promises the FPU's single-precision square root.
 ///
-/// The compiler knows C's function by this name. When it optimises, it replaces the call by the instruction, on FPU
+/// The compiler knows C's function by this name. When it optimises, it replaces the call by the instruction on FPU
 /// registers, which inline assembly cannot name in stable Rust; only a negative number still calls the function. On
 /// targets without a C library Rust's runtime provides it, portable and correctly rounded too.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]

@@ -1,11 +1,11 @@
-//! Four points at once, coordinate by coordinate: one instruction each on a large processor.
+//! Four points at once, by coordinate: one vector instruction each on a large processor.
 
 use glam::{Mat4, Vec3, Vec4};
 
 #[cfg(feature = "wide")]
 use crate::math::sqrt::sqrt;
 
-/// Four points or vectors. Each operation rounds as that of [`Vec3`] does.
+/// Four points or vectors. Each operation rounds like that of [`Vec3`].
 #[derive(Clone, Copy, Debug)]
 pub struct Vec3x4 {
     pub x: Vec4,

@@ -8,13 +8,13 @@
 //! - `sigma(a + t (b - a)) <= (1 - t) sigma(a) + t sigma(b)`, between any two.
 //!
 //! The builder stores the weights of recorded shapes with their measured stretch, the *anchors*. The bound is the least
-//! of: from each anchor; from the nearest point of the two segments that join the nearest recorded anchor to its
-//! neighbours in time, the last to the first. At a recorded frame the bound is that frame's stretch, between two of
-//! them it is hardly more, and away from them it grows with the distance.
+//! of those from each anchor, and those from the nearest point of the two segments that join the nearest recorded
+//! anchor to its neighbours in time (the last is joined to the first). At a recorded frame the bound is that frame's
+//! stretch, between two of them it is hardly more, and away from them it grows with the distance.
 //!
-//! Rounding. The arithmetic here is some tens of roundings deep: a relative 2^-16 covers it. The slack
-//! that the builder stores covers the positions' (a rounded vertex moves the gradient by its error over
-//! the triangle's height) and that of the points on segments.
+//! Rounding. The arithmetic here is some tens of roundings deep: a relative 2^-16 covers it. The slack stored by the
+//! builder covers the rounding of positions (a rounded vertex changes the gradient by its error over the triangle's
+//! height) and of points on segments.
 
 use super::layout::{self, Anchor};
 use super::{Modes, WeightsError};
@@ -24,14 +24,14 @@ use crate::surface::MeasuredStretch;
 pub(super) const ROUNDING: f32 = 1.0 + 1.0 / 65_536.0;
 
 impl Modes<'_> {
-    /// An upper bound of the stretch of the surface at these weights: never below the true one, and at the recorded
-    /// frames what [`measure_stretch`](crate::measure_stretch) measures, but for rounding. Its
-    /// [`triangle`](MeasuredStretch::triangle) is the one stretched most in the nearest recorded frame.
+    /// An upper bound on the stretch of the surface at these weights: never below the true one, and at the recorded
+    /// frames equal to [`measure_stretch`](crate::measure_stretch) except for rounding. Its
+    /// [`triangle`](MeasuredStretch::triangle) is the most stretched one in the nearest recorded frame.
     ///
     /// Cost: O(modes times anchors).
     ///
     /// # Errors
-    /// [`WeightsError`] for weights that [`check`](Self::check) refuses.
+    /// [`WeightsError`] as from [`check`](Self::check).
     pub fn stretch_bound(&self, weights: &[f32]) -> Result<MeasuredStretch, WeightsError> {
         self.check(weights)?;
         Ok(self.bound(weights))
@@ -73,7 +73,7 @@ impl Modes<'_> {
         layout::anchor(self.anchors, row, self.count())
     }
 
-    /// Most that the difference between an anchor's shape and these weights adds to the stretch.
+    /// Upper bound on the stretch added by the difference between an anchor's shape and these weights.
     fn growth_from(&self, weights: &[f32], anchor: Anchor<'_>) -> f32 {
         let mut sum = 0.0;
         for ((weight, from), mode) in weights.iter().zip(anchor.weights).zip(self.modes()) {

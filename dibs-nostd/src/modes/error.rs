@@ -25,7 +25,7 @@ pub enum ModesError {
         /// Its value.
         value: u32,
     },
-    /// A mode's range, gain or growth is not valid, or the modes together reach too far.
+    /// A mode's range, gain or growth is not valid, or the sum of all modes is too large.
     Mode {
         /// The mode.
         mode: u32,
@@ -61,7 +61,7 @@ impl core::error::Error for ModesError {}
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum WeightsError {
-    /// Not one weight for each mode.
+    /// The number of weights is not the number of modes.
     Count {
         /// Modes of the surface.
         expected: u32,

@@ -1,4 +1,4 @@
-//! A modal surface that came over the bus: as it was sent, between it and the frame before, and after it.
+//! A modal surface from the bus: as received, interpolated between it and the previous frame, and extrapolated.
 //!
 //! Weights are blended, not positions: a vertex costs as much as on the frame itself. The stretch between two shapes is
 //! bounded by convexity, as in the [bound](super::bound) of a frame.
@@ -43,22 +43,22 @@ impl<const K: usize> Weights<K> {
     }
 }
 
-/// The step from the frame before to this one, and its extrapolation.
+/// The step from the previous frame to this one, and its extrapolation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step<const K: usize> {
     before: Weights<K>,
     /// The end of the extrapolation, its weights within their ranges.
     end: Weights<K>,
-    /// Time from the frame before to this one, on the receiver's clock.
+    /// Time from the previous frame to this one, on the receiver's clock.
     interval: Millis,
-    /// The odometer's reading at the frame before.
+    /// The odometer's reading at the previous frame.
     from: MotionReading,
-    /// Units of the odometer from the frame before to this one, and from this one to the end.
+    /// Odometer units from the previous frame to this one, and from this one to the end.
     pub units: u64,
     units_ahead: u64,
-    /// Distances of the frame before and of this one from their extrapolations; NaN if unknown.
+    /// Distances of the previous frame and of this one from their extrapolations; NaN if unknown.
     shown: [f32; 2],
-    /// The latter in units.
+    /// The second of them in units.
     ahead: PredictionCheck,
 }
 
@@ -74,7 +74,7 @@ impl<const K: usize> Step<K> {
         last: Option<&Self>,
     ) -> Self {
         let mut end = *now;
-        // A quarter of the change of weights that would leave their ranges: no more than such a weight is itself.
+        // A quarter of the change of weights that would leave their ranges: no more than such a weight itself.
         let rest = Weights { values: [0.0; K], stretch: None };
         let mut cut = rest;
         let ends = end.values.iter_mut().zip(&mut cut.values);
@@ -94,13 +94,14 @@ impl<const K: usize> Step<K> {
         if let Some(last) = last {
             let t = last.ahead(interval);
             let expected = before.towards(&last.end, t, modes);
-            // Of a velocity that changes steadily, after as long a time again as this step took.
+            // For a velocity that changes at a constant rate, one time of this step later.
             let longer = 2.0 * interval.0 as f32 / (interval.0 as f32 + last.interval.0 as f32);
             let longer = if longer > 1.0 { longer } else { 1.0 };
             shown = [last.shown[1], reach.between(&expected.surface(modes), &surface) * longer];
-            // Weights and `t` are rounded by a few parts in 2^24.
+            // Weights and `t` are rounded by a few times 2^-24.
             let rounding = (units(&rest) + step + last.units_ahead) / (1 << 20);
-            // At the end, where the error has grown threefold, the surface is off its prediction by all that was cut.
+            // At the end, where the error has tripled, the surface differs from its prediction by the whole clipped
+            // part.
             let cut = reach.between(&rest.surface(modes), &cut.surface(modes)) * (4.0 / 3.0);
             let off = units(&expected) + modes.motion.units_of(cut) + rounding + 2;
             let passed = (t * last.units_ahead as f32) as u64;
@@ -112,13 +113,13 @@ impl<const K: usize> Step<K> {
         Self { before, end, interval, from, units, units_ahead, shown, ahead }
     }
 
-    /// `t` of the blend with the end after so long.
+    /// The `t` of the blend with the end, at this age.
     fn ahead(&self, age: Millis) -> f32 {
         clamped(age.0 as f32 / self.interval.0 as f32, FARTHEST) / FARTHEST
     }
 }
 
-/// A published modal surface: a [`VertexTable`] that carries a bound on its stretch and its position error, and a
+/// A published modal surface: a [`VertexTable`] with a bound on its stretch and its position error, and a
 /// [`MovingSurface`].
 ///
 /// RAM: `16 K` bytes and some 400.
@@ -133,13 +134,13 @@ pub struct ModalFrame<'a, const K: usize> {
     age: Millis,
     is_frame: bool,
     shown: f32,
-    /// The part of `shown` that is in its error by now.
+    /// The part of `shown` included in its error so far.
     own_error: f32,
     lag: Millis,
 }
 
 impl<'a, const K: usize> ModalFrame<'a, K> {
-    /// A frame as it was received.
+    /// A frame as received.
     pub(super) fn new(
         modes: &Modes<'a>,
         label: FrameLabel,
@@ -154,17 +155,17 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         Self { surface, label, weights, motion, step, age, is_frame, shown, own_error, lag }
     }
 
-    /// The facts about this frame; of a surface between frames, those of the later. Its position error is that of the
-    /// modes for the motion that they were fitted to.
+    /// The facts about this frame; for a surface between frames, about the later one. Its position error is that of the
+    /// modes for the motion to which they were fitted.
     #[must_use]
     pub const fn label(&self) -> FrameLabel {
         self.label
     }
 
-    /// The surface as long ago as the time between the last two frames that were read: certain, and late by that time.
+    /// The surface one frame interval ago, interpolated between the last two frames read: exact, but late by that time.
     ///
-    /// This and [`extrapolated`](Self::extrapolated) are the frame itself until a second one has been read, of another
-    /// time. A frame from [`ModalReader::read`](super::ModalReader::read) has no age. O(modes).
+    /// This and [`extrapolated`](Self::extrapolated) are the frame itself until a second one with another time has been
+    /// read. A frame from [`ModalReader::read`](super::ModalReader::read) has no age. O(modes).
     #[must_use]
     pub fn interpolated(&self) -> Self {
         let Some(step) = &self.step else { return *self };
@@ -175,13 +176,13 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         self.moved(weights, Some(motion), (f32::NAN, 0.0), lag)
     }
 
-    /// The surface now, if every weight has kept its velocity since the last frame: on time, and wrong by the change of
-    /// the motion, as the last frames showed it: that error is in its [`position_error`](VertexTable::position_error).
+    /// The current surface, if every weight has kept its velocity since the last frame. Its error is the change of the
+    /// motion, estimated from the last frames; it is part of its [`position_error`](VertexTable::position_error).
     /// O(modes).
     ///
-    /// It goes on for twice the time between the last two frames, and is held then. No weight leaves its range. It is
-    /// held at once before the third frame, and where the surface, moved on for so long, might be stretched beyond the
-    /// tree's limit.
+    /// The extrapolation lasts for twice the time between the last two frames; then the surface is held. No weight
+    /// leaves its range. The surface is held at once before the third frame, and if the extrapolation might be
+    /// stretched beyond the tree's limit.
     #[must_use]
     pub fn extrapolated(&self) -> Self {
         let (Some(step), Some(motion)) = (&self.step, self.motion) else { return *self };
@@ -197,7 +198,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         let prediction = Prediction::new(step.units, &step.ahead, t * FARTHEST);
         let motion = motion.beside((t * step.units_ahead as f32) as u64);
         let motion = motion.map(|motion| motion.on(prediction));
-        // The change of the motion may have been none by chance. False for NaN.
+        // A single small residual may be by chance. False for NaN.
         let [before, now] = step.shown;
         let shown = if before > now { before } else { now };
         let end = Millis((step.interval.0 as f32 * FARTHEST) as u32);
@@ -205,16 +206,16 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         self.moved(weights, motion, (shown, grown(shown, t * FARTHEST)), lag)
     }
 
-    /// A bound (mm) on the distance of the last frame's vertices from its extrapolation by the two frames before, the
-    /// larger of the last two frames': an estimate of this surface's own error by the time of the next frame.
-    /// [`position_error`](VertexTable::position_error) includes it as far as it has grown. `None` for a surface that is
+    /// A bound (mm) on the distance of the last frame's vertices from its extrapolation by the two previous frames; the
+    /// larger value of the last two frames. It estimates this surface's own error at the time of the next frame.
+    /// [`position_error`](VertexTable::position_error) includes the part reached so far. `None` for a surface that is
     /// not extrapolated.
     #[must_use]
     pub fn residual(&self) -> Option<f32> {
         (self.shown >= 0.0).then_some(self.shown)
     }
 
-    /// The time by which this surface is behind the present: see [`SurfaceBlend::lag`](crate::SurfaceBlend::lag).
+    /// How far this surface is behind the present: see [`SurfaceBlend::lag`](crate::SurfaceBlend::lag).
     #[must_use]
     pub const fn lag(&self) -> Option<Millis> {
         Some(self.lag)
@@ -258,7 +259,7 @@ impl<const K: usize> VertexTable for ModalFrame<'_, K> {
 
 impl<const K: usize> Sealed for ModalFrame<'_, K> {}
 
-/// Its motion since other frames of one reader is known, between frames too.
+/// Its motion since other frames of one reader is known, also between frames.
 impl<const K: usize> MovingSurface for ModalFrame<'_, K> {
     fn motion(&self) -> Option<MotionReading> {
         self.motion

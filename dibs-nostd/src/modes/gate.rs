@@ -6,22 +6,22 @@ use crate::stretch::{Admission, FrameExtent, Gate, IncomingSurface, StretchError
 use crate::surface::{Millis, VertexTable};
 use crate::tree::SurfaceFacts;
 
-/// Admits weights within their ranges whose surface keeps to the stretch limit, and to a speed limit: the
-/// [`Gate`] of an [`Assembler`](crate::Assembler) of modal frames.
+/// Admits weights within their ranges whose surface stays within the stretch limit and a speed limit: the [`Gate`] of
+/// an [`Assembler`](crate::Assembler) of modal frames.
 ///
-/// [`Modes::stretch_bound`] and a bound on the vertices' motion decide in O(modes), whatever the number of triangles.
-/// If a bound exceeds its limit, another gate `G` measures the surface, in slices if that is a
+/// [`Modes::stretch_bound`] and a bound on the vertices' motion decide in O(modes), for any number of triangles. If a
+/// bound exceeds its limit, another gate `G` measures the surface, in slices if it is a
 /// [`StretchMonitor`](crate::StretchMonitor). So no frame within the limits is refused, and no frame stretched or moved
 /// beyond them is admitted.
 ///
 /// The limits on speed and recovery are `G`'s: [`StretchMonitor::limits`](crate::StretchMonitor::limits). Its limits on
-/// size and on the sign of the volume hold only for frames that it measures.
+/// size and on the sign of the volume apply only to frames that it measures.
 #[derive(Clone, Debug)]
 pub struct ModalGate<'a, G, const K: usize> {
     modes: Modes<'a>,
     reach: Reach<K>,
     exact: G,
-    /// The surface that `exact` measures, where a bound exceeded its limit.
+    /// The surface for `exact` to measure, if a bound exceeded its limit.
     surface: Option<ModalSurface<'a, K>>,
     measured: u32,
 }
@@ -49,7 +49,6 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
         self.measured
     }
 
-    /// The weights in these rows.
     fn weights<V: VertexTable + ?Sized>(rows: &V) -> Result<[f32; K], StretchError> {
         let mut weights = [0.0; K];
         for (row, weight) in (0..).zip(&mut weights) {
@@ -81,7 +80,7 @@ impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
         self.modes.position_error()
     }
 
-    /// The rows hold the weights of this frame and of the published one, as an assembler stores them.
+    /// The rows hold the weights of this frame and of the published one, as the assembler stores them.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
         IncomingSurface { surface: rows, ready, before, .. }: IncomingSurface<'_, V>,

@@ -1,4 +1,4 @@
-//! The modes' bytes: section 7 of `docs/format.md`, and its checker.
+//! The modes' bytes: section 7 of `docs/format.md`, and its validation.
 
 use super::{MAX_GAIN, MAX_MODES, ModesError};
 use crate::tree::format::{range, u32_at};
@@ -14,7 +14,6 @@ pub const ANCHOR_TAIL_BYTES: usize = 8;
 /// Most anchors.
 pub const MAX_ANCHORS: usize = 65;
 
-/// The header's fields.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Header {
     pub modes: u32,
@@ -28,14 +27,13 @@ pub(super) struct Header {
     pub margin: f32,
 }
 
-/// One mode's record.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mode {
     pub low: f32,
     pub high: f32,
     /// Units of a displacement sum, times 2^16, for one step of a displacement at weight 1.
     pub gain: f32,
-    /// Most that a weight of 1 can add to a triangle's stretch.
+    /// Upper bound on a triangle's stretch added by a weight of 1.
     pub growth: f32,
 }
 
@@ -90,7 +88,7 @@ pub(super) const fn parts(
     if end != bytes.len() as u64 {
         return Err(ModesError::Length { expected: end, found: bytes.len() as u64 });
     }
-    // All offsets are at most the section's length, which a tree's header states in 32 bits.
+    // All offsets are at most the section's length, which is a 32-bit number in a tree's header.
     let (Some(records), Some(anchors), Some(rows)) = (
         range(bytes, records_at as u32, (anchors_at - records_at) as u32),
         range(bytes, anchors_at as u32, (rows_at - anchors_at) as u32),
@@ -108,7 +106,7 @@ pub(super) const fn parts(
     }
 }
 
-/// Whether it is a number of at least 0 with which lengths do not overflow.
+/// Whether it is a number of at least 0 for which lengths do not overflow.
 const fn is_length(x: f32) -> bool {
     x >= 0.0 && x <= 1e18
 }
@@ -124,7 +122,7 @@ const fn check_modes(records: &[u8], count: u32) -> Result<(), ModesError> {
             && is_length(mode.gain)
             && is_length(mode.growth);
         reach += mode.gain * if -mode.low > mode.high { -mode.low } else { mode.high };
-        // Written so that NaN is wrong.
+        // Written so that NaN is rejected.
         if !(sound && reach <= MAX_GAIN) {
             return Err(wrong);
         }
@@ -160,7 +158,7 @@ pub(super) const fn anchor_bytes(modes: usize) -> usize {
     4 * modes + ANCHOR_TAIL_BYTES
 }
 
-/// The `f32` at an offset; outside the bytes NaN, which every check refuses.
+/// The `f32` at an offset; NaN outside the bytes, which every check refuses.
 const fn f32_at(bytes: &[u8], at: usize) -> f32 {
     match u32_at(bytes, at) {
         Some(bits) => f32::from_bits(bits),
@@ -168,7 +166,6 @@ const fn f32_at(bytes: &[u8], at: usize) -> f32 {
     }
 }
 
-/// The record of a mode.
 pub(super) const fn mode(records: &[u8], mode: usize) -> Option<Mode> {
     let Some(at) = mode.checked_mul(MODE_BYTES) else { return None };
     match records.split_at_checked(at) {
@@ -189,7 +186,6 @@ pub(super) const fn decode(r: &[u8; MODE_BYTES]) -> Mode {
     }
 }
 
-/// The displacements of one vertex.
 #[inline(always)]
 pub(super) fn row(rows: &[u8], vertex: u32, modes: usize) -> Option<&[[u8; VERTEX_MODE_BYTES]]> {
     let stride = modes * VERTEX_MODE_BYTES;

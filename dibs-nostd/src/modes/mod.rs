@@ -47,15 +47,15 @@ use crate::tree::{Index, PathKind, Tree, format};
 #[doc(hidden)]
 pub const MAX_MODES: usize = 64;
 
-/// Bits of a weight times a displacement below the unit of their sum.
+/// Fraction bits of a weight times a displacement, relative to the unit of their sum.
 #[doc(hidden)]
 pub const FRACTION_BITS: u32 = 16;
 
-/// Largest sum, over the modes, of largest weight times gain: a displacement sum then fits 29 bits.
+/// Largest sum over the modes of largest weight times gain: a displacement sum then fits in 29 bits.
 #[doc(hidden)]
 pub const MAX_GAIN: f32 = 536_870_912.0;
 
-/// The displacement modes that a tree carries, validated once: a view of bytes in flash.
+/// The displacement modes in a tree, validated once: a view of bytes in flash.
 ///
 /// ```
 /// use dibs_build::{Builder, generate, modes::ModalFit};
@@ -95,12 +95,11 @@ pub struct Modes<'a> {
     mesh_id: u32,
     /// The unit of the surface's motion, with the tree's checksum.
     motion: MotionUnit,
-    /// The tree's stretch limit.
     limit: f32,
 }
 
 impl<'a> Modes<'a> {
-    /// Validates the modes that a tree carries (section 7 of `docs/format.md`).
+    /// Validates the modes in a tree (section 7 of `docs/format.md`).
     ///
     /// Cost: O(modes times anchors). The rows need no check, since any bits are displacements.
     ///
@@ -108,7 +107,7 @@ impl<'a> Modes<'a> {
     /// [`ModesError`] names the first defect and its value.
     pub const fn of<I: Index>(tree: &Tree<'a, I>) -> Result<Self, ModesError> {
         let sections = tree.sections();
-        // A volume's section holds nodes.
+        // In a tree with volume paths the section holds nodes.
         if sections.coarse.is_empty() || matches!(tree.paths(), PathKind::Volume) {
             return Err(ModesError::Absent);
         }
@@ -144,8 +143,7 @@ impl<'a> Modes<'a> {
         self.vertices
     }
 
-    /// Recorded shapes that [`stretch_bound`](Self::stretch_bound) starts from, the rest shape among
-    /// them.
+    /// Number of recorded shapes from which [`stretch_bound`](Self::stretch_bound) starts, including the rest shape.
     #[must_use]
     pub const fn anchor_count(&self) -> usize {
         self.header.anchors as usize
@@ -163,11 +161,11 @@ impl<'a> Modes<'a> {
         self.limit
     }
 
-    /// Largest distance (mm) between a recorded vertex and the modal surface's, over the motion that the modes were
-    /// fitted to: from modes left out, quantisation and arithmetic. For the answer's accuracy:
+    /// Largest distance (mm) between a recorded vertex and the modal surface's, over the motion to which the modes were
+    /// fitted: from omitted modes, quantisation and arithmetic. For the answer's accuracy:
     /// [`Proximity::widened`](crate::Proximity::widened).
     ///
-    /// It says nothing about motions other than the recorded one.
+    /// It does not hold for other motions.
     #[must_use]
     pub const fn position_error(&self) -> f32 {
         self.header.position_error
@@ -179,19 +177,19 @@ impl<'a> Modes<'a> {
         self.header.rms_error
     }
 
-    /// Part of the recorded range by which [`range`](Self::range) exceeds it.
+    /// Fraction of the recorded range by which [`range`](Self::range) exceeds it.
     #[must_use]
     pub const fn margin(&self) -> f32 {
         self.header.margin
     }
 
-    /// Bytes of flash that the modes take, without the rest shape.
+    /// Bytes of the modes in flash, without the rest shape.
     #[must_use]
     pub const fn flash_bytes(&self) -> usize {
         HEADER_BYTES + self.records.len() + self.anchors.len() + self.rows.len()
     }
 
-    /// Smallest and largest weight of a mode that [`check`](Self::check) admits; `None` for a mode that does not exist.
+    /// Smallest and largest weight of a mode that [`check`](Self::check) admits; `None` if there is no such mode.
     #[must_use]
     pub const fn range(&self, mode: usize) -> Option<[f32; 2]> {
         match layout::mode(self.records, mode) {
@@ -206,7 +204,7 @@ impl<'a> Modes<'a> {
         format::rest_position(self.rest, vertex)
     }
 
-    /// Size of one step of a mode's displacements at weight 1 (mm); `None` for a mode that does not exist.
+    /// Size of one step of a mode's displacements at weight 1 (mm); `None` if there is no such mode.
     #[must_use]
     pub const fn step(&self, mode: usize) -> Option<f32> {
         match layout::mode(self.records, mode) {
@@ -216,8 +214,8 @@ impl<'a> Modes<'a> {
         }
     }
 
-    /// Displacement of a vertex by one mode, in the mode's [`step`](Self::step)s; `None` outside the
-    /// tables. For hosts: a query reads all modes at once.
+    /// Displacement of a vertex by one mode, in the mode's [`step`](Self::step)s; `None` outside the tables. For host
+    /// programs: a query reads all modes at once.
     #[must_use]
     pub fn displacement(&self, mode: usize, vertex: u32) -> Option<[i16; 3]> {
         let &[x0, x1, y0, y1, z0, z1] = self.row(vertex)?.get(mode)?;
@@ -227,7 +225,7 @@ impl<'a> Modes<'a> {
     /// Checks that there is one weight for each mode, finite and in the mode's range. O(modes).
     ///
     /// # Errors
-    /// [`WeightsError`] names the first weight that is not.
+    /// [`WeightsError`] for the first invalid weight.
     pub fn check(&self, weights: &[f32]) -> Result<(), WeightsError> {
         if weights.len() != self.count() {
             return Err(WeightsError::Count {
@@ -250,7 +248,7 @@ impl<'a> Modes<'a> {
     /// The surface at these weights. O(modes): no vertex is computed yet.
     ///
     /// # Errors
-    /// [`WeightsError`] for weights that [`check`](Self::check) refuses, or more modes than `K`.
+    /// [`WeightsError`] as from [`check`](Self::check), or for more modes than `K`.
     pub fn surface<const K: usize>(
         &self,
         weights: &[f32],
@@ -265,12 +263,11 @@ impl<'a> Modes<'a> {
         Ok(ModalSurface::new(self, weights.iter().copied()))
     }
 
-    /// The records of all modes.
     fn modes(&self) -> impl Iterator<Item = layout::Mode> {
         self.records.as_chunks::<MODE_BYTES>().0.iter().map(layout::decode)
     }
 
-    /// A vertex's displacements by all modes, as they are stored.
+    /// A vertex's stored displacements by all modes.
     #[inline(always)]
     fn row(&self, vertex: u32) -> Option<&'a [[u8; VERTEX_MODE_BYTES]]> {
         layout::row(self.rows, vertex, self.count())

@@ -11,14 +11,14 @@ const DIAGONAL: f32 = 1.7321;
 /// Allowance for the f32 rounding of sums over all modes.
 const ROUNDING: f32 = 1.0 + 1.0 / 65_536.0;
 
-/// How far the modes' displacements reach.
+/// The sizes of the modes' displacements.
 ///
-/// A vertex moves by the sum, over the modes, of its displacement times the gain's change. That is no longer than the
-/// sum of the modes' largest displacements, each times its gain's change; nor than the root of the sum of their squares,
-/// times the largest norm of a vertex's displacements, each mode's divided by its largest.
+/// A vertex moves by the sum, over the modes, of its displacement times the change of the gain. Two bounds hold: the
+/// sum of the modes' largest displacements, each times the change of its gain; and the root of the sum of the squares
+/// of these products, times the largest norm of a vertex's displacements, each mode's divided by its largest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reach<const K: usize> {
-    /// The length of each mode's largest displacement, in units of a sum for a gain of 1.
+    /// The length of each mode's largest displacement, in units of a sum at a gain of 1.
     largest: [f32; K],
     /// The largest norm of a vertex's matrix of 3 x `K` such quotients.
     norm: f32,
@@ -48,7 +48,7 @@ impl<const K: usize> Reach<K> {
         Self { largest: largest.map(|length| length / scale), norm: sqrt(sqrt(norm)) }
     }
 
-    /// Upper bound (mm) on the distance of a vertex on one surface from its position on the other, but for the rounding
+    /// Upper bound (mm) on the distance of a vertex on one surface from its position on the other, without the rounding
     /// of the two positions.
     pub fn between(&self, before: &ModalSurface<'_, K>, after: &ModalSurface<'_, K>) -> f32 {
         let (mut sum, mut squares) = (0.0, 0.0);
@@ -96,8 +96,8 @@ mod tests {
     use crate::modes::tests::{MODES, surface};
     use crate::{Tree, VertexTable};
 
-    /// No vertex moves farther than the bound, whatever the weights, and also where they are chosen so that one vertex
-    /// moves as far as it can.
+    /// No vertex moves farther than the bound for any weights, also if they are chosen so that one vertex moves as far
+    /// as it can.
     #[test]
     fn no_vertex_moves_farther() {
         let built = surface();
@@ -144,7 +144,7 @@ mod tests {
                 tightest[kind] = tightest[kind].min(bound / moved);
             }
         }
-        // One mode alone moves its farthest vertex by all of the bound.
+        // One mode alone moves its farthest vertex by the whole bound.
         assert!(tightest[0] < 1.3 && tightest[1] < 1.001 && tightest[2] < 1.2, "{tightest:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! The control tick's end of a bus that carries weights.
+//! The control tick's end of a bus for weights.
 
 use super::frame::{Step, Weights};
 use super::reach::Reach;
@@ -7,11 +7,11 @@ use crate::surface::{
     FrameGuard, FrameLabel, FrameReader, LatestSurface, Millis, MotionReading, VertexTable,
 };
 
-/// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows, with one weight in
+/// Reads published weights as surfaces. The double buffer is [`Frames`](crate::Frames) of `K` rows with one weight
 /// each.
 ///
-/// It measures the motion from each frame that it reads to the next, by a bound: the surface that it gives is a
-/// [`MovingSurface`](crate::MovingSurface), for a [`Tracker`](crate::Tracker).
+/// It bounds the motion from each frame that it reads to the next, so its surface is a
+/// [`MovingSurface`](crate::MovingSurface) for a [`Tracker`](crate::Tracker).
 ///
 /// RAM: `20 K` bytes and some 300.
 #[derive(Debug)]
@@ -22,7 +22,6 @@ pub struct ModalReader<'f, 'a, const K: usize> {
     last: Option<Last<K>>,
 }
 
-/// The frame read last.
 #[derive(Clone, Copy, Debug)]
 struct Last<const K: usize> {
     weights: Weights<K>,
@@ -34,7 +33,7 @@ struct Last<const K: usize> {
 }
 
 impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
-    /// A reader of surfaces of exactly `K` modes, whose buffers have a row for each.
+    /// A reader of surfaces of exactly `K` modes, whose buffers have one row for each mode.
     ///
     /// Cost: two passes over the displacements of all vertices.
     ///
@@ -68,7 +67,7 @@ impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
     }
 }
 
-/// The frame as a surface, and from now on the one read last.
+/// Returns the frame as a surface, and stores it as the last one read.
 fn next<'a, const K: usize>(
     modes: &Modes<'a>,
     reach: &Reach<K>,
@@ -103,7 +102,7 @@ impl<const K: usize> Last<K> {
         weights: Weights<K>,
     ) -> Self {
         let mut now = Self { weights, epoch, received, motion: None, step: None };
-        // No assembler publishes weights out of range, for which the sums may wrap.
+        // An assembler never publishes weights out of range, for which the sums may wrap.
         if modes.check(&weights.values).is_err() {
             return now;
         }

@@ -8,11 +8,11 @@ use crate::tree::format;
 
 /// The surface at some weights: [`Modes::surface`] makes one.
 ///
-/// It stores a copy of its weights and a view of flash. `K` is the room for weights, at least [`Modes::count`].
+/// It stores a copy of its weights and a view of flash. `K` is the capacity for weights, at least [`Modes::count`].
 ///
-/// The displacement is summed in integers: a 32-bit weight times a 16-bit displacement, the upper 32 of 48 bits, added
-/// up. That takes one instruction on a Cortex-M7, where floats take a conversion, a product and a sum, and it gives the
-/// same bits in any order. Only the sum's conversion and its addition to the rest position round.
+/// The displacement is summed in integers: a 32-bit weight times a 16-bit displacement, of which the upper 32 of 48
+/// bits are added. That takes one instruction on a Cortex-M7, where floats take a conversion, a product and a sum, and
+/// it gives the same bits in any order. Only the sum's conversion and its addition to the rest position round.
 ///
 /// RAM: `4 K` bytes and a copy of [`Modes`].
 #[derive(Clone, Copy, Debug)]
@@ -60,7 +60,7 @@ impl<const K: usize> VertexTable for ModalSurface<'_, K> {
         Some(rest + Vec3::new(x as f32, y as f32, z as f32) * self.modes.header.unit)
     }
 
-    /// The error for the motion that the modes were fitted to.
+    /// The error for the motion to which the modes were fitted.
     fn position_error(&self) -> f32 {
         self.modes.position_error()
     }

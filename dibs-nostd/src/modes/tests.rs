@@ -1,4 +1,4 @@
-//! The motion of a modal surface as its odometer states it, which only the crate can read.
+//! The motion of a modal surface as stated by its odometer, which only the crate can read.
 
 // Requirements: F-06, T-04
 
@@ -13,7 +13,7 @@ use crate::{FrameLabel, FrameWriter, Frames, Millis, MovingSurface, Tree, Vertex
 
 pub(super) const MODES: usize = 8;
 
-/// A beating heart that three waves run over.
+/// A beating heart with three travelling waves.
 pub(super) fn surface() -> BuiltTree {
     let generate::MovingMesh { mesh, mut motion } = generate::heart(320).unwrap();
     for (time, frame) in (0_u8..).zip(&mut motion.frames) {
@@ -29,7 +29,7 @@ pub(super) fn surface() -> BuiltTree {
     Builder::new().stretch(3.0).build(&mesh).unwrap().with_modes(&fit, MODES).unwrap()
 }
 
-/// The farthest that a vertex moved from one surface to another.
+/// The largest motion of a vertex from one surface to another.
 fn moved(before: &impl VertexTable, after: &impl VertexTable) -> f32 {
     let rows = 0..before.len() as u32;
     rows.map(|row| before.position(row).unwrap().distance(after.position(row).unwrap()))
@@ -46,8 +46,8 @@ fn publish(writer: &mut FrameWriter<'_>, weights: &[f32], epoch: u32, received: 
     writer.publish(label).unwrap();
 }
 
-/// Between any two surfaces that a reader gave, frames, between frames and beyond them, no vertex moved farther than the
-/// odometer says, and it does not say much more. Some frames have the number and the time of the one before.
+/// Between any two surfaces of a reader (frames, between frames and beyond them) no vertex moved farther than the
+/// odometer states, and it does not overstate by much. Some frames repeat the number and time of the previous one.
 #[test]
 fn no_vertex_moves_farther_than_the_odometer_says() {
     let built = surface();
@@ -94,8 +94,8 @@ fn no_vertex_moves_farther_than_the_odometer_says() {
     }
 }
 
-/// Of weights that swing through their ranges and rest at their ends for a while, at a steady rate of frames: an
-/// extrapolated surface moves no farther at a new frame than its odometer says, and not much less.
+/// With weights that swing through their ranges and rest at the ends, at a steady frame rate: at a new frame an
+/// extrapolated surface moves no farther than its odometer states, and not much less.
 #[test]
 fn a_steady_extrapolation_moves_by_its_error() {
     let built = surface();
@@ -133,8 +133,8 @@ fn a_steady_extrapolation_moves_by_its_error() {
     assert!(found > 100.0 && stated < 2.0 * found, "{sums:?}");
 }
 
-/// At hundreds of radii a frame the numbers of a course do not fit: the odometer then knows less, and never states a way
-/// that is too short.
+/// At hundreds of radii a frame the numbers of a prediction do not fit: the odometer's bound is then looser, but never
+/// too small.
 #[test]
 fn no_speed_makes_the_odometer_understate() {
     let mesh = generate::heart(320).unwrap().mesh;
@@ -181,8 +181,8 @@ fn no_speed_makes_the_odometer_understate() {
     assert!(farthest > 20_000.0, "{farthest}");
 }
 
-/// The same where a course's numbers nearly fit: a surface that became shorter on its way goes on without becoming shorter
-/// still, so its far end is farther from where it was shown than the error of its expected place.
+/// The same if a prediction's numbers barely fit: a surface that shrank on its way continues without shrinking further,
+/// so its far end is farther from its shown position than the error of its expected position.
 #[test]
 fn a_course_of_weights_is_not_cut_to_the_numbers_that_fit() {
     const K: usize = 2;
@@ -197,13 +197,13 @@ fn a_course_of_weights_is_not_cut_to_the_numbers_that_fit() {
     let ends = mesh.positions.iter().fold([f32::MAX, f32::MIN], |[left, right], p| {
         [if p.x < left { p.x } else { left }, if p.x > right { p.x } else { right }]
     });
-    // `far` on its way, and pressed together towards its left end by `shorter` radii.
+    // At `far` along its way, and compressed towards its left end by `shorter` radii.
     let shape = |(far, shorter): (f32, f32)| {
         let pressed = |p: &Vec3| (p.x - ends[0]) / (ends[1] - ends[0]) * shorter * radius;
         mesh.positions.iter().map(|p| *p + Vec3::X * (far * most - pressed(p))).collect()
     };
     let shown = [(-2.0, 0.0), (-1.33, 0.4), (-0.66, 0.8), (0.34, 0.8)];
-    // Where the third and the fourth go on to: no weight leaves its range before.
+    // The extrapolation of the third and the fourth frame: no weight leaves its range before.
     let beyond = [(0.68, 1.6), (2.4, 0.0)];
     let frames = shown.into_iter().chain(beyond).map(shape).collect();
     let motion = Motion { frames, ..Motion::default() };
@@ -230,14 +230,14 @@ fn a_course_of_weights_is_not_cut_to_the_numbers_that_fit() {
         let last = [0, 1].map(|mode| third[mode] + (fourth[mode] - third[mode]) * part);
         read(first, 1, 0, 0);
         read(second, 2, 10_000, 0);
-        // Its units nearly do not fit.
+        // Its units barely fit.
         let before = read(third, 3, 20_000, 14_920);
         let after = read(last, 4, 34_860 + 5 * late, 0);
         let units = after.motion().unwrap().since(&before.motion().unwrap()).unwrap();
         let stated = units as f64 / 2f64.powi(32) * f64::from(most);
         let found = f64::from(moved(&before, &after));
         assert!(stated >= found * 0.999_99, "{short} {late}: {found} {stated}");
-        // Where nothing is known of the course, the way between the frames counts.
+        // If there is no prediction, the distance between the frames counts.
         *(if stated > f64::from(most) { &mut unknown } else { &mut known }) += 1;
     }
     assert!(unknown > 50 && known > 50, "{unknown} {known}");

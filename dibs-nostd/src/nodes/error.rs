@@ -37,7 +37,7 @@ pub enum NodesError {
         /// Nodes of the surface.
         nodes: u32,
     },
-    /// The numbers of an element's check are not valid, or elements are not in the order of their latest nodes.
+    /// The constants of an element's check are not valid, or elements are not sorted by their latest node.
     Element {
         /// The element.
         element: u32,
@@ -56,12 +56,12 @@ pub enum NodesError {
         /// Elements of the surface.
         elements: u32,
     },
-    /// A vertex is outside of its element, of a tree whose vertices are not, or too far outside.
+    /// A vertex is outside of its element, in a tree where none may be, or too far outside.
     Weights {
         /// Row of the vertex.
         vertex: u32,
-        /// The sum of its weights' sizes in parts of 65,536: that is the sum of one inside, and three times as much too
-        /// large.
+        /// The sum of the absolute values of its weights, in units of 1/65,536: 65,536 if inside; three times that is
+        /// too large.
         sum: u32,
     },
 }
@@ -88,10 +88,7 @@ impl fmt::Display for NodesError {
                 write!(f, "vertex {vertex} is bound to element {element}, there are {elements}")
             }
             Self::Weights { vertex, sum } => {
-                write!(
-                    f,
-                    "the sizes of the weights of vertex {vertex} sum up to {sum} parts of 65536"
-                )
+                write!(f, "the absolute weights of vertex {vertex} sum up to {sum} parts of 65536")
             }
         }
     }

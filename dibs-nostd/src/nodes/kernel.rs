@@ -1,26 +1,26 @@
 //! The check of one element.
 //!
-//! Let `e1`, `e2`, `e3` be the edges along the path through an element's four nodes, as they are now, and `G` the matrix
-//! of their products; `M` is the same at rest. The largest singular value of the deformation gradient is below `sigma`
-//! exactly if `L M - G` is positive definite for `L = sigma^2`, because `G = E0^T F^T F E0` and `M = E0^T E0`. That is so
-//! if its leading minors are positive. So the comparison with the largest `L` so far takes neither a root nor a division,
-//! and no gradient. Comparisons are strict: with `>=` the minors of diag(0, 0, -1) would pass, and NaN fails.
+//! Let `e1`, `e2`, `e3` be the current edges along the path through an element's four nodes, and `G` the matrix of
+//! their products; `M` is the same at rest. The largest singular value of the deformation gradient is below `sigma`
+//! exactly if `L M - G` is positive definite for `L = sigma^2`, because `G = E0^T F^T F E0` and `M = E0^T E0`. That is
+//! so if its leading minors are positive. So the comparison with the largest `L` so far takes neither a root nor a
+//! division, and no gradient. Comparisons are strict: with `>=` the minors of diag(0, 0, -1) would pass, and NaN fails.
 //!
 //! # Rounding
 //!
 //! Let `u = 2^-24`, and `X` be `L M - G` as computed. The entries of `G` come from differences of coordinates: those on
-//! the diagonal are off by at most `5 u` of themselves, others by `5 u |ei| |ej|`; a difference `L m - g` adds two
-//! roundings. So, for `X` positive definite, `X` is off by at most `6.1 u L m_ii` on the diagonal and by `12.1 u L
-//! sqrt(m_ii m_jj)` elsewhere. The minors are those of a matrix near `X`, as in an error analysis of Cholesky's
-//! factorisation: `x11 x22 - x12^2` is exact for an `x22` changed by `2 u` of itself, `x11 x23 - x12 x13` for an `x23` so
-//! changed, and the comparison of the products for an `x33` changed by `9 u`. In all `F^T F` is at most `L` for an `M`
-//! larger by at most `44 u` of its diagonal; storing the entries adds `3 u`. With the least eigenvalue `c` of `M` scaled
-//! to a diagonal of ones, its diagonal is at most `M / c`. So the builder divides `M` by `1 + 50 u / c`
-//! ([`MARGIN`](super::MARGIN)), and an element that passes is not stretched beyond `sqrt(L)`.
+//! the diagonal have errors of at most `5 u` of themselves, others of `5 u |ei| |ej|`; a difference `L m - g` adds two
+//! roundings. So, for `X` positive definite, `X` has an error of at most `6.1 u L m_ii` on the diagonal and
+//! `12.1 u L sqrt(m_ii m_jj)` elsewhere. The minors are those of a matrix near `X`, as in an error analysis of
+//! Cholesky's factorisation: `x11 x22 - x12^2` is exact for an `x22` changed by `2 u` of itself, `x11 x23 - x12 x13`
+//! for an `x23` changed likewise, and the comparison of the products for an `x33` changed by `9 u`. In total `F^T F` is
+//! at most `L` for an `M` larger by at most `44 u` of its diagonal; storing the entries adds `3 u`. With the least
+//! eigenvalue `c` of `M` scaled to a diagonal of ones, its diagonal is at most `M / c`. So the builder divides `M` by
+//! `1 + 50 u / c` ([`MARGIN`](super::MARGIN)), and an element that passes is not stretched beyond `sqrt(L)`.
 //!
-//! The volume `e1 . (e2 x e3)` is off by at most `8 u sqrt(2) |e1| |e2| |e3|`, and no edge is longer than the stretch limit
-//! times its rest length, so the builder stores `12 u s^3` times the product of the rest lengths: a volume above it is
-//! positive.
+//! The volume `e1 . (e2 x e3)` has an error of at most `8 u sqrt(2) |e1| |e2| |e3|`, and no edge is longer than the
+//! stretch limit times its rest length. So the builder stores `12 u s^3` times the product of the rest lengths: a
+//! volume above it is positive.
 
 // Requirement: F-07
 
@@ -31,16 +31,16 @@ use glam::Vec4;
 use super::layout::AtRest;
 use crate::math::sqrt::sqrt;
 
-/// A number, or one of each of four elements: they round alike.
+/// One number, or one for each of four elements, with the same rounding.
 pub(super) trait Lanes:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// An answer for each.
+    /// A truth value for each.
     type Mask: BitAnd<Output = Self::Mask>;
 
     fn splat(number: f32) -> Self;
 
-    /// Whether it is above another; false for NaN.
+    /// Whether it is greater than another; false for NaN.
     fn is_above(self, other: Self) -> Self::Mask;
 }
 
@@ -72,7 +72,7 @@ impl Lanes for Vec4 {
     }
 }
 
-/// An element as it is now, or four.
+/// The current shape of one element, or of four.
 #[derive(Clone, Copy)]
 pub(super) struct Now<T> {
     /// The products of its edges, in the order of [`AtRest::products`].
@@ -81,7 +81,7 @@ pub(super) struct Now<T> {
 }
 
 impl<T: Lanes> Now<T> {
-    /// From the coordinates of its four nodes.
+    /// The shape from the coordinates of its four nodes.
     #[inline(always)]
     pub fn of([a, b, c, d]: [[T; 3]; 4]) -> Self {
         let (first, second, third) = (minus(b, a), minus(c, b), minus(d, c));
@@ -119,7 +119,7 @@ impl<T: Lanes> Now<T> {
         x11.is_above(zero) & second.is_above(zero) & (second * third).is_above(between * between)
     }
 
-    /// The sum of the squares of its edges, and that at rest.
+    /// The sum of the squares of its edges, current and at rest.
     #[inline(always)]
     pub fn sizes(&self, rest: &AtRest<T>) -> [T; 2] {
         let sum = |[first, _, _, second, _, third]: [T; 6]| first + second + third;
@@ -149,7 +149,7 @@ impl Now<f32> {
         high
     }
 
-    /// The stretch of an element beyond the square `limit`, to within a part in a thousand; infinite for one that is not
+    /// The stretch of an element beyond the square `limit`, within one part in a thousand; infinite if it is not
     /// finite.
     #[cold]
     pub fn stretch_beyond(&self, rest: &AtRest<f32>, limit: f32) -> f32 {
@@ -174,6 +174,6 @@ fn dot<T: Lanes>([x, y, z]: [T; 3], [u, v, w]: [T; 3]) -> T {
     x * u + y * v + z * w
 }
 
-/// Relative rounding up of a squared stretch. Elements stretched nearly as much as the one stretched most pass the check
-/// with it: failing takes twenty times as long.
+/// Relative rounding up of a squared stretch. With it, other elements stretched nearly as much pass the quick check:
+/// the full check takes twenty times as long.
 const HEADROOM: f32 = 1.0 / 65_536.0;

@@ -1,4 +1,4 @@
-//! The nodes' bytes: section 11 of `docs/format.md`, and its checker.
+//! The nodes' bytes: section 11 of `docs/format.md`, and its validation.
 
 use glam::{Mat4, Vec3, Vec4};
 
@@ -15,23 +15,23 @@ pub const ELEMENT_BYTES: usize = 36;
 pub const BINDING_BYTES: usize = 8;
 /// The sum of a vertex's four weights.
 pub const WHOLE: u32 = 1 << 16;
-/// A stored weight of zero where vertices lie outside of their elements: weights are signed then, and each is as many
-/// parts of 65,536 as [`STEP`] times what is stored above it.
+/// The stored number of a weight of zero if vertices may lie outside of their elements: weights are then signed, in
+/// units of [`STEP`] parts of 65,536.
 pub const SIGNED_ZERO: u32 = 1 << 15;
-/// Parts of a signed weight's unit.
+/// The unit of a signed weight, in parts of 65,536.
 pub const STEP: u32 = 4;
-/// The sizes of a vertex's signed weights sum up to less than so many parts.
+/// The absolute values of a vertex's signed weights sum up to less than this.
 pub const MOST_SIZES: u32 = 3 * WHOLE;
 
 /// The header, and the tables of nodes, elements and bindings.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Parts<'a> {
-    /// Longest path of elements from the first element's first node to another, at rest (mm).
+    /// Longest path through elements from the first element's first node to any other, at rest (mm).
     pub extent: f32,
     /// Longest edge at rest (mm).
     pub edge: f32,
     pub scale: Scale,
-    /// The largest sum of the sizes of a vertex's weights: no vertex moves farther than so many times its farthest node.
+    /// The largest sum of absolute weights of a vertex: no vertex moves farther than this times its farthest node.
     pub amplification: f32,
     pub nodes: &'a [[u8; NODE_BYTES]],
     pub elements: &'a [[u8; ELEMENT_BYTES]],
@@ -41,9 +41,9 @@ pub(super) struct Parts<'a> {
 /// How weights are stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
-    /// The number that is stored for a weight of 0.
+    /// The stored number of a weight of 0.
     zero: u32,
-    /// The unit, as a part of the whole.
+    /// The unit, as a fraction of the whole.
     pub unit: f32,
     /// The whole in units.
     pub whole: u32,
@@ -61,7 +61,7 @@ impl Scale {
         stored.wrapping_sub(self.zero) as i32
     }
 
-    /// The four weights in units, of the three that are stored.
+    /// The four weights in units, from the three stored ones.
     #[inline(always)]
     pub const fn weights(&self, [u, v, w]: [u32; 3]) -> [i32; 4] {
         let (u, v, w) = (self.weight(u), self.weight(v), self.weight(w));
@@ -70,7 +70,7 @@ impl Scale {
         [u, v, w, (self.whole as i32).wrapping_sub(sum)]
     }
 
-    /// Parts of 65,536 in so many units.
+    /// The parts of 65,536 in this many units.
     pub const fn parts(&self, units: u32) -> u32 {
         units.saturating_mul(if self.zero == 0 { 1 } else { STEP })
     }
@@ -83,23 +83,23 @@ pub(super) struct Element {
     pub rest: AtRest<f32>,
 }
 
-/// What an element's check compares, or that of four.
+/// The constants of an element's check, or those of four.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AtRest<T> {
     /// The products of the edges along the path through the four nodes: 11, 12, 13, 22, 23, 33.
     pub products: [T; 6],
-    /// The least volume of the edges that is certainly positive (mm³).
+    /// The least edge volume that is certainly positive (mm³).
     pub least: T,
 }
 
-/// A vertex's element, and the weights of its first three nodes as they are stored.
+/// A vertex's element, and the stored weights of its first three nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Binding {
     pub element: u32,
     pub weights: [u32; 3],
 }
 
-/// Finds and checks the tables of a surface of so many vertices.
+/// Finds and checks the tables of a surface with this many vertices.
 pub(super) fn parts(bytes: &[u8], vertices: u32) -> Result<Parts<'_>, NodesError> {
     let wrong_length = |expected| NodesError::Length { expected, found: bytes.len() as u64 };
     let Some((header, tables)) = bytes.split_first_chunk::<HEADER_BYTES>() else {
@@ -108,7 +108,7 @@ pub(super) fn parts(bytes: &[u8], vertices: u32) -> Result<Parts<'_>, NodesError
     let word = |at| u32_at(header, at).unwrap_or(u32::MAX);
     let (nodes, elements) = (word(0), word(4));
     let (extent, edge) = (f32::from_bits(word(8)), f32::from_bits(word(12)));
-    // Written so that NaN is wrong.
+    // Written so that NaN is rejected.
     let is_length = |length: f32| length > 0.0 && length <= 1e18;
     let is_wrong = |offset: u8| match offset {
         0 => !(4..=MAX_NODES).contains(&nodes),
@@ -148,7 +148,7 @@ pub(super) fn parts(bytes: &[u8], vertices: u32) -> Result<Parts<'_>, NodesError
 fn check(parts: &Parts<'_>) -> Result<f32, NodesError> {
     for (node, row) in (0..).zip(parts.nodes) {
         let Vec3 { x, y, z } = position(row).abs();
-        // So that products of lengths do not overflow. Written so that NaN is wrong.
+        // So that products of lengths do not overflow. Written so that NaN is rejected.
         if !((x <= 1e9) & (y <= 1e9) & (z <= 1e9)) {
             return Err(NodesError::Node { node });
         }
@@ -174,7 +174,7 @@ fn check(parts: &Parts<'_>) -> Result<f32, NodesError> {
         last = latest;
         let at = |node: u32| parts.nodes.get(node as usize).map_or(Vec3::NAN, position);
         let [a, b, c, d] = corners.map(at);
-        // Written so that NaN is wrong.
+        // Written so that NaN is rejected.
         if !((b - a).dot((c - b).cross(d - c)) > rest.least) {
             return Err(NodesError::Inverted { element: row });
         }
@@ -194,12 +194,11 @@ fn check(parts: &Parts<'_>) -> Result<f32, NodesError> {
         }
         largest = largest.max(sum);
     }
-    // The sum itself is exact: the factor covers the rounding of the products with it.
+    // The sum itself is exact: the factor covers the rounding of products with it.
     let above = if largest > WHOLE { 1.0 + 1.0 / 65_536.0 } else { 1.0 };
     Ok(largest as f32 * (above / WHOLE as f32))
 }
 
-/// The position of a node.
 #[inline(always)]
 pub(super) fn position(
     &[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3]: &[u8; NODE_BYTES],
@@ -211,7 +210,6 @@ pub(super) fn position(
     )
 }
 
-/// The record of an element.
 #[inline(always)]
 pub(super) fn element(record: &[u8; ELEMENT_BYTES]) -> Element {
     let (words, _) = record.as_chunks::<4>();
@@ -227,7 +225,7 @@ pub(super) fn element(record: &[u8; ELEMENT_BYTES]) -> Element {
     Element { corners, rest }
 }
 
-/// The records of four elements: the first nodes of all, their second ones and so on; and their shapes at rest.
+/// The records of four elements: all first nodes, all second nodes and so on; and their shapes at rest.
 #[inline(always)]
 pub(super) fn four([a, b, c, d]: &[[u8; ELEMENT_BYTES]; 4]) -> ([[u32; 4]; 4], AtRest<Vec4>) {
     let (a, b, c, d) = (element(a), element(b), element(c), element(d));
@@ -252,13 +250,11 @@ pub(super) fn four([a, b, c, d]: &[[u8; ELEMENT_BYTES]; 4]) -> ([[u32; 4]; 4], A
     (corners, AtRest { products, least: last.z_axis })
 }
 
-/// The nodes of an element.
 #[inline(always)]
 pub(super) fn corners(record: &[u8; ELEMENT_BYTES]) -> [u32; 4] {
     element(record).corners
 }
 
-/// The binding of a vertex.
 #[inline(always)]
 pub(super) fn binding(row: &[u8; BINDING_BYTES]) -> Binding {
     let low = u64::from_le_bytes(*row);

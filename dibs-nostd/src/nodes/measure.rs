@@ -9,15 +9,13 @@ use crate::math::vec3x4::Vec3x4;
 use crate::stretch::{LEAST, StretchError, root_up, squared_limit};
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 
-/// How far a measurement has come.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pass {
-    /// The next element.
     next: u32,
     /// The largest squared stretch so far, and its element.
     squared: f32,
     worst: u32,
-    /// The squares of the edges of this run of elements, now and at rest.
+    /// The sums of the squared edges in this range of elements, current and at rest.
     sizes: [f32; 2],
 }
 
@@ -26,8 +24,8 @@ impl Pass {
         Self { next: 0, squared: LEAST, worst: 0, sizes: [0.0; 2] }
     }
 
-    /// Measures at most `work` elements whose nodes are below row `ready`, and returns the work left. Runs of elements
-    /// must not shrink below `shrinkage` of their size at rest.
+    /// Measures at most `work` elements whose nodes are below row `ready`. Returns the work left. A range of elements
+    /// must not shrink below `shrinkage` of its size at rest.
     pub fn advance<V: VertexTable + ?Sized>(
         &mut self,
         nodes: &Nodes<'_>,
@@ -70,7 +68,7 @@ impl Pass {
     ) -> Result<(), StretchError> {
         let limit = squared_limit(nodes.limit);
         while !rows.is_empty() {
-            // Elsewhere it would take more instructions, not fewer.
+            // On other processors it takes more instructions, not fewer.
             if cfg!(any(target_arch = "x86_64", target_arch = "aarch64")) {
                 let passed = self.fours(rows, table, ready);
                 rows = rows.get(passed..).unwrap_or_default();
@@ -87,8 +85,9 @@ impl Pass {
         Ok(())
     }
 
-    /// Measures four elements at a time, up to the first four that do not all pass the quick check, and returns how many
-    /// passed. Numbers round as in [`measure`](Self::measure) and are added in the same order, so the bits are the same.
+    /// Measures four elements at a time, up to the first four that do not all pass the quick check. Returns how many
+    /// passed. Values are rounded and added in the same order as in [`measure`](Self::measure), so the bits are the
+    /// same.
     // By itself, so that its state stays in registers.
     #[inline(never)]
     fn fours<V: VertexTable + ?Sized>(
@@ -123,7 +122,7 @@ impl Pass {
         passed
     }
 
-    /// Measures the next element; false where a node of it is not ready.
+    /// Measures the next element; false if one of its nodes is not ready.
     #[inline(always)]
     fn measure<V: VertexTable + ?Sized>(
         &mut self,
@@ -172,7 +171,7 @@ impl Pass {
     }
 }
 
-/// Four elements as they are now; `None` where a node is outside of the table.
+/// Four current elements; `None` if a node is outside of the table.
 #[inline(always)]
 fn now_of<V: VertexTable + ?Sized>(table: &V, corners: [[u32; 4]; 4]) -> Option<Now<Vec4>> {
     let at = |nodes| {
@@ -194,8 +193,8 @@ mod tests {
     use super::*;
     use crate::tree::Tree;
 
-    /// Frames of nodes, some with elements beyond the limit, turned inside out or not finite: measured four at a time in
-    /// slices of any length, the bits and the refused element are those of one at a time.
+    /// Frames of nodes, some with elements beyond the limit, inverted or not finite: measured four at a time in slices
+    /// of any length, the bits and the refused element are the same as one at a time.
     #[test]
     fn four_at_a_time_are_measured_as_one_after_another() {
         let mesh = generate::heart(600).expect("a valid size").mesh;

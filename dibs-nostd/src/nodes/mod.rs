@@ -1,8 +1,8 @@
 //! Surfaces that a coarse model moves: vertices embedded in tetrahedra, in flash.
 //!
 //! Tissue models are coarse: finite elements, cages, markers. The fine surface is embedded in them: a vertex is the
-//! weighted mean of the four nodes of its element, computed only when a query reads it. So a frame is the nodes, its check
-//! measures the elements, and the tree's radii are lengths of paths through them.
+//! weighted mean of the four nodes of its element, computed only when a query reads it. So a frame consists of nodes,
+//! its check measures the elements, and the tree's radii are lengths of paths through them.
 //!
 //! | | |
 //! |---|---|
@@ -11,9 +11,9 @@
 //! | [`Nodes::measure`] | the elements' stretch |
 //! | [`NodeMonitor`] | the check of frames of nodes, in slices, for an [`Assembler`](crate::Assembler) |
 //!
-//! Nodes are rows like vertices: [`Frames`](crate::Frames) hold them, an [`Assembler`](crate::Assembler) receives them, and
-//! a frame's [`interpolated`](crate::FrameGuard::interpolated) and [`extrapolated`](crate::FrameGuard::extrapolated) nodes
-//! carry surfaces, too.
+//! Nodes are rows like vertices: [`Frames`](crate::Frames) hold them, an [`Assembler`](crate::Assembler) receives them,
+//! and a frame's [`interpolated`](crate::FrameGuard::interpolated) and
+//! [`extrapolated`](crate::FrameGuard::extrapolated) nodes move surfaces, too.
 
 // Requirement: F-07
 
@@ -51,15 +51,15 @@ pub const MAX_NODES: u32 = 1 << 16;
 #[doc(hidden)]
 pub const MAX_ELEMENTS: u32 = 1 << 16;
 
-/// Relative allowance for the rounding of an element's check, times the least eigenvalue of its rest shape.
+/// Relative allowance for the rounding of an element's check; divided by the least eigenvalue of its scaled rest shape.
 #[doc(hidden)]
 pub const MARGIN: f64 = 50.0 / 16_777_216.0;
 
-/// The least volume of an element that is certainly positive, as a part of the product of its edges' longest lengths.
+/// The least element volume that is certainly positive, as a fraction of the product of its edges' longest lengths.
 #[doc(hidden)]
 pub const LEAST_VOLUME: f64 = 12.0 / 16_777_216.0;
 
-/// The nodes, elements and bindings that a tree carries, validated once: a view of bytes in flash.
+/// The nodes, elements and bindings in a tree, validated once: a view of bytes in flash.
 ///
 /// ```
 /// use dibs_build::{Builder, Volume, generate};
@@ -95,13 +95,12 @@ pub struct Nodes<'a> {
     motion: MotionUnit,
     mesh_id: u32,
     facts: SurfaceFacts,
-    /// The tree's stretch limit.
     limit: f32,
 }
 
 impl<'a> Nodes<'a> {
-    /// Validates the nodes that a tree carries (section 11 of `docs/format.md`). That radii cover the surface the builder
-    /// proves.
+    /// Validates the nodes in a tree (section 11 of `docs/format.md`). The builder proves that the radii cover the
+    /// surface.
     ///
     /// Cost: linear in the section's bytes.
     ///
@@ -109,7 +108,7 @@ impl<'a> Nodes<'a> {
     /// [`NodesError`] names the first defect and its value.
     pub fn of<I: Index>(tree: &Tree<'a, I>) -> Result<Self, NodesError> {
         let section = tree.sections().coarse;
-        // The section of another path kind holds modes.
+        // In other path kinds this section holds modes.
         if !matches!(tree.paths(), PathKind::Volume) {
             return Err(NodesError::Absent);
         }
@@ -123,7 +122,7 @@ impl<'a> Nodes<'a> {
         })
     }
 
-    /// Number of nodes: rows of a frame.
+    /// Number of nodes, which is the number of rows of a frame.
     #[must_use]
     pub const fn count(&self) -> u32 {
         self.parts.nodes.len() as u32
@@ -147,15 +146,15 @@ impl<'a> Nodes<'a> {
         self.mesh_id
     }
 
-    /// The tree's stretch limit: the largest that an [element](Self::element_limit) has.
+    /// The tree's stretch limit: the largest limit of any [element](Self::element_limit).
     #[must_use]
     pub const fn stretch_limit(&self) -> f32 {
         self.limit
     }
 
-    /// The stretch beyond which frames are refused for an element; `None` for a number that is no element's. Below the limit
-    /// that the builder was given, so that the check's rounding admits nothing beyond it: by a few parts in a million, and by
-    /// up to 1.6 % for a flat element.
+    /// The stretch beyond which frames are refused because of an element; `None` if there is no such element. It is
+    /// below the limit given to the builder, to allow for the check's rounding: by a few parts in a million, and by up
+    /// to 1.6 % for a flat element.
     ///
     /// Cost: one element's check and a root.
     #[must_use]
@@ -167,7 +166,7 @@ impl<'a> Nodes<'a> {
         Some(self.limit * sqrt(compared / own))
     }
 
-    /// Bytes of flash that the section takes.
+    /// Bytes of the section in flash.
     #[must_use]
     pub const fn flash_bytes(&self) -> usize {
         let Parts { nodes, elements, bindings, .. } = &self.parts;
@@ -190,7 +189,7 @@ impl<'a> Nodes<'a> {
     }
 
     /// The nodes of a vertex and their weights, in parts of 65,536, which sum up exactly; `None` outside the table. A
-    /// vertex outside of its element has negative ones.
+    /// vertex outside of its element has negative weights.
     #[must_use]
     pub fn weights(&self, vertex: u32) -> Option<[(u32, i32); 4]> {
         let ([a, b, c, d], stored) = self.binding(vertex)?;
@@ -200,18 +199,17 @@ impl<'a> Nodes<'a> {
         Some([(a, u), (b, v), (c, w), (d, x)])
     }
 
-    /// The most that a vertex moves for each millimetre of the farthest node of its element: 1 if none is outside of its
-    /// element, else the largest sum of the sizes of a vertex's weights, below 3.
+    /// The most that a vertex moves for each millimetre of the farthest node of its element: 1 if no vertex is outside
+    /// of its element, else the largest sum of a vertex's absolute weights, below 3.
     ///
-    /// Errors of the nodes' positions count so many times in an answer's accuracy, as do their motion and their
-    /// extrapolation.
+    /// The position errors of the nodes, their motion and their extrapolation are multiplied by it.
     #[must_use]
     pub const fn amplification(&self) -> f32 {
         self.parts.amplification
     }
 
-    /// The surface at these nodes: a row for each, in the order of the volume's file. No vertex is computed yet. Of a
-    /// table of another length the surface is empty, and a query refuses it.
+    /// The surface at these nodes, one row each, in the order of the volume's file. No vertex is computed yet. If the
+    /// table has another length, the surface is empty, and a query refuses it.
     #[must_use]
     pub const fn surface<'n, V: VertexTable + ?Sized>(
         &'n self,
@@ -220,14 +218,14 @@ impl<'a> Nodes<'a> {
         EmbeddedSurface::new(self, table)
     }
 
-    /// Measures the stretch of all elements at once: the largest singular value of each, rounded up. It names the element
-    /// stretched most as [`MeasuredStretch::triangle`]. [`NodeMonitor`] measures the same in slices.
+    /// Measures the stretch of all elements at once: the largest singular value of each, rounded up. The most stretched
+    /// element is [`MeasuredStretch::triangle`]. [`NodeMonitor`] measures the same in slices.
     ///
     /// Cost: linear in the elements, about 90 floating point operations each, without root or division.
     ///
     /// # Errors
-    /// [`StretchError::ElementExceeded`] and [`StretchError::Inverted`] name the first element beyond the limit or turned
-    /// inside out, [`StretchError::VertexCount`] a table of another length.
+    /// [`StretchError::ElementExceeded`] and [`StretchError::Inverted`] for the first element beyond the limit or
+    /// inverted, [`StretchError::VertexCount`] for a table of another length.
     pub fn measure<V: VertexTable + ?Sized>(
         &self,
         table: &V,
@@ -238,7 +236,7 @@ impl<'a> Nodes<'a> {
         Ok(pass.measured(self, table.epoch()))
     }
 
-    /// An odometer of node frames, with which surfaces that no bus carries have a motion for a
+    /// An odometer of node frames, for the motion of surfaces that do not come from a bus, for a
     /// [`Tracker`](crate::Tracker).
     #[must_use]
     pub const fn odometer(&self) -> Odometer {
@@ -253,12 +251,12 @@ impl<'a> Nodes<'a> {
         Ok(())
     }
 
-    /// Elements of a run whose size is limited together.
+    /// Number of elements in a range whose size is limited together.
     fn run(&self) -> u32 {
         self.element_count().div_ceil(REGIONS as u32)
     }
 
-    /// The nodes of a vertex, and the weights of the first three as they are stored.
+    /// The nodes of a vertex, and the stored weights of the first three.
     #[inline(always)]
     fn binding(&self, vertex: u32) -> Option<([u32; 4], [u32; 3])> {
         let binding = layout::binding(self.parts.bindings.get(vertex as usize)?);

@@ -12,16 +12,16 @@ use crate::tree::SurfaceFacts;
 /// Measures every frame of nodes before it is published, a few elements at a time: the [`Gate`] of an
 /// [`Assembler`](crate::Assembler) whose buffers have a row for each node.
 ///
-/// It refuses frames with an element stretched beyond the tree's limit, shrunk, or inverted, and nodes that move too far,
-/// as [`StretchMonitor`](crate::StretchMonitor) does of triangles and vertices, and gives the query the measured stretch.
-/// Nodes may move as far as keeps every vertex within the limits: see [`Nodes::amplification`].
-/// An element is measured once its nodes have come; of a partial frame all elements are.
+/// It refuses frames with an element stretched beyond the tree's limit, shrunk, or inverted, and nodes that move too
+/// far, like [`StretchMonitor`](crate::StretchMonitor) for triangles and vertices, and gives the query the measured
+/// stretch. Nodes may move as far as keeps every vertex within the limits: see [`Nodes::amplification`]. An element is
+/// measured once its nodes have arrived; in a partial frame all elements are measured.
 ///
-/// An inverted element is a local defect: a body bent until its ends overlap passes.
+/// Inversion is checked for each element: a body bent until its ends overlap passes.
 ///
-/// With `SURFACES` = 2 ([`continuous`](NodeMonitor::continuous)) it measures the end of the frame's extrapolation, too.
-/// Between two frames the stretch is bounded by theirs, because the largest singular value is convex; an element may
-/// be inverted on the way where both frames turn it by much, which bounds no distance.
+/// With `SURFACES` = 2 ([`continuous`](NodeMonitor::continuous)) it also measures the end of the frame's extrapolation.
+/// Between two frames the stretch is bounded by theirs, because the largest singular value is convex; between frames
+/// that both turn an element by much, it may be inverted, which does not affect distance bounds.
 ///
 /// Cost: [`advance`](Gate::advance) checks at most `work` nodes and elements. RAM: 250 bytes.
 #[derive(Clone, Debug)]
@@ -37,7 +37,7 @@ pub struct NodeMonitor<'a, const SURFACES: usize = 1> {
 }
 
 impl<'a> NodeMonitor<'a> {
-    /// A monitor for frames of these nodes, with the limits that [`SurfaceLimits::reach_mm`] begins with.
+    /// A monitor for frames of these nodes, with the default limits of [`SurfaceLimits::reach_mm`].
     #[must_use]
     pub const fn new(nodes: &Nodes<'a>) -> Self {
         Self::with_passes(nodes)
@@ -45,8 +45,8 @@ impl<'a> NodeMonitor<'a> {
 }
 
 impl<'a> NodeMonitor<'a, 2> {
-    /// The same with the frames' extrapolations. One beyond the tree's limit, or with an inverted element, is no error:
-    /// the surface is held then.
+    /// The same with the frames' extrapolations. An extrapolation beyond the tree's limit, or with an inverted element,
+    /// is no error: then the surface is held instead.
     #[must_use]
     pub const fn continuous(nodes: &Nodes<'a>) -> Self {
         Self::with_passes(nodes)
@@ -65,7 +65,7 @@ impl<'a, const SURFACES: usize> NodeMonitor<'a, SURFACES> {
         }
     }
 
-    /// The same with these limits on speed, recovery and size, of nodes and elements. The assembler limits the reach.
+    /// The same with these limits on speed, recovery and size, for nodes and elements. The assembler checks the reach.
     #[must_use]
     pub const fn limits(mut self, limits: SurfaceLimits) -> Self {
         self.limits = limits;
@@ -78,7 +78,7 @@ impl<'a, const SURFACES: usize> NodeMonitor<'a, SURFACES> {
         &self.nodes
     }
 
-    /// Most nodes and elements checked for one frame: the sum of its slices' work.
+    /// Upper bound on the nodes and elements checked for one frame: the sum of its slices' work.
     #[must_use]
     pub const fn whole_work(&self) -> u32 {
         let elements = self.nodes.element_count().saturating_mul(SURFACES as u32);
@@ -132,7 +132,7 @@ impl<const SURFACES: usize> Gate for NodeMonitor<'_, SURFACES> {
             return Ok(Admission::Pending);
         }
         let (work, is_compared) = self.compare(arriving, work)?;
-        // Half of the work each, so that both keep up with the frame.
+        // Half of the work for each, so that both keep up with the frame.
         let for_ahead = if SURFACES > 1 { work / 2 } else { 0 };
         let Some((own, ahead)) = self.passes.split_first_mut() else {
             return Ok(Admission::Pending);

@@ -7,14 +7,14 @@ use super::layout::Scale;
 use crate::surface::motion::sealed::Sealed;
 use crate::surface::{MeasuredStretch, MotionReading, MovingSurface, VertexTable};
 
-/// The surface that a table of nodes carries: [`Nodes::surface`] makes one.
+/// The surface at a table of nodes: [`Nodes::surface`] makes one.
 ///
-/// It is as the nodes are: between frames where they are interpolated, beyond the last where they are extrapolated, with
-/// their stretch and their motion. A vertex moves at most [`amplification`](Nodes::amplification) times as far as the
-/// farthest node of its element: 1 for one inside, whose weights are not negative and sum up to one.
+/// It has the nodes' time (between frames if they are interpolated, beyond the last if extrapolated), stretch and
+/// motion. A vertex moves at most [`amplification`](Nodes::amplification) times as far as the farthest node of its
+/// element: 1 inside, where weights are not negative and sum up to one.
 ///
-/// A vertex is the fourth node of its element plus weighted edges from there to the other three, which rounds less than
-/// a sum of weighted positions.
+/// A vertex is computed as the fourth node of its element plus weighted edges from there to the other three, which has
+/// less rounding than a sum of weighted positions.
 #[derive(Clone, Copy, Debug)]
 pub struct EmbeddedSurface<'n, 'a, V: ?Sized> {
     nodes: &'n Nodes<'a>,
@@ -32,7 +32,7 @@ impl<'n, 'a, V: VertexTable + ?Sized> EmbeddedSurface<'n, 'a, V> {
         self.table
     }
 
-    /// Largest distance (mm) by which f32 arithmetic may misplace a pin and a vertex to each other, and their
+    /// Upper bound (mm) on the f32 error of a pin's and a vertex's position relative to each other and to their
     /// triangle.
     fn rounding(&self) -> f32 {
         let stretch = self.nodes.limit;
@@ -44,11 +44,11 @@ impl<'n, 'a, V: VertexTable + ?Sized> EmbeddedSurface<'n, 'a, V> {
     }
 }
 
-/// Half a unit in the last place of 1, and a hundredth of it for the rounding of the bound itself.
+/// Half a unit in the last place of 1, plus a hundredth of it for the rounding of the bound itself.
 const ROUNDING: f32 = 1.01 / 16_777_216.0;
 
 impl<V: VertexTable + ?Sized> VertexTable for EmbeddedSurface<'_, '_, V> {
-    /// The tree's vertices; 0 where the table has another number of nodes.
+    /// The tree's vertices; 0 if the table has another number of nodes.
     fn len(&self) -> usize {
         let is_whole = self.table.len() == self.nodes.parts.nodes.len();
         if is_whole { self.nodes.parts.bindings.len() } else { 0 }
@@ -75,7 +75,7 @@ impl<V: VertexTable + ?Sized> VertexTable for EmbeddedSurface<'_, '_, V> {
         self.table.stretch()
     }
 
-    /// That of the nodes, and the rounding of f32.
+    /// The nodes' error, and the rounding of f32.
     fn position_error(&self) -> f32 {
         self.table.position_error() * self.nodes.parts.amplification + self.rounding()
     }
@@ -101,7 +101,7 @@ mod tests {
     use crate::surface::MotionUnit;
     use crate::tree::Tree;
 
-    /// The odometer of a surface counts all of a vertex's motion, of one outside of its element, too.
+    /// The odometer of a surface counts all of a vertex's motion, also of a vertex outside of its element.
     #[test]
     fn motion_counts_the_lever() {
         let mesh = generate::heart(600).expect("a valid size").mesh;

@@ -20,20 +20,20 @@ pub struct Closest {
     pub surface: usize,
     /// The tool's index in its slice.
     pub tool: usize,
-    /// The pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are
-    /// those of all. Its side is not known ([`NoSide::CutShort`]) if the budget left that of any pair open.
+    /// The closest pair. Its `lower` is the least of all pairs, its accuracy the worst, its test counts are sums over
+    /// all pairs. Its side is [`NoSide::CutShort`] if the budget ran out before the side at every pair was found.
     pub proximity: Proximity,
 }
 
 impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
-    /// As [`closest`](Self::closest), but looks only for a pair whose unsigned separation is at most `separation` (mm):
-    /// a far surface costs a few tests that way.
+    /// As [`closest`](Self::closest), but only for pairs with an unsigned separation of at most `separation` (mm): a
+    /// surface beyond that is rejected after a few tests.
     ///
-    /// Where there is no such pair, the answer's interval begins at that separation, and its side is not known
-    /// ([`NoSide::CutShort`]). A separation that is not a number limits nothing.
+    /// If there is no such pair, the answer's interval begins at `separation` and its side is [`NoSide::CutShort`]. NaN
+    /// sets no limit.
     ///
     /// # Errors
-    /// Those of [`closest`](Self::closest).
+    /// Same as [`closest`](Self::closest).
     pub fn closest_within<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         vertices: &V,
@@ -44,7 +44,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         self.within(vertices, tool, separation, options).map(|(found, _)| found)
     }
 
-    /// [`closest_within`](Self::closest_within), and whether every pair is certain to be farther.
+    /// As [`closest_within`](Self::closest_within); also returns whether every pair is certainly farther.
     fn within<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         vertices: &V,
@@ -52,7 +52,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         separation: f32,
         options: &Options,
     ) -> Result<(Proximity, bool), QueryError> {
-        // A corner beyond the limit would lower no cutoff.
+        // A corner beyond the limit would not lower the cutoff.
         let limit = separation + tool.radius();
         let first = self.first_corner(vertices, options);
         let first =
@@ -61,21 +61,21 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         let mut search = self.search(vertices, tool, options, first)?;
         let limit = search.limit_to(separation);
         let found = search.run::<WITHIN>(limit)?;
-        // A search that its budget ended has a lower bound below the limit.
+        // A search that ran out of budget has a lower bound below the limit.
         let is_farther = !(found.separation <= separation) && found.lower >= limit - tool.radius();
         Ok((self.sided(vertices, tool, options, found)?, is_farther))
     }
 
     /// The closest pair between the surface and a chain of tools; `None` for an empty slice.
     ///
-    /// A tool is searched no farther than the closest so far, and again without that limit if it may be inside. One link of
-    /// a chain is not, if the next one is outside of a closed surface and neither meets it. So tools that do not touch each
-    /// other, and all tools at an open surface, cost as much as one by one.
+    /// Each tool is searched no farther than the smallest separation so far, and again without that limit if it may be
+    /// inside. A link is not inside if an adjoining link is outside of a closed surface and neither touches it. Tools
+    /// that do not touch each other, and all tools at an open surface, cost as much as one query for each tool.
     ///
-    /// Cost: the budget at most, for all tools together, and a node test a tool.
+    /// Cost: at most the budget for all tools together, plus one node test for each tool.
     ///
     /// # Errors
-    /// Those of [`closest`](Self::closest).
+    /// Same as [`closest`](Self::closest).
     ///
     /// ```
     /// use dibs_build::{Builder, generate};
@@ -105,15 +105,17 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         Ok(scene.finish())
     }
 
-    /// The closest pair between a chain of tools and the surfaces of a scene, each with its query; `None` without either.
+    /// The closest pair between a chain of tools and the surfaces of a scene, each with its query; `None` if there is
+    /// no tool or no surface.
     ///
-    /// Signed options search each surface at least once without a limit, since a tool deep inside it is far from it.
-    /// Unsigned ones search no surface farther than the closest pair so far, nearest surface of the last answers first.
+    /// With signed options each surface is searched at least once without a limit, since a tool deep inside is far from
+    /// the surface. With unsigned options a surface is searched no farther than the closest pair so far. The surface
+    /// whose last answer is nearest comes first.
     ///
-    /// Cost: the budget at most, for all pairs together, and a node test a pair.
+    /// Cost: at most the budget for all pairs together, plus one node test for each pair.
     ///
     /// # Errors
-    /// Those of [`closest`](Self::closest), of any surface.
+    /// Same as [`closest`](Self::closest), for any surface.
     pub fn closest_in_scene<V: VertexTable + ?Sized, T: Tool>(
         surfaces: &mut [(&mut Self, &V)],
         tools: &[T],
@@ -132,13 +134,13 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// [`Contact::surface`](crate::Contact::surface) and [`tool`](crate::Contact::tool) tell them apart. A chain and one
     /// surface are a scene too.
     ///
-    /// Pairs are searched as far as the closest pair so far or the margin, whichever is farther. The contacts of each
-    /// are those of [`contacts`](Self::contacts), and the list's bound holds for all pairs.
+    /// Each pair is searched as far as the closest pair so far or the margin, whichever is larger. Its contacts are as
+    /// in [`contacts`](Self::contacts); the list's bound holds for all pairs.
     ///
-    /// Cost: the budget at most, for all pairs together, and a node test a pair.
+    /// Cost: at most the budget for all pairs together, plus one node test for each pair.
     ///
     /// # Errors
-    /// Those of [`contacts`](Self::contacts), of any surface.
+    /// Same as [`contacts`](Self::contacts), for any surface.
     ///
     /// ```
     /// use dibs_build::{Builder, generate};
@@ -221,8 +223,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         nearest_first(nearest, surfaces.len())
     }
 
-    /// Adds this surface, number `surface` of the scene. Calls back with each tool's number and closest pair, where it
-    /// is as close as the scene's margin, inside or crossing.
+    /// Searches this surface, number `surface` of the scene. Calls `near` with the number and closest pair of each tool
+    /// that is within the scene's limit, inside or crossing.
     fn add_to<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         scene: &mut Scene,
@@ -241,8 +243,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
             scene.add(surface, number, found, &mut best);
             let is_outside = found.side == Side::Outside;
             if is_outside || is_farther {
-                // Without the accuracy an end next to the surface might count as outside; no test shows it, since a tool
-                // whose end is there is searched.
+                // Less the accuracy, so that an axis end next to the surface does not count as outside. No test covers
+                // this: such a tool is searched anyway.
                 passed.add(number, found.lower + tool.radius() - found.accuracy, is_outside);
             }
             if !is_farther {
@@ -295,27 +297,26 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     }
 }
 
-/// The numbers below `count`, `nearest` first.
+/// The numbers below `count`, with `nearest` first.
 fn nearest_first(nearest: usize, count: usize) -> impl Iterator<Item = usize> {
     let others = (0..count).filter(move |&number| number != nearest);
     [nearest].into_iter().filter(move |&number| number < count).chain(others)
 }
 
-/// The pairs so far.
 struct Scene {
-    /// The closest, with the interval and the tests of all.
+    /// The closest pair so far, with the interval and test counts of all pairs.
     best: Option<Closest>,
-    /// With the rest of the budget.
+    /// With the remaining budget.
     options: Options,
-    /// Pairs as close as this are searched, even if another one is closer.
+    /// Pairs within this separation are searched even if another one is closer.
     margin: f32,
-    /// A tool of the chain was searched on the present surface.
+    /// A tool of the chain was searched on the current surface.
     is_entered: bool,
-    /// No tool was found inside or crossing the present surface.
+    /// No tool was found inside or crossing the current surface.
     is_outside: bool,
-    /// The present surface has sides, which are asked for.
+    /// The current surface has sides, and the options ask for the side.
     has_sides: bool,
-    /// The budget ended before the side of a tool was known.
+    /// The budget ran out before the side of a tool was known.
     is_cut_short: bool,
 }
 
@@ -332,14 +333,14 @@ impl Scene {
         }
     }
 
-    /// The next surface. The sides of an open one are those of its closest sheets, which may be far.
+    /// Starts the next surface. At an open surface the side is that of the closest sheet, which may be far away.
     fn enter(&mut self, has_sides: bool, is_closed: bool) {
         self.has_sides = has_sides && self.options.is_signed;
         self.is_entered = !self.has_sides;
         self.is_outside = is_closed || !self.has_sides;
     }
 
-    /// A tool outside that is farther than this is not the closest; infinite while the chain may be inside, where
+    /// A tool outside with a larger separation is not the closest; infinite while the chain may be inside, where
     /// another tool may be deeper.
     fn limit(&self) -> f32 {
         match &self.best {
@@ -351,7 +352,7 @@ impl Scene {
         }
     }
 
-    /// Adds a pair, and keeps the surface's closest in `own`.
+    /// Adds a pair, and keeps the closest of this surface in `own`.
     fn add(&mut self, surface: usize, tool: usize, found: Proximity, own: &mut Option<Proximity>) {
         self.is_entered = true;
         self.options = self.options.after(found.tests());

@@ -1,4 +1,4 @@
-//! Corners of a triangle where they are now.
+//! The current positions of a triangle's corners.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use crate::tree::Tree;
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
-/// A triangle's corners: their rows, and their positions.
+/// The vertex rows of a triangle's corners, and their positions.
 #[inline(always)]
 pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
@@ -17,7 +17,6 @@ pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
     Ok((rows, positions(vertices, rows)?))
 }
 
-/// The positions of three rows.
 #[inline(always)]
 pub(super) fn positions<V: VertexTable + ?Sized>(
     vertices: &V,

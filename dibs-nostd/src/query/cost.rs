@@ -4,31 +4,31 @@
 
 use super::Budget;
 
-/// A fitted bound on a query's cost: `base + n * node_test + t * triangle_test`, in instructions, where `n`
-/// and `t` are the node and triangle tests that an answer counts. Those that a [`Budget`] allows are exact; the
-/// instructions of a test are measured, not proved.
+/// A fitted bound on a query's cost: `base + n * node_test + t * triangle_test`, in instructions, where `n` and `t` are
+/// the node and triangle tests that an answer counts. A [`Budget`] limits the tests exactly; the instructions of a test
+/// are measured, not proved.
 ///
-/// The constants are the plane above some hundred thousand adversarial queries about four small surfaces, on an
-/// emulated Cortex-M7 and on x86-64, plus a margin of 20 %. They are checked on surfaces and poses that the fit has not
-/// seen: the repository's `docs/evidence/guarantees.md` lists these, the queries above the bound, its tightness, and the cycles
-/// of an instruction. They are for [`Query::closest`](crate::Query::closest), vertex tables that are slices of `Vec3`,
-/// and the firmware's profile or an optimised build.
+/// The constants are an upper plane of the costs of some hundred thousand adversarial queries on four small surfaces,
+/// on an emulated Cortex-M7 and on x86-64, plus a margin of 20 %. They are checked on surfaces and poses outside of the
+/// fit: the repository's `docs/evidence/guarantees.md` lists these, the queries above the bound, its tightness, and the
+/// cycles per instruction. They hold for [`Query::closest`](crate::Query::closest), vertex tables that are slices of
+/// `Vec3`, and the firmware's profile or an optimised build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Cost {
-    /// The cost of every query: setting it up, the root, a warm start's bookkeeping, and the answer. Of a tree over
-    /// surfaces that share no vertex, each further root adds about a node test.
+    /// The cost of every query: set-up, the root, the warm start and the answer. In a tree over surfaces that share no
+    /// vertex, each further root adds about one node test.
     pub base: u32,
-    /// The cost of a node test: of a sphere, or of a leaf's or triangle's plane.
+    /// The cost of a node test: of a sphere, or of the plane of a leaf or triangle.
     pub node_test: u32,
     /// The cost of an exact triangle test, on top of the plane test before it.
     pub triangle_test: u32,
 }
 
 impl Cost {
-    /// The most instructions, by the fit, of a query that makes so many tests.
+    /// An upper bound by the fit on the instructions of a query with this many tests.
     ///
     /// ```
     /// use dibs_nostd::Cost;
@@ -42,7 +42,8 @@ impl Cost {
         nodes.saturating_add(triangles).saturating_add(self.base as u64)
     }
 
-    /// The most instructions, by the fit, of a query within `budget`, however it divides the tests.
+    /// An upper bound by the fit on the instructions of a query within `budget`, for any mix of node and triangle
+    /// tests.
     #[must_use]
     pub const fn instructions_within(&self, budget: Budget) -> u64 {
         // With the triangle of a warm start.
@@ -50,7 +51,7 @@ impl Cost {
         most.saturating_add(self.base as u64)
     }
 
-    /// The most instructions for each node test of a budget.
+    /// The largest cost per node test of a budget, in instructions.
     const fn unit(&self) -> u32 {
         let triangle = self.triangle_test.div_ceil(Budget::TRIANGLE);
         if self.node_test > triangle { self.node_test } else { triangle }
@@ -58,8 +59,8 @@ impl Cost {
 }
 
 impl Budget {
-    /// The budget of a query that ends within this many instructions, by the fit. A deadline shorter than [`Cost::base`]
-    /// gives an empty budget, which still costs the base.
+    /// The largest budget with which a query ends within this many instructions, by the fit. A deadline shorter than
+    /// [`Cost::base`] gives an empty budget, which still costs the base.
     ///
     /// ```
     /// use dibs_nostd::{Budget, Cost, Options};
@@ -72,9 +73,9 @@ impl Budget {
     #[must_use]
     pub const fn for_instructions(instructions: u32, cost: &Cost) -> Self {
         match instructions.saturating_sub(cost.base).checked_div(cost.unit()) {
-            // The triangle of a warm start comes on top.
+            // The triangle of a warm start is not counted in the budget.
             Some(tests) => Self::new(tests.saturating_sub(Self::TRIANGLE)),
-            // Tests that cost nothing.
+            // Tests cost nothing.
             None => Self::UNLIMITED,
         }
     }

@@ -14,7 +14,7 @@ pub(super) fn distance(tool: &impl Tool, point: Vec3) -> f64 {
     (offset - span * along.clamp(0.0, 1.0)).length()
 }
 
-/// The least distance of any vertex below a link.
+/// The least distance of any vertex of a subtree.
 pub(super) fn least(tree: &Tree<'_, u16>, link: Link, far: &impl Fn(u32) -> f64) -> f64 {
     match link {
         Link::Children { first, count } => (first..first + count)

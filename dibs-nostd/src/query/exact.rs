@@ -1,19 +1,19 @@
-//! The side of a point by the triangles of a tie.
+//! The side of a point from the triangles that tie for the closest.
 //!
-//! The triangles are put in order by their distances. Of those that may be the closest, each has a feature with the
-//! closest point, and the feature decides the side. The side is certain where all agree.
+//! The triangles are compared by their distances. The closest feature (face, edge or vertex) of each triangle that may
+//! be the closest decides a side. The side is certain if all of them agree.
 //!
 //! # The side at a feature
-//! Seen from the closest point, the surface is a cone, and the point is on the side of the cone's element that makes the
-//! least angle with it.
+//! Seen from the closest point, the surface is a cone; the point is on the side of the cone's element at the least
+//! angle to it.
 //! - *Face*: the triangle.
-//! - *Edge*: all its triangles make an angle of at least 90 degrees with the point. So the least angle is that of the
-//!   triangle that sees the point at the largest sine.
-//! - *Vertex*: its edges make angles of at least 90 degrees, and the angle to a plane has no minimum beyond that. So the
-//!   least angle is that of an edge, and then the rule of the edge holds.
+//! - *Edge*: all its triangles are at 90 degrees or more to the point. So the least angle is that of the triangle whose
+//!   plane has the largest sine to the point.
+//! - *Vertex*: its edges are at 90 degrees or more, and the angle to a plane has no minimum beyond that. So the least
+//!   angle is that of an edge, and the rule of the edge applies.
 //!
-//! A point on an edge that is nearly a vertex may be taken for the vertex: then the edge's angle is 90 degrees, and no
-//! other's is clearly less. One in a face is at a sine of 1 from it, and the edge has the face's side.
+//! A point on an edge next to a vertex may be classified as the vertex: then the edge's angle is 90 degrees, and no
+//! other edge's is clearly less. A point in a face has sine 1 to it, and the edge has the face's side.
 
 // Requirement: S-01
 
@@ -25,21 +25,21 @@ use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, VertexTable};
 
-/// Above or not, where that is certain.
+/// Whether the point is above, or why that is not certain.
 pub(super) type Above = Result<bool, NoSide>;
 
-/// A point whose side is asked for, and the closest triangles so far.
+/// The point, and the closest triangles so far.
 pub(super) struct Exact<'s, 't, I, V: ?Sized, P: Precision> {
     tree: &'s Tree<'t, I>,
     vertices: &'s V,
     at: &'s OnAxis,
     start: P::Vector,
     along: P::Vector,
-    /// Square of the least distance; its error.
+    /// Square of the least distance, and its error.
     least: P,
     doubt: P,
     above: Above,
-    /// The vertex asked for last, by the least row of a triangle around it, and its answer.
+    /// The last vertex, by the least row of a triangle around it, and its answer.
     vertex: Option<(u32, u32, Above)>,
     /// Node tests left, and made.
     left: u32,
@@ -54,19 +54,18 @@ struct Seen<P: Precision> {
     /// Edge `e` leads from corner `e` to the next one.
     edges: [P::Vector; 3],
     normal: P::Vector,
-    /// Square of the normal's length.
     square: P,
-    /// Height of the point above the plane, times the normal's length; its error.
+    /// Height of the point above the plane, times the normal's length; and its error.
     height: P,
     doubt: P,
-    /// It spans no plane, as far as the precision tells.
+    /// The edges span no plane at this precision.
     is_flat: bool,
-    /// The size of the terms whose sum `to` is.
+    /// The size of the terms that are added to give `to`.
     far: P,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V, P> {
-    /// For a point, with no more node tests than `left`.
+    /// For a point, with at most `left` node tests.
     pub fn new(tree: &'s Tree<'t, I>, vertices: &'s V, at: &'s OnAxis, left: u32) -> Self {
         Self {
             tree,
@@ -83,7 +82,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         }
     }
 
-    /// The same in f64, with the rest of the work.
+    /// The same in f64, with the remaining node tests.
     pub fn finer(&self) -> Exact<'s, 't, I, V, f64> {
         Exact::new(self.tree, self.vertices, self.at, self.left)
     }
@@ -112,7 +111,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         is_enough
     }
 
-    /// Adds a triangle. Returns whether it was of use to go on.
+    /// Adds a triangle. Returns `false` if the side can no longer become certain.
     #[cold]
     #[inline(never)]
     pub fn add(&mut self, row: u32) -> Result<bool, QueryError> {
@@ -154,7 +153,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         Ok(self.see(row)?.is_above())
     }
 
-    #[inline(always)] // A tick asks for the planes alone.
+    #[inline(always)] // A tick needs only the planes.
     fn see(&self, row: u32) -> Result<Seen<P>, QueryError> {
         let corrupt = QueryError::Corrupt { row };
         let [a, b, c] = self.tree.triangle(row).ok_or(corrupt)?;
@@ -196,8 +195,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         }
     }
 
-    /// Around a vertex whose triangles cut each other the angle-weighted pseudonormal (f32, as far as that is clear) may
-    /// differ from the nearest triangle. Then no side is certain.
+    /// Around a vertex whose triangles intersect each other, the angle-weighted pseudonormal (f32, where it is clear)
+    /// may disagree with the nearest triangle. Then no side is certain.
     fn unless_cut(&self, above: Above, row: u32, corner: u32, vertex: u32) -> Above {
         let Some(centre) = self.vertices.position(vertex) else { return above };
         let towards = (self.at.start - centre) + self.at.span * self.at.parameter;
@@ -211,7 +210,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         }
     }
 
-    /// The least row of the triangles around a corner.
     fn first_around(&self, row: u32, corner: u32) -> Result<u32, NoSide> {
         let (mut first, mut at, mut corner) = (row, row, corner);
         for _ in 0..MAX_RING {
@@ -235,7 +233,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         seen: &Seen<P>,
     ) -> Result<Above, QueryError> {
         let (mut row, mut seen) = (first, *seen);
-        // The cosine's square, with its sign, times the square of the distance.
+        // The square of the cosine, with its sign, times the square of the distance.
         let mut largest = P::from(f32::NEG_INFINITY);
         let mut above = Err(NoSide::Degenerate);
         for _ in 0..MAX_RING {
@@ -254,7 +252,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
                 return Ok(Err(NoSide::Degenerate));
             }
             let size = P::size(to_centre);
-            // Its coordinates are differences of no more than the size and the axis.
+            // The coordinates of the difference are no larger than `size` and the axis.
             let far = P::from(2.0) * (size + P::size(self.along));
             let doubt = P::from(8.0) * P::ROUNDING * size * far;
             if cosine > largest + doubt {
@@ -276,7 +274,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
 }
 
 impl<P: Precision> Seen<P> {
-    /// A triangle from the point `start + along`.
     #[inline(always)]
     fn new(corners: [P::Vector; 3], start: P::Vector, along: P::Vector) -> Self {
         let [a, b, c] = corners;
@@ -301,7 +298,7 @@ impl<P: Precision> Seen<P> {
         }
     }
 
-    /// The square of the distance, and the feature with the closest point. A flat triangle is its edges.
+    /// The square of the distance, and the closest feature. Of a flat triangle only the edges count.
     fn closest(&self) -> (P, Feature) {
         let (mut least, mut closest) = (P::from(f32::INFINITY), Feature::Face);
         let zero = P::from(0.0);
@@ -336,20 +333,20 @@ impl<P: Precision> Seen<P> {
         if self.is_flat { NoSide::Degenerate } else { NoSide::BelowAccuracy }
     }
 
-    /// How much rounding tilts the plane.
+    /// The tilt of the plane by rounding.
     fn tilt(&self) -> P {
         let [ab, _, ca] = self.edges;
         (P::dot(ab, ab) / self.square * P::dot(ca, ca)).root()
     }
 
-    /// Whether the point is above the plane. The error covers a flat triangle, too.
+    /// Whether the point is above the plane. The error covers flat triangles, too.
     #[inline(always)]
     fn is_above(&self) -> Option<bool> {
         let is_clear = self.height.absolute() > self.doubt;
         is_clear.then_some(self.height > P::from(0.0))
     }
 
-    /// Whether the point is at a larger sine from this plane than from another one, whatever the rounding.
+    /// Whether the point's sine to this plane is certainly larger than to `other`'s, despite rounding.
     fn has_larger_sine_than(&self, other: &Self) -> bool {
         let least = self.height.absolute() - self.doubt;
         let most = other.height.absolute() + other.doubt;
@@ -358,7 +355,7 @@ impl<P: Precision> Seen<P> {
         are_clear && least > P::SINES * most
     }
 
-    /// Whether the point is above the edge of this triangle and another one.
+    /// Whether the point is above the edge between this triangle and `other`.
     fn above_edge(&self, other: &Self) -> Above {
         let (one, two) = (self.is_above(), other.is_above());
         if let Some(above) = one

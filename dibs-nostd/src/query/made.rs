@@ -1,8 +1,7 @@
-//! Tests that were made.
+//! Counts of tests made.
 
 use super::{Budget, Proximity};
 
-/// Numbers of tests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Tests {
     pub node_tests: u32,
@@ -12,12 +11,12 @@ pub(super) struct Tests {
 impl Tests {
     pub const NONE: Self = Self { node_tests: 0, triangle_tests: 0 };
 
-    /// The node tests that take as long.
+    /// The node tests that take as long as these tests.
     pub const fn work(self) -> u32 {
         self.node_tests.saturating_add(self.triangle_tests.saturating_mul(Budget::TRIANGLE))
     }
 
-    /// These and other ones.
+    /// The sum of both counts.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self {
@@ -28,20 +27,19 @@ impl Tests {
 }
 
 impl Proximity {
-    /// The tests that the answer took.
+    /// The answer's test counts.
     pub(super) const fn tests(&self) -> Tests {
         Tests { node_tests: self.node_tests, triangle_tests: self.triangle_tests }
     }
 
-    /// The node tests that take as long as its tests did, which a [`Budget`] bounds: a triangle test counts as
-    /// [`Budget::TRIANGLE`]. The first root's test is one of them; it comes on top of the budget, as does
-    /// the triangle of a warm start.
+    /// The answer's work in node tests, which a [`Budget`] bounds: a triangle test counts as [`Budget::TRIANGLE`]. It
+    /// includes the first root's test and the triangle of a warm start, which the budget does not count.
     #[must_use]
     pub const fn work(&self) -> u32 {
         self.tests().work()
     }
 
-    /// Counts tests that it took besides.
+    /// Adds tests made outside of the search.
     pub(super) const fn add_tests(&mut self, made: Tests) {
         let Tests { node_tests, triangle_tests } = self.tests().and(made);
         (self.node_tests, self.triangle_tests) = (node_tests, triangle_tests);

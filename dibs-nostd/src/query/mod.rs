@@ -1,4 +1,4 @@
-//! The traversal: the closest pair between a tool and the surface as it is now.
+//! The traversal: the closest pair between a tool and the current surface.
 
 mod chain;
 mod contacts;
@@ -44,13 +44,12 @@ use separation::signed;
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
 ///
-/// `STACK` must be at least [`Tree::stack`], checked once, here; the builder prints it. Make it once,
-/// in a `static` or at start-up, and use it at every tick.
+/// `STACK` must be at least [`Tree::stack`], which [`new`](Self::new) checks and the builder prints. Create it once, in
+/// a `static` or at start-up, and use it at every tick.
 #[derive(Clone, Debug)]
 pub struct Query<'t, I, const STACK: usize> {
     tree: Tree<'t, I>,
     stack: [Waiting; STACK],
-    /// The last answer's triangle.
     triangle: Option<TriangleRow>,
     ties: Ties,
 }
@@ -76,23 +75,24 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
 
     /// The closest pair between `tool` and the surface whose vertices are `vertices`.
     ///
-    /// Signed, if the tree has adjacency: [`Proximity::side`] says on which side of the surface the tool is.
+    /// Signed if the tree has adjacency: [`Proximity::side`] is the tool's side of the surface.
     ///
-    /// Exact within [`Proximity::accuracy`], which includes the surface's position error, as long as the surface keeps
-    /// to the stretch limit (or to the stretch that it carries, or that `options` give). Starts from the last answer's
-    /// triangle, unless `options` say otherwise. Pins are vertices of the surface, so their distances are upper bounds
-    /// from the first node on.
+    /// Exact within [`Proximity::accuracy`], which includes the surface's position error, while the surface stays
+    /// within the stretch limit (or the stretch that it carries, or that of `options`). The search starts from the last
+    /// answer's triangle, unless `options` say otherwise. A sphere's pin is a vertex of the surface, so its distance is
+    /// an upper bound from the first node on.
     ///
-    /// Where a capsule's axis crosses the surface or is inside, up to 27 more searches find the depth, with no more node tests than the
-    /// tree has nodes, or 3,072 if that is more. Where they do not suffice, the interval is wider than the tolerance.
-    /// Of a tree with several solids, each whose sphere the axis reaches takes a search of its own. Where f32 cannot tell the
-    /// side, f64 does, counted as the node tests that take as long; too many triangles that tie take two more searches.
+    /// Where a capsule's axis crosses the surface or is inside, up to 27 more searches find the depth, with no more
+    /// node tests than the tree has nodes, or 3,072 if that is more. If these do not suffice, the interval is wider
+    /// than the tolerance. In a tree with several solids, each solid whose sphere the axis reaches takes its own
+    /// search. Where f32 cannot decide the side, f64 does, counted as node tests of equal time; if too many triangles
+    /// tie, two more searches follow.
     ///
     /// Cost: the budget at most; typical counts are in the repository's `docs/evidence/benchmarks.md`.
     ///
     /// # Errors
-    /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a measurement of another mesh, or
-    /// bytes that changed under the query. A budget that ran out is no error.
+    /// [`QueryError`]: a table of the wrong size, a root pin that is not finite, a stretch measured on another mesh, or
+    /// bytes that changed during the query. Running out of budget is no error.
     pub fn closest<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         vertices: &V,
@@ -104,15 +104,15 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         self.sided(vertices, tool, options, found)
     }
 
-    /// As [`closest`](Self::closest), in batches of up to seven subtrees: for processors that overlap instructions
-    /// and have vector registers.
+    /// As [`closest`](Self::closest), in batches of up to seven subtrees: for processors with out-of-order execution
+    /// and vector registers.
     ///
-    /// It has the same promises, errors and answers (of several triangles equally close it may name another) and mostly
-    /// needs fewer tests. It takes 2 KiB of the call stack, and pays only if `STACK` is 128 more than [`Tree::stack`];
-    /// with less, batches are smaller. A microcontroller is better off with `closest`.
+    /// It has the same promises, errors and answers (of several triangles at equal distance it may name another) and
+    /// usually needs fewer tests. It takes 2 KiB of the call stack, and pays only if `STACK` is [`Tree::stack`] plus
+    /// 128; with less, batches are smaller. On a microcontroller `closest` is faster.
     ///
     /// # Errors
-    /// Those of [`closest`](Self::closest).
+    /// Same as [`closest`](Self::closest).
     #[cfg(feature = "wide")]
     pub fn closest_wide<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
@@ -127,7 +127,6 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
 }
 
 impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
-    /// The search of the closest pair.
     #[inline(always)]
     fn search<'s, V: VertexTable + ?Sized, T: Tool>(
         &'s mut self,
@@ -140,7 +139,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         Search::start(roots, &self.tree, &mut self.stack, vertices, tool, options, first, ties)
     }
 
-    /// The answer with the side, for a search's closest pair.
+    /// Adds the side to a search's closest pair.
     #[inline(always)]
     fn sided<V: VertexTable + ?Sized, T: Tool>(
         &mut self,

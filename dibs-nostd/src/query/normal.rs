@@ -1,4 +1,4 @@
-//! Normals of the surface as it is now, at a face, an edge or a vertex.
+//! Normals of the current surface, at a face, an edge or a vertex.
 //!
 //! The sign of `(p - c) . n` is the side of a point `p` whose closest point is `c`, if `n` is the angle-weighted
 //! pseudonormal there (Bærentzen & Aanæs, "Signed distance computation using the angle weighted pseudonormal", IEEE
@@ -23,13 +23,13 @@ const FLAT: f32 = 1.0 / 1_048_576.0;
 /// The same in f64.
 const FLAT_DOUBLE: f64 = 1e-18;
 
-/// Squares of lengths below this lose their digits.
+/// Squares of lengths below this lose precision.
 const TINY: f32 = 1e-30;
 
 /// Rounding of a pseudonormal, relative to the sum of its weights.
 pub(super) const NORMAL: f32 = 1e-5;
 
-/// The feature of a triangle that a point is on. Edge `e` leads from corner `e` to the next one.
+/// The feature of a triangle that contains a point. Edge `e` leads from corner `e` to the next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Feature {
     Face,
@@ -57,8 +57,7 @@ pub(super) enum NoNormal {
 }
 
 impl Feature {
-    /// The feature within `tolerance` of a point of a triangle: a corner rather than an edge, an edge rather than
-    /// the face.
+    /// The feature within `tolerance` of a point of a triangle: a corner is preferred to an edge, an edge to the face.
     pub fn of(corners: &[Vec3; 3], point: Vec3, tolerance: f32) -> Self {
         let [a, b, c] = *corners;
         let near = tolerance * tolerance;
@@ -81,7 +80,7 @@ impl Feature {
         feature
     }
 
-    /// Visits the triangles that meet in a feature of a triangle, but for this one, as far as [`MAX_RING`] or a border.
+    /// Visits the other triangles that meet in a feature of a triangle, up to [`MAX_RING`] or an open boundary.
     pub fn each_other<I: Index>(
         self,
         tree: &Tree<'_, I>,
@@ -154,12 +153,11 @@ pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
     Ok([position(a)?, position(b)?, position(c)?])
 }
 
-/// The corner after one.
 pub(super) const fn after(corner: u32) -> u32 {
     if corner == 2 { 0 } else { corner + 1 }
 }
 
-/// The corners in their order, from one of them on.
+/// The corners rotated so that `first` comes first.
 pub(super) fn turned<T>([a, b, c]: [T; 3], first: u32) -> [T; 3] {
     match first {
         0 => [a, b, c],
@@ -190,7 +188,7 @@ fn flat_normal(corners: &[Vec3; 3]) -> Result<(Vec3, f32), NoNormal> {
     let (ab, ac) = (b - a, c - a);
     let across = ab.cross(ac);
     let size = f64::size(across);
-    // Written so that NaN has no normal.
+    // Written so that NaN gives no normal.
     let is_clear = f64::dot(across, across) > FLAT_DOUBLE * f64::dot(ab, ab) * f64::dot(ac, ac);
     let scaled = (across / size).as_vec3();
     let length = sqrt(scaled.length_squared());
@@ -202,7 +200,7 @@ fn flat_normal(corners: &[Vec3; 3]) -> Result<(Vec3, f32), NoNormal> {
     }
 }
 
-/// The angle, 0 to pi, of a sine above 0 and a cosine, both times the same length. Within 1e-6.
+/// The angle, 0 to pi, from a sine above 0 and a cosine, both scaled by the same length. Within 1e-6.
 fn angle(sine: f32, cosine: f32) -> f32 {
     let flank = cosine.abs();
     let acute =

@@ -3,16 +3,16 @@
 use super::made::Tests;
 use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 
-/// The most work of one query, in node tests. It bounds the query's time; an answer that was cut short is still valid, with a
-/// wider interval.
+/// The work limit of one query, in node tests. It bounds the query's time; an answer that was cut short is still valid,
+/// with a wider interval.
 ///
-/// A node test is one of a sphere, or of a leaf's or triangle's plane. An exact triangle test counts as
-/// [`TRIANGLE`](Self::TRIANGLE) of them. The roots' spheres are always tested and not counted, and the triangle of a warm
-/// start comes on top. The depth of an axis that
-/// crosses or is inside counts its work besides the searches as the node tests that take as long.
+/// A node test is that of a sphere, or of the plane of a leaf or triangle. An exact triangle test counts as
+/// [`TRIANGLE`](Self::TRIANGLE) node tests. The tests of the roots' spheres and of a warm start's triangle are not
+/// counted. The depth of an axis that crosses or is inside counts its work outside of searches as node tests of equal
+/// time.
 ///
 /// Every answer's interval holds the true separation. For the same query a larger budget never lowers the lower end,
-/// and raises the upper end by no more than the accuracy. From tick to tick that holds for the upper end alone, if the
+/// and raises the upper end by no more than the accuracy. From tick to tick only the upper end keeps this rule, if the
 /// answer's triangle is the next warm start and nothing has moved: the warm start uses up a test, so the lower end of
 /// an answer that is cut short again may fall, by centimetres. Take the larger of two lower ends only for the same
 /// frame and pose.
@@ -27,34 +27,33 @@ impl Budget {
     /// No limit.
     pub const UNLIMITED: Self = Self { tests: u32::MAX };
 
-    /// The node tests that an exact triangle test counts as.
+    /// An exact triangle test counts as this many node tests.
     pub const TRIANGLE: u32 = 8;
 
-    /// As much work as this many node tests.
+    /// A budget of this many node tests.
     #[must_use]
     pub const fn new(tests: u32) -> Self {
         Self { tests }
     }
 
-    /// The node tests that it is worth.
+    /// The number of node tests.
     #[must_use]
     pub const fn tests(self) -> u32 {
         self.tests
     }
 
-    /// The same, but no more than `most`.
     pub(super) const fn at_most(self, most: u32) -> Self {
         if self.tests < most { self } else { Self { tests: most } }
     }
 
-    /// What is left of it after work that takes as long as this many node tests.
+    /// The budget left after this many node tests.
     pub(super) const fn less(self, tests: u32) -> Self {
         Self { tests: self.tests.saturating_sub(tests) }
     }
 }
 
-/// Prior knowledge for a query, and its budget. Prior knowledge changes an answer's cost, not the answer, except
-/// that a budget may widen the interval.
+/// Prior knowledge for a query, and its budget. Prior knowledge changes the cost, not the answer; a budget may widen
+/// the interval.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Options {
@@ -68,14 +67,14 @@ pub struct Options {
     pub(super) part: Option<u8>,
 }
 
-/// The triangle that a query tests first.
+/// The triangle that a query tests first (warm start).
 #[derive(Clone, Copy, Debug)]
 enum First {
-    /// The last answer's.
+    /// The last answer's triangle.
     Last,
     /// None.
     Cold,
-    /// This one.
+    /// A given triangle.
     Triangle(TriangleRow),
 }
 
@@ -86,7 +85,8 @@ impl Default for Options {
 }
 
 impl Options {
-    /// No budget; a start from the query's last answer; the stretch that the surface carries, or else the tree's limit.
+    /// No budget; a warm start from the query's last answer; the stretch that the surface carries, or else the tree's
+    /// limit.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -112,12 +112,12 @@ impl Options {
         self
     }
 
-    /// The same options with what is left of the budget after these tests.
+    /// The same options with the budget left after these tests.
     pub(super) const fn after(self, made: Tests) -> Self {
         self.budget(self.budget.less(made.work()))
     }
 
-    /// Starts from this triangle instead of the last answer's. A wrong or stale one costs one triangle test; `None`
+    /// Starts from this triangle instead of the last answer's. A wrong or outdated one costs one triangle test; `None`
     /// starts cold.
     #[must_use]
     pub const fn warm_start(mut self, triangle: Option<TriangleRow>) -> Self {
@@ -137,47 +137,48 @@ impl Options {
         }
     }
 
-    /// How the stretch of a search with these options is known.
+    /// The source of the stretch in a search with these options.
     pub(super) fn coverage<V: VertexTable + ?Sized>(&self, vertices: &V) -> Coverage {
         let measured = self.stretch.or_else(|| vertices.stretch());
         measured.map_or(Coverage::Assumed, |measured| measured.coverage())
     }
 
-    /// Leaves the side out: the separation is that of a tool outside, and costs no more than the distance.
+    /// Leaves the side out: the separation is computed as if the tool were outside, at the cost of the distance alone.
     #[must_use]
     pub const fn unsigned(mut self) -> Self {
         self.is_signed = false;
         self
     }
 
-    /// Asks for the side, whatever was said before.
+    /// Asks for the side, even after [`unsigned`](Self::unsigned).
     #[cfg(feature = "control")]
     pub(crate) const fn signed(mut self) -> Self {
         self.is_signed = true;
         self
     }
 
-    /// Largest width (mm) of the certified interval where the tool's axis crosses the surface or is inside; by default a 512th of
-    /// the axis' length, at least 32 times the accuracy. Less takes more tests. With more than the axis' length the side
-    /// is found and no depth, at the cost of the closest pair.
+    /// Largest width (mm) of the certified interval where the tool's axis crosses the surface or is inside; by default
+    /// a 512th of the axis' length, at least 32 times the accuracy. A smaller width takes more tests. A width above the
+    /// axis' length gives the side without a depth, at the cost of the closest pair.
     #[must_use]
     pub const fn depth_tolerance(mut self, tolerance: f32) -> Self {
         self.depth_tolerance = Some(tolerance);
         self
     }
 
-    /// Lists only contacts of the triangles with this [label](crate::Tree::label), as if the others were not there: the
-    /// locally closest pairs of their part of the surface. So a label's margin holds beside a part that is nearer. The
-    /// closest pair and the side are those of the whole surface. Where the tool is inside or crossing, its deepest pair is
-    /// in the list of its own triangle's label.
+    /// Lists only contacts of the triangles with this [label](crate::Tree::label), as if there were no others: the
+    /// locally closest pairs of that part of the surface. So a label's margin holds next to a nearer part. The closest
+    /// pair and the side are those of the whole surface. Where the tool is inside or crossing, its deepest pair is
+    /// listed under its own triangle's label.
     #[must_use]
     pub const fn contacts_of(mut self, label: u8) -> Self {
         self.part = Some(label);
         self
     }
 
-    /// Uses this stretch, measured on the frame that is searched, instead of the surface's own
-    /// ([`VertexTable::stretch`](crate::VertexTable::stretch)): smaller spheres than the tree's limit has, fewer tests.
+    /// Uses this stretch, measured on the searched frame, instead of the surface's own
+    /// ([`VertexTable::stretch`](crate::VertexTable::stretch)). It gives smaller spheres than the tree's limit, so
+    /// fewer tests.
     #[must_use]
     pub const fn stretch(mut self, measured: MeasuredStretch) -> Self {
         self.stretch = Some(measured);

@@ -1,18 +1,18 @@
-//! The tools of a scene that were passed over because others are closer, and the proof that they are outside.
+//! The tools of a scene that were skipped because others are closer, and the proof that they are outside.
 //!
-//! No surface is within a tool's clearance, so every point that near to the axis of a tool outside is outside, too. An axis
-//! that has such a point and touches nothing is outside of a closed surface.
+//! No surface is within a tool's clearance, so every point within the clearance of the axis of a tool outside is
+//! outside, too. An axis with such a point that touches no surface is outside of a closed surface.
 
 use crate::Tool;
 
-/// Tools that may be passed over: one for each bit of a set.
+/// Most tools that may be skipped: one for each bit of a set.
 pub(super) const MOST: usize = 64;
 
 /// The tools on one surface.
 pub(super) struct Passed {
-    /// The distance from each tool's axis within which there is no surface; 0 if not known.
+    /// The distance from each tool's axis within which there is no surface; 0 if unknown.
     clear: [f32; MOST],
-    /// Tools that are passed over, and tools that are certain to be outside.
+    /// Tools that were skipped, and tools that are certainly outside.
     passed: u64,
     outside: u64,
 }
@@ -22,7 +22,7 @@ impl Passed {
         Self { clear: [0.0; MOST], passed: 0, outside: 0 }
     }
 
-    /// The tool is outside, or passed over, with no surface within `clear` (mm) of its axis.
+    /// Adds a tool that is outside or was skipped, with no surface within `clear` (mm) of its axis.
     pub fn add(&mut self, number: usize, clear: f32, is_outside: bool) {
         if let Some(place) = self.clear.get_mut(number) {
             *place = clear;
@@ -30,9 +30,9 @@ impl Passed {
         }
     }
 
-    /// The tools passed over that may be inside.
+    /// The skipped tools that may be inside.
     pub fn unsure<T: Tool>(&mut self, tools: &[T]) -> impl Iterator<Item = usize> + use<T> {
-        // Each round finds one more outside at least, or is the last.
+        // Each round but the last finds at least one more tool outside.
         for _ in 0..MOST {
             let before = self.outside;
             for (number, tool) in tools.iter().enumerate().take(MOST) {
@@ -48,7 +48,7 @@ impl Passed {
         (0..MOST).filter(move |number| unsure & (1 << number) != 0)
     }
 
-    /// An end of a tool's axis is within the clearance of a tool outside.
+    /// Whether an end of a tool's axis is within the clearance of a tool outside.
     fn joins<T: Tool>(&self, tool: &T, tools: &[T]) -> bool {
         let ends = [tool.axis_start(), tool.axis_point(1.0)];
         tools.iter().zip(self.clear).enumerate().any(|(number, (other, clear))| {

@@ -6,16 +6,17 @@ use crate::{Index, Tree, VertexTable};
 
 /// A plane: points beyond it are farther from the tool's axis than the cutoff.
 ///
-/// For any vector `n` from the axis' nearest point `q` to some point, the axis lies where `n . (x - q) <= 0`: it is
+/// For any vector `n` at the axis' point `q` nearest to some point, the axis lies where `n . (x - q) <= 0`, since it is
 /// convex. So all points of a patch with `n . (x - q) > cutoff |n|` at its vertices are farther than the cutoff. The
-/// plane is tighter than any sphere around the patch: a sphere's lower bound is that of its farthest tangent plane.
+/// plane is tighter than any sphere around the patch: the lower bound of a sphere is that of its farthest tangent
+/// plane.
 pub(super) struct Plane {
     pub normal: Vec3,
     pub limit: f32,
 }
 
 impl Plane {
-    /// Written so that a NaN is not beyond.
+    /// Written so that NaN is not beyond.
     #[inline(always)]
     pub fn has_beyond(&self, point: Vec3) -> bool {
         self.normal.dot(point) > self.limit
@@ -23,8 +24,8 @@ impl Plane {
 
     /// The number of a leaf's leading triangles that are beyond the plane; `None` if the leaf's bytes are bad.
     ///
-    /// After the first triangle only a triangle's third corner may be new to the leaf: the builder orders them so, and
-    /// the checker checks it. (A separate function, so that the plane stays in registers.)
+    /// After the first triangle only a triangle's third corner may be new to the leaf: the builder sorts them so, and
+    /// validation checks it. (A separate function, so that the plane stays in registers.)
     #[inline(never)]
     pub fn beyond<I: Index, V: VertexTable + ?Sized>(
         &self,
@@ -49,7 +50,7 @@ impl Plane {
         Some(count)
     }
 
-    /// The least distance of a leaf's vertices beyond the plane, in units of the normal's length; not above zero if a
+    /// The least distance of a leaf's vertices beyond the plane, in units of the normal's length; zero or less if a
     /// vertex is not beyond. `None` if the leaf's bytes are bad.
     #[inline(never)]
     pub fn excess<I: Index, V: VertexTable + ?Sized>(
@@ -73,7 +74,7 @@ impl Plane {
     }
 }
 
-/// The least of three; not a number if one is not.
+/// The least of three; NaN if any is NaN.
 #[inline(always)]
 pub(super) fn least([a, b, c]: [f32; 3]) -> f32 {
     let lower = if a > b { b } else { a };

@@ -1,4 +1,4 @@
-//! The numbers that a side is decided in: f32 first, and f64 where its rounding hides the side.
+//! The number types in which a side is decided: f32 first, then f64 if rounding hides the side in f32.
 
 // Requirement: A-01
 
@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use crate::math::sqrt::sqrt;
 
-/// A number, its vectors and its rounding.
+/// A number type with its vectors and its rounding.
 pub(super) trait Precision:
     Copy
     + PartialOrd
@@ -30,15 +30,15 @@ pub(super) trait Precision:
     const FLAT: Self;
     /// More than the rounding of the square of a sine, if no triangle is flat.
     const SINES: Self;
-    /// Squares of areas below this lose their digits.
+    /// Squares of areas below this lose precision.
     const TINY: Self;
-    /// The product of four lengths below this is a number.
+    /// Products of four lengths below this do not overflow.
     const MOST: Self;
-    /// Where a flat triangle hides the side, rather than being its edges.
+    /// Whether a flat triangle makes the side unknown, instead of counting as its edges.
     const IS_ROUGH: bool;
-    /// Node tests that take as long as the distance to a triangle.
+    /// Node tests that take as long as the distance to one triangle.
     const DISTANCE_COST: u32;
-    /// The same for a triangle around a vertex.
+    /// The same for one triangle around a vertex.
     const RING_COST: u32;
 
     fn vector(vector: Vec3) -> Self::Vector;
@@ -52,7 +52,7 @@ pub(super) trait Precision:
     fn root(self) -> Self;
 }
 
-/// The operations that have the same names for both.
+/// The operations that both types name alike.
 macro_rules! operations {
     () => {
         fn cross(one: Self::Vector, other: Self::Vector) -> Self::Vector {

@@ -35,31 +35,29 @@ use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Index, MeasuredStretch, Proximity, Tree, TriangleRow, VertexTable};
 
-/// A search with its limit at infinity.
+/// A search without a distance limit.
 pub(super) const WHOLE: u8 = 0;
-/// A search that began with the cutoff at its limit, which bounds the subtrees that it never visited.
+/// A search whose cutoff starts at its limit, which bounds the subtrees that it never visits.
 pub(super) const WITHIN: u8 = 1;
-/// A search that ends once a point of the surface is found within its limit.
+/// A search that ends once it finds a point of the surface within its limit.
 pub(super) const UNTIL: u8 = 2;
 
 /// The outcome of a visit to a subtree.
 enum Step {
-    /// Finished; any children that remain wait on the stack.
+    /// Finished; any remaining children are on the stack.
     Done,
     /// Unfinished: the budget ran out.
     OutOfBudget,
 }
 
-/// The nearest pin so far: a point of the surface, and so an upper bound from the first node on.
+/// The nearest pin so far: a pin is a point of the surface, so it gives an upper bound from the first node on.
 #[derive(Clone, Copy)]
 struct NearestPin {
-    /// Its row in the vertex table.
     row: u32,
     /// Its distance from the tool's axis.
     distance: f32,
 }
 
-/// The state of one search.
 pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     tree: &'s Tree<'t, I>,
     vertices: &'s V,
@@ -67,11 +65,11 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     stack: &'s mut [Waiting],
     waiting: usize,
     meter: Meter,
-    /// Turns a radius code into the sphere's radius under the stretch in use.
+    /// Converts a radius code into the sphere's radius under the current stretch.
     radius_scale: f32,
     scale: f32,
     slack: f32,
-    /// Added to the cutoff where a plane is compared.
+    /// Added to the cutoff for comparison with a plane.
     coordinate_slack: f32,
     tilt_slack: f32,
     /// Upper bound plus rounding slack: the distance of the nearest surface point known, beyond which nothing
@@ -82,15 +80,15 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     best: Option<AxisPair>,
     best_squared: f32,
     best_triangle: u32,
-    /// A triangle no farther from the axis is collected. Not a number if nobody asks.
+    /// Triangles up to this squared distance from the axis are collected as ties. NaN if ties are not needed.
     tie_squared: f32,
     /// The triangles that may be the closest, once the search has ended.
     ties: Option<&'s mut Ties>,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T> {
-    /// A search below some roots that tests the triangle `first`, which must be below one of them, before anything else.
-    /// If the side is asked for, `ties` will have the triangles that may be the closest, once the search has ended.
+    /// A search below some roots, which first tests the triangle `first`; this must be below one of the roots. If the
+    /// side is asked for, `ties` receives the triangles that may be the closest.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     pub fn start(
@@ -147,9 +145,9 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         if !(coordinates < 1e18) {
             return Err(QueryError::Position { vertex: root.pin });
         }
-        // The closest pair in a sound tree takes one test of each node's sphere, two of each leaf's plane and one of each
-        // triangle, its plane and exact, besides the warm one. If corrupt bytes form a loop, this bound ends the search. Other
-        // kinds have bounds of their own.
+        // The closest pair in a sound tree takes at most one test of each node's sphere, two of each leaf's plane and
+        // two of each triangle (plane and exact), besides the warm start's. If corrupt bytes form a loop, this bound
+        // ends the search. Other kinds of search have their own bounds.
         let triangles = header.triangles.saturating_add(1).saturating_mul(1 + Budget::TRIANGLE);
         let most = header.nodes.saturating_mul(3).saturating_add(triangles);
         ties = ties.filter(|_| options.is_signed && tree.has_adjacency());
@@ -190,7 +188,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         Ok(search)
     }
 
-    /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
+    /// Visits subtrees, nearest first, until none is below the cutoff or the budget runs out.
     ///
     /// Each kind is a function with one caller, into which it is inlined: this keeps the plain query's loop in
     /// registers.
@@ -226,7 +224,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     }
 
     /// Lowers the cutoff to `separation` (mm) from the tool. Returns the limit on the distance from its axis, with
-    /// rounding to spare, so that an axis that touches the surface is always within.
+    /// rounding slack, so that an axis that touches the surface is always within it.
     pub fn limit_to(&mut self, separation: f32) -> f32 {
         let distance = separation + self.tool.radius();
         let rounding = self.slack + self.tree.position_error();
@@ -235,7 +233,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         limit
     }
 
-    /// No triangle was found within `limit` of the axis. A limit that is not a number limits nothing.
+    /// No triangle was found within `limit` of the axis. NaN sets no limit.
     fn is_beyond(&self, limit: f32) -> bool {
         self.best.is_none_or(|pair| pair.distance_squared > limit * limit)
     }
@@ -258,7 +256,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
         }
     }
 
-    /// Where it was not searched, the surface may be as close as the closest triangle.
+    /// In unsearched parts the surface may be as close as the closest triangle found.
     fn leave_unfinished(&mut self) {
         if let Some(ties) = &mut self.ties {
             ties.lose();

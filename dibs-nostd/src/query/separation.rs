@@ -1,7 +1,8 @@
 //! The signed separation: the least signed distance of any point of the tool's axis, less the radius.
 //!
-//! The signed distance of a point is negative inside. It changes by at most the motion of point and surface, and so does
-//! the least of an axis. Where the axis is outside, the closest pair has it; where it crosses or is inside, the deepest point.
+//! The signed distance of a point is negative inside. It changes by at most the motion of point and surface, and so
+//! does its minimum over an axis. That minimum is at the closest pair if the axis is outside, and at the deepest point
+//! if it crosses or is inside.
 
 // Requirements: A-03, S-02
 
@@ -16,7 +17,6 @@ use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
-/// A query's arguments.
 pub(super) struct Asked<'a, 't, I, V: ?Sized, T> {
     pub tree: &'a Tree<'t, I>,
     pub vertices: &'a V,
@@ -24,8 +24,8 @@ pub(super) struct Asked<'a, 't, I, V: ?Sized, T> {
     pub options: &'a Options,
 }
 
-/// Adds the side, and the signed separation that follows from it, for positions that are exact. `ties` are the triangles that may be
-/// the closest, `known` a tracker's memory of the last tick's depth.
+/// Adds the side and the signed separation that follows from it, for exact positions. `ties` are the triangles that may
+/// be the closest, `known` is a tracker's memory of the last tick's depth.
 #[inline(never)]
 pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
@@ -51,7 +51,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
-    /// Makes `found`, the closest pair of the shells of some roots, their signed answer.
+    /// Replaces `found`, the closest pair below some roots, by their signed answer.
     #[inline(always)]
     pub fn signed(
         &self,
@@ -62,12 +62,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
     ) -> Result<(), QueryError> {
         let &Self { tree, vertices, tool, options } = self;
         let has_length = tool.axis_length() > 0.0;
-        // No triangle is closer than one that is touched, so its side is certain without the rest of the budget.
+        // No triangle is closer than one that the axis touches, so its side is certain without the remaining budget.
         let is_touching = found.triangle.is_some() && found.axis_distance <= found.accuracy;
         let is_open = found.is_cut_short() && !is_touching;
         if is_open {
             found.side = Side::Undefined(NoSide::CutShort);
-            // Where nothing says that the axis may be inside, its depth is nobody's concern.
+            // If nothing suggests that the axis is inside, its depth is not needed.
             if !(has_length && known.as_ref().is_some_and(KnownDepthMut::may_be_inside)) {
                 return Ok(());
             }
@@ -90,7 +90,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
                 found.direction = at.outward;
                 found.point_on_tool = on_axis - at.outward * tool.radius();
             }
-            // Too close for a side of its own, but too far to cross: its axis is on the side of any of its points.
+            // Too close for a side of its own, but too far to cross: the axis is on the side of any of its points.
             let is_near = at.side == Side::Undefined(NoSide::BelowAccuracy)
                 && tree.is_closed()
                 && found.axis_distance <= 2.0 * found.accuracy;

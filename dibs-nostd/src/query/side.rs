@@ -16,44 +16,43 @@ use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 
-/// On which side of the surface a tool's axis is. The outer side is where the triangles' corners are seen counter-
-/// clockwise.
+/// The side of the surface on which a tool's axis is. From outside, a triangle's corners are counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Side {
-    /// The axis is outside, of all solids.
+    /// The axis is outside of all solids.
     Outside,
     /// The whole axis is inside, of the solid with the least separation.
     Inside,
     /// The axis crosses the surface of that solid.
     Crossing,
-    /// Not known. Separations are then those of a tool outside.
+    /// Not known. Separations are computed as for a tool outside.
     Undefined(NoSide),
 }
 
-/// Why a tool is on no side of the surface.
+/// Why a tool's side is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum NoSide {
-    /// [`Options::unsigned`](crate::Options::unsigned): the query left it out.
+    /// The query left the side out: [`Options::unsigned`](crate::Options::unsigned).
     NotAsked,
-    /// The tree has no adjacency: it was built without, or from a surface that has no sides.
+    /// The tree has no adjacency: it was built without it, or from a surface without sides.
     NoAdjacency,
     /// The closest point is on an open boundary of the surface.
     OpenBoundary,
-    /// The axis is closer to the surface, or to a tie between its features, than the accuracy tells apart.
+    /// The axis is closer to the surface, or to a tie between its features, than the accuracy resolves.
     BelowAccuracy,
-    /// The closest point is on an edge of more than two triangles that are not pairs around a solid; the tree was cut
-    /// there.
+    /// The closest point is on an edge of more than two triangles that are not pairs around a solid; the builder cut
+    /// the mesh there.
     NonManifold,
     /// A triangle at the closest point has no area, or more than 256 meet there.
     Degenerate,
-    /// The budget ran out before the closest point was certain, or no point is as close as asked for
-    /// ([`Query::closest_within`](crate::Query::closest_within)).
+    /// The budget ran out before the closest point was certain, or no point is within the separation of
+    /// [`Query::closest_within`](crate::Query::closest_within).
     CutShort,
 }
 
@@ -79,22 +78,22 @@ impl fmt::Display for NoSide {
 /// Rounding of a coordinate and of a few operations on it, relative to its size.
 pub(super) const COORDINATES: f32 = 4.0 / 16_777_216.0;
 
-/// A corner's weight above which a point of a triangle is not on the edge across from it.
+/// If a corner's weight is above this, the point is not on the opposite edge.
 const AWAY: f32 = 1e-3;
 
-/// Within this many accuracies the difference of two points gives a poor direction, so the pseudonormal is used.
+/// Within this many accuracies the difference of two points is a poor direction, so the pseudonormal is used.
 const NEAR: f32 = 8.0;
 
-/// A point's side, and the unit vector that leads out; zero where no normal is known.
+/// A point's side, and the unit vector that leads out; zero if no normal is known.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PointSide {
     pub side: Side,
     pub outward: Vec3,
-    /// Node tests that take as long as its work in f64.
+    /// The f64 work, in node tests of equal time.
     pub work: u32,
 }
 
-/// A point of an axis. Its parts are kept apart, so that far from the origin their sum is not rounded.
+/// A point of an axis. Start and offset are kept apart, so that far from the origin their sum is not rounded.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OnAxis {
     pub start: Vec3,
@@ -110,13 +109,13 @@ impl OnAxis {
     }
 }
 
-/// The side of an axis' point whose closest point of the surface is known, with no more node tests than `left`.
+/// The side of an axis' point whose closest surface point is known, with at most `left` node tests.
 ///
 /// # Why no side is wrong
-/// `ties` holds every triangle that may be the closest, so all triangles that meet in the true closest point are among
-/// them. A point above the planes of all of these is above any pseudonormal there, and outside; below all of them, inside.
-/// So if the point is above all of `ties`, or below all, whichever is the closest does not matter. Elsewhere
-/// [`Exact`] puts them in order. If there are too many, `many` is the answer of [`of_many`].
+/// `ties` holds every triangle that may be the closest, so it holds all triangles that meet in the true closest point.
+/// A point above the planes of all of these is above any pseudonormal there, and outside; a point below all of them is
+/// inside. So if the point is above all of `ties`, or below all, it does not matter which is the closest. Otherwise
+/// [`Exact`] compares their distances. If there are too many, `many` is the answer of [`of_many`].
 #[inline(never)] // So that a tick's code fits the tightly coupled memory of small controllers.
 pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
@@ -174,8 +173,8 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     Ok(PointSide { side: if is_above { Side::Outside } else { Side::Inside }, outward, work })
 }
 
-/// Whether the point is above the closest of the triangles that decide, by f32 where it can tell, else by f64; and the node
-/// tests that this takes as long as.
+/// Whether the point is above the closest of the deciding triangles, in f32 if that suffices, else in f64; and the cost
+/// in node tests.
 #[cold]
 #[inline(never)]
 fn decided<I: Index, V: VertexTable + ?Sized>(
@@ -195,7 +194,7 @@ fn decided<I: Index, V: VertexTable + ?Sized>(
     Ok((above, rough.work.saturating_add(fine.work)))
 }
 
-/// The side of a point with too many ties to remember: searches them again, from the closest pair on.
+/// The side of a point with more ties than fit in memory: searches for them again, starting at the closest pair.
 #[cold]
 #[inline(never)]
 pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
@@ -236,8 +235,8 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
     Ok(if is_complete { exact.answer() } else { Err(NoSide::CutShort) })
 }
 
-/// Whether a point is above all triangles of a tie, or below all, as far as f32 can tell. A triangle at an open boundary
-/// counts only if the closest point is not there.
+/// Whether a point is above all tied triangles, or below all, as far as f32 can tell. A triangle at an open boundary
+/// counts only if the closest point is not on the boundary.
 fn clearly_above<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     pair: &Proximity,
@@ -264,7 +263,7 @@ fn clearly_above<I: Index, V: VertexTable + ?Sized>(
     Ok(side.flatten())
 }
 
-/// Whether triangles of a tie meet in an edge that has no neighbours.
+/// Whether tied triangles meet in an edge without a neighbour.
 #[cold]
 fn is_crowded<I: Index>(tree: &Tree<'_, I>, ties: &Ties) -> bool {
     ties.deciding().into_iter().flatten().any(|row| {
@@ -279,7 +278,7 @@ fn is_crowded<I: Index>(tree: &Tree<'_, I>, ties: &Ties) -> bool {
     })
 }
 
-/// The triangles that meet where a pair's point of the surface is, for a side as seen from there alone.
+/// The triangles that meet in a pair's surface point, which alone decide the side.
 pub(super) fn star<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,
@@ -300,7 +299,7 @@ pub(super) fn star<I: Index, V: VertexTable + ?Sized>(
     }
 }
 
-/// The pseudonormal at a pair's point of the surface, of length 1; zero if rounding hides it.
+/// The unit pseudonormal at a pair's surface point; zero if rounding hides it.
 pub(super) fn outward<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,

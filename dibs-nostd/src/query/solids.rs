@@ -1,8 +1,8 @@
-//! The signed separation from several solids: the least from any of them.
+//! The signed separation from several solids: the least of theirs.
 //!
-//! Each solid has a sign of its own, by its own closest sheet: where solids overlap, or one holds another, the closest
-//! sheet of all decides nothing. The least of their separations changes by no more than tool and surface move, as each
-//! of them does.
+//! Each solid has its own sign, from its own closest sheet: where solids overlap or contain each other, the closest
+//! sheet of all decides nothing. The least separation changes by no more than tool and surface move, as each solid's
+//! does.
 
 // Requirement: S-02
 
@@ -42,7 +42,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
         }
         let (pin, radius, _) = tree.node(solid).ok_or(QueryError::Corrupt { row: solid })?;
         let pin = vertices.position(pin).ok_or(QueryError::Corrupt { row: pin })?;
-        // A solid lies in the sphere of its outer shell. The rounding of both sides is less than the accuracy.
+        // A solid lies within its outer shell's sphere. The rounding of both sides is less than the accuracy.
         let apart = sqrt(tool.axis_distance_squared(pin)) - radius * stretch;
         if apart > closest.accuracy {
             continue;
@@ -55,7 +55,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     Ok(())
 }
 
-/// The signed answer of one solid, with the budget less the tests of the answer so far.
+/// The signed answer of one solid, with the budget left after the answer's tests so far.
 fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
     asked: &Asked<'_, '_, I, V, T>,
     stack: &mut [Waiting],
@@ -73,8 +73,8 @@ fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
     Ok(found)
 }
 
-/// The nearer of the answers of two solids, with the interval and the tests of both. The tool is inside if it is inside one
-/// of them, and on no known side if that of another one is not known.
+/// The nearer answer of two solids, with the interval and test counts of both. The tool is inside if it is inside one
+/// of them; if one side is unknown, so is the result's.
 fn nearer(one: Proximity, other: Proximity, tool: &impl Tool) -> Proximity {
     let is_nearer = other.separation < one.separation;
     let (near, farther) = if is_nearer { (other, one) } else { (one, other) };
@@ -87,8 +87,8 @@ fn nearer(one: Proximity, other: Proximity, tool: &impl Tool) -> Proximity {
     nearer
 }
 
-/// The least separation that an answer leaves possible. Without a side, an axis may be inside, no deeper than its closest
-/// point and its length.
+/// The least separation that an answer allows. Without a side the axis may be inside, no deeper than its closest
+/// distance plus its length.
 fn least_possible(answer: &Proximity, tool: &impl Tool) -> f32 {
     match answer.side {
         Side::Undefined(_) => -(answer.axis_distance + tool.axis_length()) - tool.radius(),

@@ -8,26 +8,26 @@ use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Step, Tool, VertexTable};
 
-/// The result of a sweep. Times count in sweeps: 0 is its start, 1 its end.
+/// The result of a sweep. Times are fractions of the sweep: 0 at its start, 1 at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct SweepAnswer {
-    /// Before this time they are certainly not closer than the margin; 1 or more: at no time.
+    /// Until this time they are certainly not closer than the margin; 1 or more: during the whole sweep.
     pub clear_until: f32,
-    /// The first time at which they were found within the margin, or farther by no more than the
-    /// [accuracy](Proximity::accuracy) and the rounding of positions between. If this is `None` and `clear_until` is
-    /// less than 1, the samples were too few to decide.
+    /// The first time at which they were found within the margin, or farther by at most the
+    /// [accuracy](Proximity::accuracy) and the rounding of positions at that time. If this is `None` and `clear_until`
+    /// is less than 1, there were too few samples to decide.
     pub contact: Option<f32>,
     /// The closest pair at the end.
     pub at_end: Proximity,
-    /// Queries made.
+    /// The number of queries made.
     pub samples: u32,
 }
 
-/// The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices each
-/// move straight and evenly.
+/// The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices
+/// each move in a straight line at constant speed.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -70,7 +70,7 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
         }
     }
 
-    /// Most by which a distance can change from start to end, rounded up.
+    /// An upper bound on the change of any distance from start to end, rounded up.
     fn most(&self) -> f32 {
         const U: f32 = 1.0 / 16_777_216.0;
         let [from, to] = &self.tools;
@@ -83,7 +83,7 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
         (tool + (last - first).abs() * self.step.length()) * (1.0 + 16.0 * U) + 8.0 * U * lengths
     }
 
-    /// The size of the coordinates that an instant is computed from.
+    /// The size of the coordinates from which an instant is computed.
     fn size(&self) -> f32 {
         let of = |tool: &T| tool.axis_start().abs().max_element() + tool.axis_length();
         let [from, to] = &self.tools;
@@ -97,18 +97,18 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     /// Whether tool and surface come closer than `margin` (mm, not negative) in a sweep, and when first.
     ///
     /// By conservative advancement (Mirtich 1996): a distance changes by no more than tool and surface move, so a pair
-    /// at one instant clears the time before and after in which the motion cannot use up its distance. As a rule the
-    /// pair at the end, which a tick needs anyway, clears all of it. If not, the sweep advances from the start,
-    /// with at most `samples` queries in all. No time is skipped at any speed: `clear_until` ends where the proof does.
-    /// The distance is that to the surface itself, from either side.
+    /// at one instant clears the time before and after in which the motion cannot use up its distance. Usually the pair
+    /// at the end, which a tick needs anyway, clears the whole sweep. If not, the sweep advances from the start, with
+    /// at most `samples` queries in all. No time is skipped at any speed: `clear_until` ends where the proof does. The
+    /// distance is unsigned, to the surface from either side.
     ///
-    /// The stretch in the options must hold all the time: that of both frames, by
-    /// [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). Their budget is for each sample.
+    /// The stretch in the options must hold during the whole sweep: that of both frames, by
+    /// [`MeasuredStretch::or_larger`](crate::MeasuredStretch::or_larger). The budget applies to each sample.
     ///
-    /// Cost: `samples` times that of [`closest`](Self::closest), and once at least.
+    /// Cost: `samples` times that of [`closest`](Self::closest), at least once.
     ///
     /// # Errors
-    /// [`QueryError::Margin`] and [`QueryError::BlendTime`] for arguments out of range, and those of
+    /// [`QueryError::Margin`] and [`QueryError::BlendTime`] for arguments out of range; otherwise same as
     /// [`closest`](Self::closest).
     pub fn sweep<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
@@ -131,13 +131,13 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let at_end = sample(1.0, options)?;
         let mut swept =
             SweepAnswer { clear_until: 0.0, contact: None, at_end: at_end.found, samples: 1 };
-        // A distance clears a part of the sweep; any does, where nothing moves.
+        // A distance clears a part of the sweep; without motion any distance clears all of it.
         let part = |spare: f32| match most {
             _ if !(spare > 0.0) => 0.0,
             0.0 => ALWAYS,
             most => spare / most * ROUND_DOWN,
         };
-        // The pair at the end clears the rest from here on.
+        // The pair at the end clears the time from `end` on.
         let end = 1.0 - part(at_end.spare);
         if at_end.touches {
             swept.contact = Some(1.0);
@@ -152,7 +152,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
                 break;
             }
             let next = time + part(now.spare);
-            // The step rounds to nothing.
+            // The step rounds to zero.
             if !(next > time) {
                 break;
             }
@@ -166,7 +166,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
 /// The pair at an instant.
 struct Sample {
     found: Proximity,
-    /// Certified distance left above the margin; 0 if there is none.
+    /// Certified separation above the margin; 0 if there is none.
     spare: f32,
     /// Whether they are within the margin, up to the errors.
     touches: bool,
@@ -175,7 +175,7 @@ struct Sample {
 impl Sample {
     fn new(found: Proximity, is_kept: bool, margin: f32, rounding: f32, radius: f32) -> Self {
         let separation = found.axis_distance - radius;
-        // Signed answers are exact; others bound the distance to the surface.
+        // Signed separations are exact; unsigned ones bound the distance to the surface.
         let lower = match found.side {
             Side::Undefined(_) => found.lower,
             _ if is_kept => found.lower,
@@ -188,9 +188,8 @@ impl Sample {
     }
 }
 
-/// After the end.
 const ALWAYS: f32 = 2.0;
-/// Factor on a time, for the rounding of its quotient.
+/// Factor on a time that covers the rounding of its quotient.
 const ROUND_DOWN: f32 = 1.0 - 8.0 / 16_777_216.0;
 /// Rounding of tool, surface and time at an instant, relative to [`Sweep::size`].
 const ROUNDING: f32 = 48.0 / 16_777_216.0;

@@ -1,10 +1,10 @@
-//! The packets of a frame that have arrived, as ranges instead of a mark for each.
+//! The packets of a frame that have arrived, as ranges instead of one mark per packet.
 
 // Requirement: B-01
 
 use core::ops::Range;
 
-/// Contiguous ranges of sequence numbers noted besides the first: the most gaps that a frame can have at once.
+/// Contiguous ranges of sequence numbers besides the first: the most gaps that a frame can have at once.
 pub(super) const GAPS: usize = 7;
 
 /// Packets of consecutive sequence numbers, and their rows.
@@ -13,7 +13,6 @@ struct Contig {
     /// Sequence numbers, `from..to`; empty where the slot is free.
     from: u16,
     to: u16,
-    /// Rows, `first..end`.
     first: u32,
     end: u32,
 }
@@ -26,17 +25,17 @@ impl Contig {
 ///
 /// # Why this proves completeness
 ///
-/// Rows are in the order of the sequence. Each range holds consecutive sequence numbers, and a packet's rows were
-/// compared with its neighbours' when it joined the range: in an exact frame they follow each other without a gap, in
-/// any frame without an overlap. So once the first range, which begins at sequence 1 and row 0, reaches the commit, and
-/// its rows the last row, every row was in exactly one packet, whatever the sender claims.
+/// Rows are in the order of the sequence. Each range holds consecutive sequence numbers. When a packet joins a range,
+/// its rows are compared with its neighbours': in an exact frame they must follow without a gap, in any frame without
+/// an overlap. So once the first range, which begins at sequence 1 and row 0, reaches the commit and the last row,
+/// every row was in exactly one packet, whatever the sender states.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arrivals {
     /// From the frame's first packet on.
     prefix: Contig,
-    /// The others, in no order. No vector: a range keeps its slot while others come and go.
+    /// The other ranges, unordered. No vector: a range keeps its slot while others come and go.
     others: [Contig; GAPS],
-    /// Number of these in use.
+    /// Number of other ranges in use.
     used: u8,
     /// Rows must follow each other without a gap.
     is_exact: bool,
@@ -45,7 +44,7 @@ pub(super) struct Arrivals {
 /// Why a packet cannot be placed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Misplaced {
-    /// It came before.
+    /// It arrived before.
     Duplicate,
     /// Its rows do not fit between those of the packets before and after it.
     Order,
@@ -75,7 +74,7 @@ struct Range32 {
 const PREFIX: usize = GAPS;
 
 impl Arrivals {
-    /// No packet yet. An exact frame needs every row.
+    /// No packets yet. An exact frame needs every row.
     pub const fn new(is_exact: bool) -> Self {
         let prefix = Contig { from: 1, to: 1, first: 0, end: 0 };
         Self { prefix, others: [Contig::FREE; GAPS], used: 0, is_exact }
@@ -86,12 +85,13 @@ impl Arrivals {
         self.prefix.to
     }
 
-    /// Rows below this one are final: the first range's, and the rows between them that a partial frame leaves out.
+    /// Rows below this one are final: those of the first range, and the rows between them that a partial frame leaves
+    /// out.
     pub const fn ready(&self) -> u32 {
         self.prefix.end
     }
 
-    /// Whether a packet with this sequence number or a later one has come.
+    /// Whether a packet with this sequence number or a later one has arrived.
     pub fn reaches(&self, sequence: u16) -> bool {
         self.prefix.to > sequence || self.others.iter().any(|range| range.to > sequence)
     }

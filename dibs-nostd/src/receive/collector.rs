@@ -1,6 +1,6 @@
-//! Which frames, packets and hellos are taken, when a frame is complete, and the receiver's status.
+//! Which frames, packets and hellos are accepted, when a frame is complete, and the receiver's status.
 //!
-//! Of a frame's content only whether it is partial matters.
+//! Of a frame's content it only uses whether it is partial.
 //!
 //! One file, because the order of its checks is the protocol's.
 
@@ -20,42 +20,40 @@ use crate::wire::{
 
 pub use heartbeats::LastHeartbeat;
 
-/// The frame in work.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub id: FrameId,
     pub begin: Begin,
-    /// The receiver's clock at the begin.
+    /// The receiver's clock at the begin packet.
     received: Millis,
-    /// The receiver's clock at the last packet that was taken.
+    /// The receiver's clock at the last accepted packet.
     touched: Millis,
-    /// Checksum of the begin packet: tells a repeated begin from a restarted sender's.
+    /// Checksum of the begin packet: distinguishes a repeated begin from that of a restarted sender.
     begin_checksum: u32,
     /// Sum of the packets' contributions so far.
     sum: u32,
     pub arrivals: Arrivals,
-    /// The commit's sequence number and digest, once it has come.
+    /// The commit's sequence number and digest, once received.
     commit: Option<(u16, u32)>,
-    /// All packets have come, and the digest matches.
+    /// All packets have arrived, and the digest matches.
     pub is_complete: bool,
 }
 
-/// The frame that was published last.
 #[derive(Clone, Copy, Debug)]
 struct Published {
     id: FrameId,
     captured: Millis,
-    /// The age that was stated: below 65,535.
+    /// The stated age: below 65,535.
     source_age: u16,
-    /// By how long this capture is before the latest of any published frame: a surface may go back by a clock's jitter,
-    /// its time does not.
+    /// How much earlier this capture is than the latest published one: captures may go back by a clock's jitter, the
+    /// latest time does not.
     back: u16,
     transit: Millis,
-    /// The greatest age that was reported: a wrap of the clock does not make it young again.
+    /// The greatest age reported: a wrap of the clock does not reduce it.
     oldest: Millis,
 }
 
-/// Decides which packets and frames to take, and counts them.
+/// Decides which packets and frames to accept, and counts them.
 #[derive(Debug)]
 pub(super) struct Collector {
     mesh_id: u32,
@@ -67,32 +65,33 @@ pub(super) struct Collector {
     pub is_registration: bool,
     /// Statuses made so far.
     statuses: u32,
-    /// The nonce of the last hello, until a status answers it; as bytes, which take less room.
+    /// The nonce of the last hello, until a status answers it; stored as bytes to save space.
     hello: Option<[u8; 8]>,
-    /// The receiver's clock at the hello that was taken last, if one was.
+    /// The receiver's clock at the last accepted hello, if any.
     greeted_at: Millis,
     is_greeted: bool,
-    /// The heartbeat refused last as not later, where nothing is under a tag.
+    /// The last heartbeat refused as not later, if tags are not used.
     straggler: Option<(u32, u32)>,
-    /// The receiver's clock at the packet in work, and at the last packet that was taken.
+    /// The receiver's clock at the current packet, and at the last accepted packet.
     now: Millis,
     packet: Option<Millis>,
-    /// The latest time at which the sender is known to have lived.
+    /// The latest time at which the sender is known to have been alive.
     alive_at: Option<Millis>,
     trouble: Trouble,
-    /// The frame refused or abandoned last, and why: the cause of its packets that follow.
+    /// The last refused or abandoned frame, and the cause: also the cause for its later packets.
     refused: Option<(FrameName, Event)>,
     pub counters: Counters,
 }
 
-/// Time in which one hello without a tag is taken: anybody can send them. A sender repeats its own after 50 ms.
+/// Within this time only one hello without a tag is accepted, since anybody can send them. A sender repeats its own
+/// after 50 ms.
 const GREETING: Millis = Millis(20);
 
-/// Time without a packet after which an earlier frame may replace the one in work.
+/// Time without a packet after which an earlier frame may replace the one being received.
 const PATIENCE: Millis = Millis(100);
 
-/// The longest time by which a capture can be earlier than a published one: more than any age that a packet states. A
-/// longer time back is one forward, on a clock that wraps.
+/// The longest time by which a capture can be earlier than a published one: more than any age that a packet states. On
+/// a clock that wraps, a longer step back is a step forward.
 const EARLIEST: Millis = Millis(1 << 17);
 
 impl Collector {
@@ -123,7 +122,7 @@ impl Collector {
         self.now = now;
     }
 
-    /// A packet was taken.
+    /// Notes an accepted packet.
     pub const fn note_packet(&mut self) {
         self.packet = Some(self.now);
     }
@@ -134,7 +133,7 @@ impl Collector {
         self.counters.count(event);
     }
 
-    /// Counts a rejection, of a frame with this name, its begin or another packet.
+    /// Counts a rejection of the begin or another packet of the frame with this name.
     #[cold]
     pub fn refuse<M: Mac>(&mut self, name: FrameName, is_begin: bool, rejection: &ReceiveError) {
         if is_begin || rejection.ends_frame() {
@@ -144,7 +143,7 @@ impl Collector {
         self.trouble.note(name, rejection, M::TAGGED, self.now);
     }
 
-    /// Takes a hello.
+    /// Accepts a hello.
     pub fn hello<M: Mac>(
         &mut self,
         packet: &Packet<'_>,
@@ -154,7 +153,7 @@ impl Collector {
         if !packet.is_genuine(mac, hello.session) {
             return Err(ReceiveError::Forged { epoch: packet.epoch });
         }
-        // The last one is answered, so that strangers with many do not keep a sender from its answer.
+        // The latest hello is answered, so that strangers with many hellos do not keep a sender from its answer.
         self.hello = Some(hello.nonce.to_le_bytes());
         let after = self.now.since(self.greeted_at);
         if !M::TAGGED && self.is_greeted && after < GREETING {
@@ -164,7 +163,7 @@ impl Collector {
         Ok(())
     }
 
-    /// The numbers that a fail-safe machine watches.
+    /// The numbers for a fail-safe machine.
     ///
     /// A complete frame counts from before its publication, where it is the worse: a control tick that interrupts the bus
     /// right after it reads the new surface beside the numbers noted before.
@@ -196,7 +195,7 @@ impl Collector {
     }
 
     /// Starts a frame from a genuine begin, with its checksum and its contribution to the digest; `None` for a repeated
-    /// one. `is_acceptable` has the checks of this receiver.
+    /// begin. `is_acceptable` does this receiver's checks.
     pub fn begin<M: Mac>(
         &mut self,
         epoch: u32,
@@ -255,7 +254,7 @@ impl Collector {
         Ok(Some(frame))
     }
 
-    /// The name of the next frame of this process: after all that have come.
+    /// The name of the next frame of this process: later than all received ones.
     pub fn next_id(&self) -> FrameId {
         let in_work = self.frame.as_ref().map(|frame| frame.id);
         let published = self.published_id();
@@ -267,20 +266,20 @@ impl Collector {
         later.map_or(first, |last| FrameId { epoch: last.epoch.wrapping_add(1), ..last })
     }
 
-    /// The place of all rows of the frame in work, which have come at once; their commit with them.
+    /// The position of all rows of the current frame, received at once together with its commit.
     pub fn place_whole(&mut self, rows: u32) -> Option<Place> {
         let frame = self.frame.as_mut()?;
         frame.commit = Some((2, frame.sum));
         frame.arrivals.locate(1, 0..rows).ok()
     }
 
-    /// A frame came from this process, which is alive.
+    /// Notes a frame of this process, which is its sign of life.
     pub fn note_local(&mut self) {
         self.note_packet();
         self.note_alive(None);
     }
 
-    /// The frame in work and the packet's contribution to its digest, if the packet belongs to it.
+    /// The current frame and the packet's contribution to its digest, if the packet belongs to it.
     #[inline]
     pub fn frame_of<M: Mac>(
         &self,
@@ -322,7 +321,7 @@ impl Collector {
         }
     }
 
-    /// The known session with this lower half.
+    /// The known session with this low half.
     fn session_of(&self, low: u16) -> Option<u32> {
         let in_work = self.frame.as_ref().map(|frame| frame.id.session);
         let published = self.published.as_ref().map(|published| published.id.session);
@@ -341,7 +340,7 @@ impl Collector {
         self.finish()
     }
 
-    /// Takes the commit: `None` for one that is repeated, `Some(true)` once the frame is complete.
+    /// Accepts the commit: `None` for a repeated one, `Some(true)` once the frame is complete.
     pub fn commit<M: Mac>(
         &mut self,
         packet: &Packet<'_>,
@@ -351,7 +350,7 @@ impl Collector {
         self.frame_of(packet, mac)?;
         let Some(frame) = &mut self.frame else { return Ok(None) };
         let sequence = packet.sequence;
-        // Before that place there is no pose.
+        // A commit at or before the pose's sequence number is without a pose.
         if frame.begin.is_posed && sequence <= POSE_SEQUENCE {
             return Err(ReceiveError::Order { sequence });
         }
@@ -394,13 +393,13 @@ impl Collector {
         Ok(true)
     }
 
-    /// The frame in work has become the published one.
+    /// Makes the current frame the published one.
     pub fn published(&mut self, frame: &Frame) {
         self.frame = None;
         self.wants_whole = false;
         self.is_registration &= frame.is_partial();
         let back = match self.since_newest(frame.captured()) {
-            // At most a clock's jitter, or the frame had been refused.
+            // At most a clock's jitter, otherwise the frame would have been refused.
             Some(Err(Millis(by))) => by as u16,
             _ => 0,
         };
@@ -413,12 +412,12 @@ impl Collector {
             transit: frame.transit(),
             oldest: Millis(0),
         });
-        // The published session is the sender's: a heartbeat of another one was stray.
+        // The published session is the sender's: a heartbeat of another session was stray.
         self.heartbeat = self.heartbeat.filter(|last| last.session == frame.id.session);
         self.counters.count(Event::Published);
     }
 
-    /// The time from the latest published capture to this one, or by how long this one is earlier.
+    /// The time from the latest published capture to this one, or how much earlier this one is.
     fn since_newest(&self, captured: Millis) -> Option<Result<Millis, Millis>> {
         let Published { captured: last, back, .. } = self.published?;
         let newest = last.after(Millis(back.into()));
@@ -427,7 +426,7 @@ impl Collector {
         Some(if is_earlier { Err(by) } else { Ok(captured.since(newest)) })
     }
 
-    /// The time in which the published surface became that of the frame in work: 0 for one captured earlier.
+    /// The time between the captures of the published frame and the current one: 0 if the current one is earlier.
     pub fn time_to(&self, frame: &Frame) -> Option<Millis> {
         let time = self.since_newest(frame.captured())?;
         Some(time.unwrap_or(Millis(0)))
@@ -482,7 +481,7 @@ impl Frame {
         matches!(self.begin.content, Content::Partial { .. })
     }
 
-    /// The receiver's clock at the surface's capture, if the begin had no transit.
+    /// The receiver's clock at the capture, assuming that the begin had no transit time.
     pub fn captured(&self) -> Millis {
         self.received.before(Millis(self.begin.freshness.age_ms.into()))
     }
@@ -504,7 +503,7 @@ impl Frame {
         if self.commit.is_some_and(|(commit, _)| sequence >= commit) {
             return Err(ReceiveError::Order { sequence });
         }
-        // A posed frame has its pose there, which has no rows.
+        // This sequence number of a posed frame is its pose, without rows.
         if self.begin.is_posed && sequence == POSE_SEQUENCE && !rows.is_empty() {
             return Err(ReceiveError::Order { sequence });
         }

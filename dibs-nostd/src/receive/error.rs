@@ -9,8 +9,7 @@ use crate::surface::{Millis, PoseError};
 use crate::tree::SurfaceFacts;
 use crate::wire::{Event, PacketError};
 
-/// Why a packet, or the frame that it would have finished, was rejected. The frame published last
-/// stays.
+/// Why a packet, or the frame that it would have completed, was rejected. The last published frame stays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -22,7 +21,7 @@ pub enum ReceiveError {
         /// The mesh id in the packet.
         mesh_id: u32,
     },
-    /// A frame of a surface with another unit or size, though of the same mesh id.
+    /// A frame of a surface with another unit or size, but the same mesh id.
     OtherSurface {
         /// The sender's surface.
         sent: SurfaceFacts,
@@ -34,42 +33,42 @@ pub enum ReceiveError {
         /// The packet's epoch.
         epoch: u32,
     },
-    /// The frame is not later than the published one, or earlier than the one in work; or the heartbeat is not later
-    /// than the last.
+    /// The frame is not later than the published one, or earlier than the one being received; or the heartbeat is not
+    /// later than the last.
     Stale {
         /// The packet's epoch.
         epoch: u32,
     },
     /// The surface was captured before the published one, by more than the jitter of a clock.
     Earlier {
-        /// By so long.
+        /// The time difference.
         by: Millis,
     },
-    /// The surface was 65,535 ms old or older when it was sent: how old, the packet cannot say. So is one of this process
-    /// that was captured in the future.
+    /// The surface was at least 65,535 ms old when it was sent, more than a packet can state; or a frame of this
+    /// process was captured in the future.
     TooOld,
-    /// Rows or a commit of a frame whose begin never came, or that was abandoned.
+    /// Rows or a commit of a frame whose begin was not received, or that was abandoned.
     Unexpected {
         /// The packet's epoch.
         epoch: u32,
     },
-    /// Rows or a commit of a frame that was refused before.
+    /// Rows or a commit of a frame that was refused.
     Refused {
         /// The packet's epoch.
         epoch: u32,
         /// The event by which its begin, or the frame, was refused.
         cause: Event,
     },
-    /// As unexpected, and the tag cannot be verified, because nothing of the packet's session has come.
+    /// As [`Unexpected`](Self::Unexpected); its tag cannot be verified because no begin of its session was received.
     Unverifiable {
         /// The packet's epoch.
         epoch: u32,
         /// The event by which the frame's begin was refused, if one came.
         cause: Option<Event>,
     },
-    /// A hello without a tag, so soon after another that it is not answered at once. The next status answers the last one.
+    /// A hello without a tag, too soon after another to be answered at once. The next status answers the latest hello.
     Throttled {
-        /// Time since the hello that was taken.
+        /// Time since the last accepted hello.
         after: Millis,
     },
     /// A packet for senders.
@@ -79,23 +78,23 @@ pub enum ReceiveError {
         /// The packet's epoch.
         epoch: u32,
     },
-    /// A partial frame on another base than the published frame.
+    /// A partial frame whose base is not the published frame.
     Base {
         /// The base that it changes.
         epoch: u32,
     },
-    /// Rows of a partial frame came before the published frame's rows were copied.
+    /// Rows of a partial frame arrived before the published frame's rows were copied.
     NotReady {
         /// The first row of the packet.
         first: u32,
     },
     /// The frame has another number of rows than this receiver.
     RowCount {
-        /// Rows that the begin packet announces, or that the frame came to.
+        /// Rows announced by the begin packet, or of the whole frame.
         rows: u32,
     },
-    /// A frame with a content that this receiver does not take, a pose among them, rows in another encoding than their
-    /// frame's, or a pose of a frame without.
+    /// The content or encoding is not accepted: unknown content, a pose where none is expected, or rows in another
+    /// encoding than their frame's.
     Encoding,
     /// Rows outside the surface.
     OutOfRange {
@@ -109,7 +108,7 @@ pub enum ReceiveError {
         /// The packet's sequence number.
         sequence: u16,
     },
-    /// More gaps in the sequence than the receiver can note.
+    /// More gaps in the sequence than the receiver can track.
     Gaps {
         /// The packet's sequence number.
         sequence: u16,
@@ -119,31 +118,31 @@ pub enum ReceiveError {
         /// The first such row.
         row: u32,
     },
-    /// A coordinate or weight is larger than this receiver allows.
+    /// A coordinate or weight is beyond this receiver's limit.
     TooFar {
         /// The first such row.
         row: u32,
     },
-    /// The packets do not add up to the commit's digest. The frame is abandoned.
+    /// The packets do not match the commit's digest. The frame is abandoned.
     Digest {
         /// In the commit.
         stated: u32,
-        /// Of the packets that came.
+        /// Of the received packets.
         computed: u32,
     },
-    /// The frame's rotation and shift are no rigid pose.
+    /// The frame's rotation and shift are not a rigid pose.
     Pose(PoseError),
     /// The gate refused the surface. The frame is abandoned.
     Stretch(StretchError),
 }
 
 impl ReceiveError {
-    /// Whether a frame that had begun ends with this rejection.
+    /// Whether this rejection ends the current frame.
     pub(super) const fn ends_frame(&self) -> bool {
         matches!(self, Self::RowCount { .. } | Self::Digest { .. } | Self::Stretch(_))
     }
 
-    /// The event that counts it.
+    /// The event that counts this rejection.
     #[must_use]
     pub const fn event(&self) -> Event {
         match self {
@@ -195,7 +194,7 @@ impl fmt::Display for ReceiveError {
                 write!(f, "the sender's surface has {sent}; the receiver's has {here}")
             }
             Self::Forged { epoch } => write!(f, "a packet of frame {epoch} has no genuine tag"),
-            Self::Stale { epoch } => write!(f, "frame {epoch} is not later than what is here"),
+            Self::Stale { epoch } => write!(f, "frame {epoch} is not later than the last one"),
             Self::Earlier { by } => {
                 write!(f, "the surface was captured {by} before the published one")
             }
@@ -228,12 +227,12 @@ impl fmt::Display for ReceiveError {
                 )
             }
             Self::RowCount { rows } => write!(f, "the frame has {rows} rows"),
-            Self::Encoding => write!(f, "not the content or encoding that is received here"),
+            Self::Encoding => write!(f, "the content or encoding is not accepted"),
             Self::OutOfRange { first, count } => {
                 write!(f, "{count} rows from {first} are outside the surface")
             }
             Self::Order { sequence } => {
-                write!(f, "packet {sequence} of the frame does not go with the others")
+                write!(f, "the rows of packet {sequence} are out of order")
             }
             Self::Gaps { sequence } => {
                 write!(f, "packet {sequence} of the frame leaves too many gaps")

@@ -1,4 +1,4 @@
-//! The bus's health, in numbers that a fail-safe machine watches.
+//! The bus's health, as numbers for a fail-safe machine.
 
 // Requirement: B-04
 
@@ -9,43 +9,41 @@ use crate::wire::{FrameId, Packet, is_newer};
 /// The health of the bus, as the receiver sees it, for [`LinkStatus::set`](crate::failsafe::LinkStatus::set). Times are
 /// on the receiver's clock.
 ///
-/// With a key only packets with a genuine tag count as rejections, so that nobody without it adds to them or hides any.
-/// Damage and strays count in [`Counters`](crate::wire::Counters) alone: the frames that they spoil count here.
+/// With a key only packets with a genuine tag count as rejections, so that nobody without the key can add or hide any.
+/// Damaged and stray packets count only in [`Counters`](crate::wire::Counters); the frames that they spoil count here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct BusHealth {
-    /// Time of the last packet taken; repeated packets and hellos do not count.
+    /// Time of the last accepted packet; repeated packets and hellos do not count.
     pub packet: Option<Millis>,
-    /// Latest time at which the sender is known to have lived: that of the status that a heartbeat echoed, or without an
-    /// echo that of its arrival.
+    /// Latest time at which the sender is known to have been alive: that of the status that a heartbeat echoed, or
+    /// without an echo the heartbeat's arrival.
     pub heartbeat: Option<Millis>,
-    /// Frames refused, abandoned or without a begin since the last publication: each once, unless more than four were
-    /// refused in turn. Packets of other meshes and of frames that are over do not count.
+    /// Frames refused, abandoned or without a begin since the last publication: each once, unless more than four frames
+    /// alternate. Packets of other meshes and of finished frames do not count.
     pub rejections: u32,
     /// Packets without a genuine tag, less [`FORGERIES_A_SECOND`](Self::FORGERIES_A_SECOND), at most
-    /// [`MOST_FORGERIES`](Self::MOST_FORGERIES). The first publication sets it to 0, because until
-    /// then the sender did not know the receiver's challenge. Later ones leave it.
+    /// [`MOST_FORGERIES`](Self::MOST_FORGERIES). The first publication resets it to 0, because before it the sender did
+    /// not know the receiver's challenge. Later ones do not.
     pub forgeries: u32,
     /// Time from the status that the published frame echoes to the arrival of its begin packet: an upper bound on the
-    /// latency of each. [`Millis::MAX`] where it echoes none. From the moment at which the next frame is complete, the
-    /// greater of both.
+    /// latency of either. [`Millis::MAX`] if it echoes none. Once the next frame is complete, the greater of both frames.
     pub transit: Millis,
-    /// Age of the published frame when it was sent, as the sender stated it. As with the transit, the greater of both.
+    /// Age of the published frame when it was sent, as the sender stated it. As with the transit, the greater of both frames.
     pub source_age: Millis,
 }
 
 impl BusHealth {
-    /// Forgeries that are forgotten each second: a lasting rate up to this never trips a watch.
+    /// Forgeries subtracted each second: a lasting rate up to this never exceeds a limit.
     pub const FORGERIES_A_SECOND: u32 = 1_000 / DRAIN_MS;
 
-    /// The most forgeries that are remembered, so that a flood is forgotten within
-    /// `MOST_FORGERIES / FORGERIES_A_SECOND` seconds.
+    /// Largest count of forgeries, so that a flood decays within `MOST_FORGERIES / FORGERIES_A_SECOND` seconds.
     pub const MOST_FORGERIES: u32 = 1_000;
 }
 
-/// Time (ms) after which one forgery is forgotten.
+/// Time (ms) after which one forgery is subtracted.
 const DRAIN_MS: u32 = 100;
 
 /// The part of a frame's name that every packet carries.
@@ -65,14 +63,14 @@ impl FrameName {
     }
 }
 
-/// Names of frames that are remembered as counted.
+/// Number of frame names remembered as counted.
 const REMEMBERED: usize = 4;
 
-/// The frames that went wrong since the last publication, and the forgeries.
+/// The failed frames since the last publication, and the forgeries.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trouble {
     rejections: u32,
-    /// The frames counted last, the newest first.
+    /// The last counted frames, the newest first.
     counted: [Option<FrameName>; REMEMBERED],
     forgeries: Bucket,
 }
@@ -87,14 +85,14 @@ impl Trouble {
         (self.rejections, self.forgeries.level(now))
     }
 
-    /// A frame was published.
+    /// Notes a publication.
     pub const fn note_published(&mut self, is_first: bool) {
         let forgeries = if is_first { Bucket::EMPTY } else { self.forgeries };
         *self = Self { forgeries, ..Self::new() };
     }
 
-    /// A packet, or the frame of this name, was rejected. With a key (`is_keyed`) every rejection that counts is of a
-    /// packet with a genuine tag.
+    /// Notes that a packet, or the frame of this name, was rejected. With a key (`is_keyed`) only packets with a
+    /// genuine tag count as rejections.
     pub fn note(&mut self, name: FrameName, rejection: &ReceiveError, is_keyed: bool, now: Millis) {
         match rejection {
             ReceiveError::Forged { .. } => self.forgeries.add(now),
@@ -108,13 +106,13 @@ impl Trouble {
         }
     }
 
-    /// A frame was refused or abandoned.
+    /// Notes that a frame was refused or abandoned.
     pub fn note_frame(&mut self, name: FrameName, is_keyed: bool) {
         let [newest, before @ ..] = &self.counted;
         let is_recorded = |newest: &FrameName| {
             newest.session_low == name.session_low && !is_newer(name.epoch, newest.epoch)
         };
-        // Names with a genuine tag only rise, so an earlier one is a recording. Without a key the earlier one may be
+        // Names with a genuine tag only increase, so an earlier one is a replay. Without a key the earlier one may be
         // the genuine one.
         let is_counted = self.counted.contains(&Some(name))
             || is_keyed && newest.as_ref().is_some_and(is_recorded);
@@ -126,18 +124,17 @@ impl Trouble {
     }
 }
 
-/// A leaky bucket.
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
     level: u32,
-    /// The receiver's clock at the last drop that left it.
+    /// The receiver's clock at the last drop that drained.
     drained: Millis,
 }
 
 impl Bucket {
     const EMPTY: Self = Self { level: 0, drained: Millis(0) };
 
-    /// Drops that have left since; none where the clock went back.
+    /// Drops drained since then; none if the clock went back.
     const fn drops(&self, now: Millis) -> u32 {
         let Millis(elapsed) = now.since(self.drained);
         if elapsed > i32::MAX as u32 { 0 } else { elapsed / DRAIN_MS }

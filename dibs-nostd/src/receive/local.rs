@@ -1,4 +1,4 @@
-//! Whole frames of this process, without packets: the same checks, and the same gate.
+//! Whole frames of this process, without packets: the same checks and the same gate.
 
 // Requirement: B-08
 
@@ -12,19 +12,19 @@ use crate::surface::{Millis, Position, RigidPose, elapsed};
 use crate::wire::{Begin, Content, Encoding, FrameId, Freshness, Mac};
 
 impl<G: Gate, M: Mac> Assembler<'_, G, M> {
-    /// Takes a whole frame from this process, say from a solver's own thread: the positions (mm) of all rows, in the
-    /// rows' order, that the surface had at `captured`, at most 65.5 s before `now` on the receiver's clock. As after a
-    /// frame's last packet, [`advance`](Self::advance) then checks and publishes it.
+    /// Takes a whole frame from this process, for example from a solver's thread: the positions (mm) of all rows, in
+    /// the rows' order, captured at `captured`, at most 65.5 s before `now` on the receiver's clock. As after a frame's
+    /// last packet, [`advance`](Self::advance) then checks and publishes it.
     ///
-    /// The call counts as a sign of life, as a heartbeat does, and its transit time is 0. A frame of packets that is in
-    /// work is abandoned: one source at a time.
+    /// The call counts as a sign of life, like a heartbeat, and its transit time is 0. Use one source at a time: a
+    /// frame of packets that is still being received is abandoned.
     ///
-    /// Cost: O(rows), several readings each.
+    /// Cost: O(rows), several reads of each row.
     ///
     /// # Errors
     /// [`ReceiveError`], counted: another number of rows, a position that is not finite or too far away, a capture too
-    /// old or earlier than the published one's, weights expected, or a complete frame still in work
-    /// ([`Busy`](ReceiveError::Busy)). What was published or in work stays.
+    /// old or earlier than the published one's, weights expected, or a complete frame still being checked
+    /// ([`Busy`](ReceiveError::Busy)). The published and the current frame stay.
     pub fn frame(
         &mut self,
         positions: impl ExactSizeIterator<Item = Vec3> + Clone,
@@ -34,7 +34,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         self.frame_at(positions, None, captured, now)
     }
 
-    /// The same, at a pose.
+    /// The same, with a pose.
     pub(crate) fn frame_at(
         &mut self,
         positions: impl ExactSizeIterator<Item = Vec3> + Clone,
@@ -52,7 +52,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         self.local((Content::Whole, rows), pose, source, store, [captured, now])
     }
 
-    /// The same, of weights of displacement modes.
+    /// The same, with weights of displacement modes.
     ///
     /// # Errors
     /// As [`frame`](Self::frame); [`ReceiveError::TooFar`] for a weight out of its mode's range.
@@ -73,7 +73,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         self.local((Content::Modal, weights.len()), None, source, store, [captured, now])
     }
 
-    /// Refuses, and counts, a frame of this process.
+    /// Refuses and counts a frame of this process.
     #[cold]
     pub(crate) fn refuse_frame(&mut self, rejection: ReceiveError, now: Millis) -> ReceiveError {
         self.collector.set_now(now);
@@ -87,7 +87,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         rejection
     }
 
-    /// Takes a frame whose rows `check` finds good and `store` stores.
+    /// Takes a frame whose rows `check` accepts and `store` stores.
     fn local(
         &mut self,
         (content, rows): (Content, usize),
@@ -133,7 +133,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             return Err(ReceiveError::Encoding);
         }
         check(self)?;
-        // A frame of one packet, whose parts add up to 0.
+        // Like a frame of one packet, with digest contributions of 0.
         self.begin_frame(id.epoch, begin, [0; 2])?;
         if let Some(pose) = pose {
             self.gate.place(pose);

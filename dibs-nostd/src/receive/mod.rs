@@ -31,24 +31,24 @@ pub use health::BusHealth;
 use health::FrameName;
 use step::{Earlier, Step};
 
-/// Assembles frames of vertices from packets, and publishes the complete and admitted ones.
+/// Assembles frames of vertices from packets, and publishes those that are complete and admitted.
 ///
 /// [`accept`](Self::accept) takes packets, in the bus interrupt. [`advance`](Self::advance) does the longer work, in
-/// slices: it checks the surface ([`Gate`]), publishes it, and copies the rows that partial frames build on. The two
+/// slices: it checks the surface ([`Gate`]), publishes it, and copies the rows on which partial frames build. The two
 /// must not interrupt each other: call both in the bus interrupt, or call `advance` at another priority below the
 /// control tick's with the bus interrupt masked.
 ///
-/// A frame is published when every row has come in its place in the sequence, the commit's digest confirms that all
-/// packets were of one frame, and the gate admits the surface. Until then, and after any rejection, the frame published
-/// last stays. `docs/wire.md` has the whole table of packets and outcomes. With a [`Mac`], a packet without a genuine
-/// tag is dropped first.
+/// A frame is published when every row has arrived at its place in the sequence, the commit's digest confirms that all
+/// packets belong to one frame, and the gate admits the surface. Until then, and after any rejection, the last
+/// published frame stays. `docs/wire.md` has the whole table of packets and outcomes. With a [`Mac`], a packet without
+/// a genuine tag is dropped first.
 ///
-/// With a gate of modes the buffers have a row for each, and frames hold weights instead: see
+/// With a gate of modes the buffers have one row for each mode, and frames hold weights instead of positions: see
 /// [`Gate::weight_range`].
 ///
 /// RAM: less than 700 bytes besides [`Frames`](crate::Frames) and gate, for any number of vertices. A surface's buffers
-/// with both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes a vertex and
-/// at most 1,750 bytes.
+/// with both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes for each
+/// vertex plus at most 1,750 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
@@ -85,17 +85,17 @@ pub struct Assembler<'f, G, M = NoMac> {
     mac: M,
     max_coordinate: f32,
     collector: Collector,
-    /// The frame in work has been admitted and labelled: only its publication is left.
+    /// The current frame is admitted and labelled: only its publication is left.
     is_admitted: bool,
-    /// Leading rows of the back buffer that equal the published ones, except where the partial frame in work has
-    /// changed them.
+    /// Leading rows of the back buffer that equal the published ones, except those changed by the current partial
+    /// frame.
     copied: u32,
     step: Step,
-    /// Rows were stored since the copying began. If their frame is not published, the copy starts again.
+    /// Rows were stored since copying began. If their frame is not published, copying starts again.
     is_dirty: bool,
-    /// A partial frame has come, so each published frame is copied for the next one.
+    /// A partial frame was received, so each published frame is copied for the next one.
     takes_partial: bool,
-    /// The quantisation box of the frame in work is within the limit.
+    /// The quantisation box of the current frame is within the limit.
     is_box_inside: bool,
 }
 
@@ -111,7 +111,7 @@ pub enum Progress {
     },
     /// The packet was taken.
     Stored,
-    /// The packet had come before, and was ignored.
+    /// The packet had arrived before, and was ignored.
     Duplicate,
     /// The frame is complete: [`Assembler::advance`] checks and publishes it.
     Complete {
@@ -129,12 +129,12 @@ pub enum Progress {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Advance {
-    /// No complete frame waits; rows may be left to copy or to check ahead.
+    /// No complete frame is waiting; rows may be left to copy or to check in advance.
     Idle,
     /// More work is left.
     Pending,
-    /// The frame is admitted, but a read of the last one is in progress: a later call publishes it.
-    /// Never on one core where the reader preempts the writer.
+    /// The frame is admitted, but a read of the last one is in progress: a later call publishes it. Never occurs on one
+    /// core where the reader preempts the writer.
     Held {
         /// Its number.
         epoch: u32,
@@ -147,8 +147,8 @@ pub enum Advance {
 }
 
 impl<'f, G: Gate> Assembler<'f, G> {
-    /// An assembler for the mesh with this id, whose vertices keep within `max_coordinate` (mm) of the origin on each
-    /// axis, at most [`MAX_COORDINATE`]. A smaller limit detects more damage, and bounds the accuracy of every query.
+    /// An assembler for the mesh with this id, whose vertices stay within `max_coordinate` (mm) of the origin on each
+    /// axis, at most [`MAX_COORDINATE`]. A smaller limit detects more damage, and improves the accuracy of every query.
     /// With NaN nothing is ever published.
     #[must_use]
     pub fn new(writer: FrameWriter<'f>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
@@ -161,7 +161,7 @@ impl<'f, 't, I: Index> Assembler<'f, StretchMonitor<'t, I>> {
     /// limit and these limits.
     ///
     /// # Errors
-    /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
+    /// [`StretchError::NoMetric`] if the tree was emitted without its metric section.
     pub fn for_tree(
         writer: FrameWriter<'f>,
         tree: &Tree<'t, I>,
@@ -173,11 +173,11 @@ impl<'f, 't, I: Index> Assembler<'f, StretchMonitor<'t, I>> {
 }
 
 impl<'f, 't, I: Index> Assembler<'f, StretchMonitor<'t, I, 2>> {
-    /// The same, for three buffers: the frames that it publishes move between their times and beyond
+    /// The same, for three buffers: the published frames can be interpolated between their times and extrapolated
     /// ([`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated)). It measures twice as much.
     ///
     /// # Errors
-    /// [`StretchError::NoMetric`] where the tree was emitted without its metric section.
+    /// [`StretchError::NoMetric`] if the tree was emitted without its metric section.
     pub fn continuous(
         writer: FrameWriter<'f>,
         tree: &Tree<'t, I>,
@@ -215,13 +215,13 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         }
     }
 
-    /// Takes one packet, whole. `now` is the receiver's clock. The frame's label keeps its value at the
-    /// begin packet, less the age that the frame had when it was sent.
+    /// Takes one whole packet. `now` is the receiver's clock. The frame's label stores its value at the begin packet,
+    /// less the age that the frame had when it was sent.
     ///
     /// Cost: O(bytes).
     ///
     /// # Errors
-    /// [`ReceiveError`] names why the packet or its frame was not taken; the event has been counted.
+    /// [`ReceiveError`] tells why the packet or its frame was rejected; the event has been counted.
     #[inline]
     pub fn accept(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
         self.collector.set_now(now);
@@ -254,11 +254,11 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
     /// Does a slice of work: compares rows with the published ones and checks triangles, or copies rows, at most `work`
     /// in all, and publishes an admitted frame.
     ///
-    /// Call it after each packet, so that the check keeps up with the frame, and from time to time when the bus is
-    /// quiet. Cost: O(`work`), with a gate that is sliced.
+    /// Call it after each packet, so that the check keeps up with the frame, and periodically while the bus is quiet.
+    /// Cost: O(`work`), with a sliced gate.
     ///
     /// # Errors
-    /// [`ReceiveError::Stretch`] when the gate refuses the surface; it has been counted.
+    /// [`ReceiveError::Stretch`] if the gate refuses the surface; it has been counted.
     pub fn advance(&mut self, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else {
             self.clean();
@@ -285,9 +285,8 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         self.check(ready, work)
     }
 
-    /// The receiver's status for the sender, or its answer to a hello that came:
-    /// [`encode_status`](crate::wire::encode_status) makes a packet of it. Make one as soon as a hello has come.
-    /// `safety` as in [`Status::safety`].
+    /// The receiver's status for the sender, or its answer to a hello: [`encode_status`](crate::wire::encode_status)
+    /// makes a packet of it. Make one as soon as a hello has arrived. `safety` as in [`Status::safety`].
     pub fn status(&mut self, now: Millis, safety: u8) -> Status {
         let stretch = self.writer.front().and_then(|front| front.label().stretch);
         let stretch = stretch.map(|stretch| stretch.sigma());
@@ -302,13 +301,13 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         if is_modal { facts } else { SurfaceFacts { vertices: self.writer.len(), ..facts } }
     }
 
-    /// The mesh whose frames are taken.
+    /// The id of the mesh whose frames are accepted.
     #[cfg(feature = "control")]
     pub(crate) const fn mesh_id(&self) -> u32 {
         self.collector.mesh_id()
     }
 
-    /// Name of the frame published last.
+    /// Name of the last published frame.
     #[must_use]
     pub fn published(&self) -> Option<FrameId> {
         self.collector.published_id()
@@ -326,7 +325,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         &self.collector.counters
     }
 
-    /// Counts bytes of a stream that were no packet, as a [`Deframer`](crate::wire::Deframer) reports.
+    /// Counts bytes of a stream that were not a packet, as reported by a [`Deframer`](crate::wire::Deframer).
     pub fn count_framing(&mut self, _: &StreamError) {
         self.collector.refuse_bytes(Event::Framing);
     }
@@ -337,14 +336,14 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         self.collector.health()
     }
 
-    /// The frame published last.
+    /// The last published frame.
     #[must_use]
     pub fn surface(&self) -> Option<FrameView<'_>> {
         self.writer.front()
     }
 
-    /// Registers the surface anew: the next whole frame is compared with no frame before it, as the first one is. For
-    /// an operator who knows that the tissue was moved, say with the patient, beyond the limit on
+    /// Registers the surface anew: like the first frame, the next whole frame is not compared with an earlier one. For
+    /// an operator who knows that the tissue was moved, for example with the patient, beyond the limit on
     /// [recovery](SurfaceLimits::recovery_mm). Until then no frame that far away is published.
     pub const fn register(&mut self) {
         self.collector.register();
@@ -362,7 +361,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         &self.mac
     }
 
-    /// Forgets the copied rows, if rows of an unpublished frame have been stored over them.
+    /// Discards the copied rows if rows of an unpublished frame have overwritten them.
     fn clean(&mut self) {
         if self.is_dirty {
             self.is_dirty = false;
@@ -378,7 +377,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         self.copied = end;
     }
 
-    /// Lets the gate check a slice of the frame in work.
+    /// Lets the gate check a slice of the current frame.
     fn check(&mut self, ready: u32, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
         let (back, front) = (self.writer.back(), self.writer.front());
@@ -397,7 +396,8 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
             }
             compared = Some(self.step.compared());
         }
-        // A registration is compared with nothing. A partial frame is none: the rest of it is the published one's.
+        // A registration is not compared with an earlier frame. A partial frame is no registration: its other rows are
+        // the published one's.
         let is_registration = self.collector.is_registration && !frame.is_partial();
         let before = front.as_ref().filter(|_| !is_registration);
         let time = |front: &FrameView<'_>| {
@@ -435,7 +435,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         }
     }
 
-    /// Publishes the frame in work, once admitted.
+    /// Publishes the current frame, once admitted.
     fn publish(&mut self) -> Advance {
         let Some(frame) = self.collector.frame else { return Advance::Idle };
         let epoch = frame.id.epoch;

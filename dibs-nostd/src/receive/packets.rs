@@ -1,4 +1,4 @@
-//! The effect of each packet on the frame in work.
+//! The effect of each packet on the current frame.
 
 use core::ops::Range;
 
@@ -75,7 +75,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             }
         };
         let is_partial = matches!(begin.content, Content::Partial { .. });
-        // Even if this frame is refused, the next one must find the published rows copied.
+        // Even if this frame is refused, the published rows must be copied for the next one.
         self.takes_partial |= is_partial;
         let begun = self.collector.begin::<M>(epoch, begin, sums, check_begin)?;
         let Some(frame) = begun else { return Ok(Progress::Duplicate) };
@@ -93,7 +93,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         Ok(Progress::Begun { epoch: frame.id.epoch })
     }
 
-    /// Takes the pose of a frame: in its sequence a packet of no rows, so that none is published without.
+    /// Takes the pose of a frame: it has a sequence number but no rows, so that no posed frame is published without it.
     #[cold]
     #[inline(never)]
     fn pose(
@@ -208,7 +208,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     }
 }
 
-/// Stores rows in their slots. (On the board a function of its own, so that the loop has the registers.)
+/// Stores rows in their slots. (On the board not inlined, so that the loop has enough registers.)
 #[cfg_attr(target_arch = "arm", inline(never))]
 #[cfg_attr(not(target_arch = "arm"), inline(always))]
 fn store<R>(slots: &[Position], rows: &[R], decode: impl Fn(&R) -> Vec3) {
@@ -221,7 +221,7 @@ const fn stored(is_complete: bool, epoch: u32) -> Progress {
     if is_complete { Progress::Complete { epoch } } else { Progress::Stored }
 }
 
-/// Whether every coordinate is within the limit; false for one that is not a number.
+/// Whether every coordinate is within the limit; false for NaN.
 #[inline(always)]
 fn is_within(position: Vec3, limit: f32) -> bool {
     let Vec3 { x, y, z } = position.abs();
@@ -229,7 +229,7 @@ fn is_within(position: Vec3, limit: f32) -> bool {
     (x <= limit) & (y <= limit) & (z <= limit)
 }
 
-/// An error that names the first position that is not finite or beyond the limit.
+/// The error for the first position that is not finite or beyond the limit.
 #[inline]
 pub(super) fn check(
     positions: impl Iterator<Item = Vec3> + Clone,

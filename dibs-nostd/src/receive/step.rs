@@ -1,32 +1,32 @@
-//! The motion from the published frame to the one in work, measured in slices while its rows arrive.
+//! The motion from the published frame to the current one, measured in slices while its rows arrive.
 //!
-//! The assembler measures it itself, because it alone knows that both frames stay as they are until the later one is
-//! published: so no gate, and no user, can understate it.
+//! The assembler measures it itself, because it alone knows that both frames are unchanged until the later one is
+//! published: so no gate and no user can understate the motion.
 
 use crate::math::sqrt::sqrt;
 use crate::stretch::{Compared, largest_change, largest_step};
 use crate::surface::{MotionReading, MotionUnit, PredictionCheck, VertexTable};
 
-/// Most units of a step that is extrapolated: more than 32 times the root sphere's radius.
+/// Most units of an extrapolated step: more than 32 times the root sphere's radius.
 const MOST: u64 = 1 << 30;
 
 /// The rows compared so far, and the squares of the largest step and of the largest distance from the extrapolation.
 #[derive(Debug)]
 pub(super) struct Step {
     rows: u32,
-    /// First and end of the slice with the largest step.
+    /// Start and end of the slice with the largest step.
     fastest: [u32; 2],
     largest: f32,
     off: f32,
-    /// Units of the odometer between the two frames before, and the part of them that the extrapolation adds.
+    /// Odometer units between the two previous frames, and the fraction of that step that the extrapolation adds.
     units: u64,
     t: f32,
 }
 
-/// The frame before the published one, from which the frame in work is extrapolated.
+/// The frame before the published one, from which the current frame is extrapolated.
 pub(super) struct Earlier<'f, V: ?Sized> {
     pub frame: &'f V,
-    /// Units from it to the published frame, and the part of that step that is added.
+    /// Units from it to the published frame, and the fraction of that step to add.
     pub units: u64,
     pub t: f32,
 }
@@ -36,7 +36,7 @@ impl Step {
         Self { rows: 0, fastest: [0; 2], largest: 0.0, off: 0.0, units: 0, t: f32::NAN }
     }
 
-    /// Compares at most `work` of the rows below `ready` with those before, and with the extrapolation of these from an
+    /// Compares at most `work` of the rows below `ready` with the published ones, and with their extrapolation from an
     /// earlier frame, if there is one. Returns the work left.
     pub fn compare<V: VertexTable + ?Sized>(
         &mut self,
@@ -73,12 +73,12 @@ impl Step {
         Compared { largest: self.largest, rows: self.fastest, t: self.t }
     }
 
-    /// The distance of the frame from the extrapolation, where there was one; its stretch is not known here.
+    /// The distance of the frame from its extrapolation, if any; its stretch is not known here.
     pub fn ahead(&self, unit: Option<&MotionUnit>) -> PredictionCheck {
         let units = |squared| unit?.units_of_step(squared);
         let known = match (units(self.largest), units(self.off)) {
             (Some(step), Some(off)) if self.units < MOST && step < MOST && off < MOST => {
-                // The distance is the difference of two steps, each rounded by a few parts in 2^24.
+                // The distance is the difference of two steps, each rounded by a few times 2^-24 of itself.
                 let rounding = (2 * self.units + step) / (1 << 18) + 2;
                 Some(((self.t * self.units as f32) as u32, (off + rounding) as u32))
             }
@@ -89,7 +89,7 @@ impl Step {
         PredictionCheck { shown, passed, off, ..PredictionCheck::UNKNOWN }
     }
 
-    /// The odometer's reading after the step from a frame with the reading `before`; a start where that is unknown, or
+    /// The odometer's reading after the step from a frame with the reading `before`; a new start if that is unknown or
     /// the step is not finite.
     pub fn motion(&self, unit: &MotionUnit, before: Option<MotionReading>) -> MotionReading {
         let after = before.and_then(|before| before.after_step(unit, self.largest));

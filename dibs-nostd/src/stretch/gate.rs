@@ -1,4 +1,4 @@
-//! The last check of a frame before it is published, as a trait, so that a user can choose the check.
+//! The last check of a frame before it is published, as a trait, so that users can write their own.
 
 use core::ops::Range;
 
@@ -14,7 +14,7 @@ use crate::tree::{Index, SurfaceFacts, Tree};
 pub enum FrameExtent {
     /// Every row.
     Whole,
-    /// Some rows; the others are as they were published.
+    /// Some rows; the others stay as published.
     Partial,
 }
 
@@ -38,26 +38,27 @@ pub struct IncomingSurface<'a, V: ?Sized> {
     /// The published surface, and the time from its capture to this one's; `None` before the first, and for a
     /// [registration](crate::Assembler::register).
     pub before: Option<(&'a V, Millis)>,
-    /// How far the rows have moved from there, where that was measured already.
+    /// The motion of the rows since `before`, if already measured.
     #[doc(hidden)]
     pub compared: Option<Compared>,
 }
 
-/// The comparison of a surface's rows with those before.
+/// The comparison of a surface's rows with the published ones.
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
     /// The largest squared distance (mm²) of any row compared so far.
     pub largest: f32,
-    /// First and end of the rows that have it among them.
+    /// Start and end of a range of rows that contains it.
     pub rows: [u32; 2],
-    /// The part of the step before by which the rows were moved on to be compared with these; NaN where they were not.
+    /// The fraction of the previous step that was added to the published rows for this comparison; NaN if none was.
     pub t: f32,
 }
 
 impl Compared {
-    /// What the distance from that extrapolation grows to. With a steady acceleration the error, after a time `b` beyond a
-    /// step that took `a`, grows as `b (a + b)`. That seen had the last step's time for `b`; the next one is taken to have
-    /// it for both. With `t = b / a` of the one seen the ratio is `2 t / (1 + t)`.
+    /// The factor from the observed residual to that of the next extrapolation. With a constant acceleration the error,
+    /// a time `b` beyond a step that took `a`, grows as `b (a + b)`. For the observed residual `b` was the last step's
+    /// time; for the next one both times are assumed to be the last step's. With `t = b / a` of the observed one the
+    /// factor is `2 t / (1 + t)`.
     #[cfg(feature = "bus")]
     pub(crate) fn growth(&self) -> f32 {
         let growth = 2.0 * self.t / (1.0 + self.t);
@@ -77,9 +78,9 @@ impl<'a, V: ?Sized> IncomingSurface<'a, V> {
 ///
 /// For each frame: [`begin`](Self::begin) once, then [`moved`](Self::moved) for each packet and
 /// [`advance`](Self::advance) as often as there is time, until it admits or refuses the frame. A frame may be abandoned
-/// at any moment, and another begun. [`published`](Self::published) follows once an admitted frame is published.
+/// at any time, and another begun. [`published`](Self::published) follows once an admitted frame is published.
 ///
-/// A check of one's own goes around the library's: here whole frames wait until somebody has confirmed them.
+/// A user's gate wraps the library's: in this example whole frames wait until somebody has confirmed them.
 ///
 /// ```
 /// use core::ops::Range;
@@ -130,10 +131,10 @@ impl<'a, V: ?Sized> IncomingSurface<'a, V> {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait Gate {
-    /// A frame begins, and the one before is forgotten unless it was published. O(1).
+    /// A frame begins; the previous one is discarded unless it was published. O(1).
     fn begin(&mut self, changed: FrameExtent);
 
-    /// These rows of the frame have come: each row at most once, in any order of packets. O(1).
+    /// These rows of the frame have arrived: each row at most once, packets in any order. O(1).
     fn moved(&mut self, rows: Range<u32>) {
         let _ = rows;
     }
@@ -144,7 +145,7 @@ pub trait Gate {
         false
     }
 
-    /// The frame that has begun is at this pose.
+    /// The current frame has this pose.
     #[doc(hidden)]
     #[cfg(feature = "bus")]
     fn place(&mut self, pose: RigidPose) {
@@ -154,7 +155,7 @@ pub trait Gate {
     /// Checks at most `work` rows and triangles that have arrived. Admission before the frame is complete has no
     /// effect.
     ///
-    /// # Errors
+    /// [`StretchError`] if the surface must not be published; it names the triangle or vertex.
     /// [`StretchError`] when the surface must not be published; it names the triangle or vertex.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
@@ -165,17 +166,17 @@ pub trait Gate {
     /// The admitted frame is now the published one.
     fn published(&mut self) {}
 
-    /// Smallest and largest weight of a mode that may be published. With `None`, as for most gates, the receiver takes
-    /// frames of vertices; with a range it takes only modal frames. The rows of a modal frame are
-    /// [`Vec3`](crate::glam::Vec3)s with a weight each, as `x`.
+    /// Smallest and largest admitted weight of a mode. With `None`, as for most gates, the receiver takes frames of
+    /// vertices; with a range it takes only modal frames. The rows of a modal frame are [`Vec3`](crate::glam::Vec3)s
+    /// with one weight each, as `x`.
     fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
         let _ = mode;
         None
     }
 
-    /// The farthest (mm) that any vertex may be from its position in a surface captured so long before: see
-    /// [`SurfaceLimits::speed`](crate::SurfaceLimits::speed) and
-    /// [`recovery_mm`](crate::SurfaceLimits::recovery_mm). Infinite for a gate that compares no frames.
+    /// Upper bound (mm) on the distance of any vertex from its position in a surface captured this much earlier: see
+    /// [`SurfaceLimits::speed`](crate::SurfaceLimits::speed) and [`recovery_mm`](crate::SurfaceLimits::recovery_mm).
+    /// Infinite for a gate that compares no frames.
     fn farthest(&self, elapsed: Millis) -> f32 {
         let _ = elapsed;
         f32::INFINITY
@@ -187,25 +188,25 @@ pub trait Gate {
         None
     }
 
-    /// The stretch at the end of the frame's extrapolation, once it is admitted. `None` where the gate measures none,
-    /// or it is beyond the limit.
+    /// The stretch at the end of the frame's extrapolation, once the frame is admitted. `None` if the gate does not
+    /// measure it, or it is beyond the limit.
     #[doc(hidden)]
     fn ahead(&self) -> Option<f32> {
         None
     }
 
-    /// The surface that the gate is for; the default knows nothing of it.
+    /// The facts of the gate's surface; the default has none.
     fn surface_facts(&self) -> SurfaceFacts {
         SurfaceFacts::default()
     }
 
-    /// The error (mm) of making the surface from the frame's rows: added to the frame's position error.
+    /// The error (mm) of computing the surface from the frame's rows: added to the frame's position error.
     fn position_error(&self) -> f32 {
         0.0
     }
 }
 
-/// Admits every surface, unmeasured. Answers then rely on the paper's assumption that the tissue keeps within the
+/// Admits every surface, unmeasured. Answers then rely on the paper's assumption that the tissue stays within the
 /// tree's stretch limit.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoGate;

@@ -1,22 +1,22 @@
 //! The check of one triangle.
 //!
-//! Let `f1` and `f2` lead from a triangle's centre to the other of its first two corners and to the third, as they are
-//! now, and `G` be their Gram matrix, `[f1.f1, f1.f2; f1.f2, f2.f2]`; `M` is the same at rest, from the tree's metric
+//! Let `f1` and `f2` be the current edges from a triangle's centre to the other of its first two corners and to the
+//! third, and `G` their Gram matrix, `[f1.f1, f1.f2; f1.f2, f2.f2]`; `M` is the same at rest, from the tree's metric
 //! section. The triangle's largest singular value is at most `sigma` exactly if `L M - G` is positive semidefinite for
 //! `L = sigma^2`: if its diagonal and its determinant are not negative. So the comparison with the largest `L` so far
-//! takes neither a root nor a division. Only a triangle that fails it has its value computed, and that value counts
+//! takes neither a root nor a division. Only for a triangle that fails it the value is computed, and that value is used
 //! only once it passes the same check.
 //!
 //! # Rounding
 //!
-//! Let `u = 2^-24`. The entries of `G` come from differences of coordinates: the diagonal's are off by at most `5 u` of
-//! themselves, the other by `5 u |f1| |f2|`. A difference `x = L a - g` adds two roundings, the comparison of the
-//! products two. If it holds, then, with `a` and `d` the diagonal of `M`, `G` is below `L (M + E)` with `|E11| <= 6.1 u
-//! a`, `|E22| <= 6.1 u d` and `|E12| <= 12.1 u sqrt(a d)`, so below `L (M + 18.2 u diag(a, d))`. Storing the
-//! off-diagonal entry of `M`, whose lowest bit is a mark, adds `2 u sqrt(a d)`. And `diag(a, d)` is below `M / (1 -
-//! |cos|)`, `cos` that of the angle at the centre. So the builder divides `M` by `1 + 21 u / (1 - |cos|)`, rounding
-//! down, and a triangle that passes is not stretched beyond `sqrt(L)`. It chooses the centre that makes this small. For
-//! edges 6.1 u is all.
+//! Let `u = 2^-24`. The entries of `G` come from differences of coordinates: the diagonal's have errors of at most
+//! `5 u` of themselves, the other of `5 u |f1| |f2|`. A difference `x = L a - g` adds two roundings, the comparison of
+//! the products two. If it holds, then, with `a` and `d` the diagonal of `M`, `G` is below `L (M + E)` with
+//! `|E11| <= 6.1 u a`, `|E22| <= 6.1 u d` and `|E12| <= 12.1 u sqrt(a d)`, so below `L (M + 18.2 u diag(a, d))`.
+//! Storing the off-diagonal entry of `M`, whose lowest bit is a flag, adds `2 u sqrt(a d)`. And `diag(a, d)` is below
+//! `M / (1 - |cos|)`, `cos` that of the angle at the centre. So the builder divides `M` by `1 + 21 u / (1 - |cos|)`,
+//! rounding down, and a triangle that passes is not stretched beyond `sqrt(L)`. It chooses the centre that makes this
+//! small. For edges the error is only 6.1 u.
 //!
 //! The builder avoids products that overflow or underflow; where it cannot, it stores a metric of zeros, which no
 //! triangle passes.
@@ -31,7 +31,7 @@ use crate::math::vec3x4::Vec3x4;
 /// Half a unit in the last place of 1.
 pub(super) const U: f32 = 1.0 / 16_777_216.0;
 
-/// The least square that is measured, that of a half: more shrinking makes no search faster, and products do not
+/// The least square that is measured, that of a half: a smaller one would make no search faster, and products do not
 /// underflow.
 pub(crate) const LEAST: f32 = 0.25;
 
@@ -48,10 +48,10 @@ impl Worst {
     }
 }
 
-/// The squares that a triangle's measure compares, now or at rest.
+/// The squares compared for a triangle, current or at rest.
 pub(super) type Squares = [f32; 3];
 
-/// A triangle as it is now: the edges from its centre to the other of its first two corners, and to the third.
+/// A triangle's current edges: from its centre to the other of its first two corners, and to the third.
 #[derive(Clone, Copy)]
 pub(super) struct Edges {
     pub first: Vec3,
@@ -60,7 +60,7 @@ pub(super) struct Edges {
 
 /// The measure of a path kind.
 pub(super) trait Measure {
-    /// The squares of a triangle as it is now.
+    /// The squares of a triangle's current edges.
     fn squares(now: Edges) -> Squares;
 
     /// Whether the stretch is certainly at most `sqrt(limit)`. False for NaN.
@@ -74,7 +74,7 @@ pub(super) trait Measure {
     /// `second` is positive.
     fn is_within(first: f32, second: f32, between: f32, now: Edges) -> bool;
 
-    /// The same of four triangles with the edges `now`, one bit each.
+    /// The same for four triangles with the edges `now`, one bit each.
     fn are_within(first: Vec4, second: Vec4, between: Vec4, now: [Vec3x4; 2]) -> u32;
 }
 
@@ -137,7 +137,7 @@ impl Measure for LongestEdge {
         let mut worst = 0.0;
         for (rest, now) in rest.iter().zip(now) {
             let ratio = now / rest;
-            // Written so that a NaN is kept.
+            // Written so that NaN is kept.
             if !(ratio <= worst) {
                 worst = ratio;
             }
@@ -157,8 +157,8 @@ impl Measure for LongestEdge {
     }
 }
 
-/// Least relative rounding up of a triangle's squared stretch. It is more than rounding requires, so that triangles
-/// stretched nearly as much pass the quick check: failing it takes several times as long.
+/// Least relative rounding up of a triangle's squared stretch. It is more than rounding requires, so that other
+/// triangles stretched nearly as much pass the quick check: the full check takes several times as long.
 const HEADROOM: f32 = 256.0 * U;
 
 /// The squared stretch of a triangle, rounded up, but not above the limit. If the triangle is not certainly within the
@@ -187,7 +187,6 @@ pub(crate) fn squared_limit(limit: f32) -> f32 {
     limit * limit * (1.0 - 2.0 * U)
 }
 
-/// The root of a square, rounded up.
 pub(crate) fn root_up(squared: f32) -> f32 {
     sqrt(squared) * (1.0 + 4.0 * U)
 }
@@ -199,14 +198,14 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// The limit's square is never above the exact one, and hardly below.
+        /// The limit's square is never above the exact one, and at most slightly below.
         #[test]
         fn a_limit_is_squared_downwards(limit in 1.0_f32..1e6) {
             let (exact, squared) = (f64::from(limit).powi(2), f64::from(squared_limit(limit)));
             prop_assert!(squared <= exact && squared >= exact * (1.0 - 5.0 * f64::from(U)));
         }
 
-        /// A root is never below the exact one, and hardly above.
+        /// A root is never below the exact one, and at most slightly above.
         #[test]
         fn a_root_is_taken_upwards(squared in LEAST..1e12) {
             let (exact, root) = (f64::from(squared).sqrt(), f64::from(root_up(squared)));

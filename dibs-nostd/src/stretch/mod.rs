@@ -36,7 +36,7 @@ use regions::{of_regions, region_rows};
 pub enum StretchError {
     /// The tree was emitted without its metric section.
     NoMetric,
-    /// The table does not have one row for each of the tree's vertices, or nodes.
+    /// The table does not have one row for each of the tree's vertices or nodes.
     VertexCount {
         /// Rows that the tree needs.
         expected: u32,
@@ -47,7 +47,7 @@ pub enum StretchError {
     Exceeded {
         /// The triangle.
         triangle: TriangleRow,
-        /// Its stretch; NaN or infinite if a position is, or if the triangle is too small at rest to be measured.
+        /// Its stretch; NaN or infinite if a position is, or if the triangle at rest is too small to be measured.
         stretch: f32,
         /// Its limit.
         limit: f32,
@@ -56,8 +56,8 @@ pub enum StretchError {
     ElementExceeded {
         /// The element.
         element: u32,
-        /// Its stretch; infinite if a node is not finite. Where elements have limits of their own it is divided by that one
-        /// and multiplied by the tree's.
+        /// Its stretch; infinite if a node is not finite. If elements have their own limits, it is divided by the
+        /// element's and multiplied by the tree's.
         stretch: f32,
         /// The tree's limit.
         limit: f32,
@@ -67,9 +67,9 @@ pub enum StretchError {
         /// The element.
         element: u32,
     },
-    /// A run of elements has shrunk below its limit: collapsed, or in another unit.
+    /// A range of elements has shrunk below its limit: collapsed, or in another unit.
     ElementsShrunk {
-        /// The first of them.
+        /// The first element of the range.
         element: u32,
         /// The least size allowed.
         limit: f32,
@@ -85,7 +85,7 @@ pub enum StretchError {
     InsideOut {
         /// Its volume (mm³): positive where triangles wind counterclockwise as seen from outside.
         volume: f32,
-        /// The volume of the rest shape, or of the first frame where the tree has none.
+        /// The volume of the rest shape, or of the first frame if the tree has none.
         reference: f32,
     },
     /// A vertex moved farther since the published frame than the limits on speed and recovery allow.
@@ -125,7 +125,7 @@ impl fmt::Display for StretchError {
                 write!(f, "the region of triangle {triangle} shrank below {limit} of its size")
             }
             Self::InsideOut { volume, reference } => {
-                write!(f, "the surface encloses {volume} where it should {reference}: inside out")
+                write!(f, "the surface is inside out: its volume is {volume}, expected {reference}")
             }
             Self::TooFast { vertex, step, limit } => {
                 write!(
@@ -140,18 +140,19 @@ impl fmt::Display for StretchError {
 
 impl core::error::Error for StretchError {}
 
-/// Measures the stretch of a whole frame at once: the tree's [`PathKind`](crate::PathKind) of every triangle, rounded
-/// up by the error of the f32 arithmetic and 2^-17 of itself. [`StretchMonitor`] measures the same in slices.
+/// Measures the stretch of a whole frame at once, by the tree's [`PathKind`](crate::PathKind) for every triangle,
+/// rounded up by the error of the f32 arithmetic and 2^-17 of itself. [`StretchMonitor`] measures the same in slices.
 ///
-/// The result is never below the true stretch of a triangle. It is above the largest by some ten parts in a million,
-/// and by more only for triangles nearly flat at rest (twice as much at an angle of 120 degrees, a thousandth at most).
-/// The rest shape of a triangle lower than 1/64 of its longest edge counts as that high, here and in the tree's radii.
+/// The result is never below the true stretch of a triangle. It exceeds the largest by some ten parts in a million, and
+/// by more only for triangles nearly flat at rest (twice as much at an angle of 120 degrees, a thousandth at most). The
+/// rest shape of a triangle lower than 1/64 of its longest edge counts as that high, here and in the tree's radii.
 ///
 /// Cost: linear in the triangles, about 35 floating point operations each, without root or division except for a
 /// triangle stretched more than all before it.
 ///
 /// # Errors
-/// [`StretchError::Exceeded`] names the first triangle beyond its limit; the others name the cause of a missing
+/// [`StretchError::Exceeded`] for the first triangle beyond its limit; other errors give the cause of a missing
+/// measurement.
 /// measurement.
 pub fn measure_stretch<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,

@@ -15,29 +15,29 @@ use super::{
 use crate::surface::{Millis, MotionUnit, REGIONS, SurfaceBlend, VertexTable};
 use crate::tree::{Index, SurfaceFacts, Tree, TriangleRow};
 
-/// Blocks of vertex rows, at most: they mark the rows that a partial frame moved.
+/// Largest number of blocks of vertex rows, in which moved rows of a partial frame are marked.
 const BLOCKS: usize = 32;
 
 /// Measures every frame before it is published, a few triangles at a time. This [`Gate`] refuses surfaces stretched,
 /// shrunk or moved beyond their limits, and gives the query the measured stretch.
 ///
-/// A whole frame is measured as it arrives: a triangle is checked once its corners have come, and rows are ordered so
+/// A whole frame is measured as it arrives: a triangle is checked once its corners have arrived, and rows are sorted so
 /// that corners arrive along with their triangles. Of a partial frame only the [`REGIONS`] with a moved corner are
-/// measured, once it is complete; the other regions keep their stretch. A region begins with its worst triangle of the
+/// measured, once it is complete; the other regions keep their stretch. A region starts with its worst triangle of the
 /// last time, so that few others fail the quick check. The result is that of
-/// [`measure_stretch`](super::measure_stretch) on the whole surface, but for a few parts in a million of rounding,
-/// which depend on the triangle that a region began with. The same frames always give the same bits.
+/// [`measure_stretch`](super::measure_stretch) on the whole surface, except for a few parts in a million of rounding
+/// that depend on the triangle with which a region started. The same frames always give the same bits.
 ///
-/// The rows that a frame brings are compared with the published ones, and the volume that a closed surface encloses
-/// with that of the rest shape; [`SurfaceLimits`] lists the refusals.
+/// The rows of a frame are compared with the published ones, and the volume that a closed surface encloses with that of
+/// the rest shape; [`SurfaceLimits`] lists the refusals.
 ///
-/// With `SURFACES` = 2 ([`continuous`](StretchMonitor::continuous)) it measures the end of the frame's extrapolation, too:
-/// `now + 2 (now - before)`, with the published frame before. By convexity the two bound the stretch of all surfaces on
-/// the way.
+/// With `SURFACES` = 2 ([`continuous`](StretchMonitor::continuous)) it also measures the end of the frame's
+/// extrapolation, `now + 2 (now - before)`, with the published frame as `before`. By convexity the two bound the
+/// stretch of all surfaces between.
 ///
-/// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: 800 bytes
-/// at most, whatever the surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes two passes over
-/// the triangles.
+/// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: at most 800
+/// bytes for any surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes two passes over the
+/// triangles.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -76,9 +76,8 @@ pub struct StretchMonitor<'t, I, const SURFACES: usize = 1> {
     changed: FrameExtent,
     /// The measurement of the frame, and that of its extrapolation.
     passes: [Pass; SURFACES],
-    /// The stretch of the extrapolation of the frame in work; NaN unless measured, and within the limit.
+    /// The stretch of the current frame's extrapolation; NaN unless measured and within the limit.
     ahead: f32,
-    /// The extrapolation is beyond the limit.
     is_beyond: bool,
     speed: f32,
     recovery: f32,
@@ -86,27 +85,27 @@ pub struct StretchMonitor<'t, I, const SURFACES: usize = 1> {
     /// The square of each region's size at rest.
     rest: [f32; REGIONS],
     volume: Volume,
-    /// Blocks of rows still to be compared with the published ones, and the next row of the first of them.
+    /// Blocks of rows still to be compared with the published ones, and the next row of the first block.
     blocks_left: u32,
     next_row: u32,
 }
 
 impl<'t, I: Index> StretchMonitor<'t, I> {
-    /// A monitor for surfaces of this tree, with the limits that [`SurfaceLimits::reach_mm`] begins with.
+    /// A monitor for surfaces of this tree, with the default limits of [`SurfaceLimits::reach_mm`].
     ///
     /// # Errors
-    /// [`StretchError::NoMetric`] where the tree was emitted without its metric.
+    /// [`StretchError::NoMetric`] if the tree was emitted without its metric.
     pub fn new(tree: &Tree<'t, I>) -> Result<Self, StretchError> {
         Self::with_passes(tree)
     }
 }
 
 impl<'t, I: Index> StretchMonitor<'t, I, 2> {
-    /// The same with the frames' extrapolations. An extrapolation beyond the tree's limit is no error: the surface is
-    /// held then.
+    /// The same with the frames' extrapolations. An extrapolation beyond the tree's limit is no error: then the surface
+    /// is held instead.
     ///
     /// # Errors
-    /// [`StretchError::NoMetric`] where the tree was emitted without its metric.
+    /// [`StretchError::NoMetric`] if the tree was emitted without its metric.
     pub fn continuous(tree: &Tree<'t, I>) -> Result<Self, StretchError> {
         Self::with_passes(tree)
     }
@@ -155,7 +154,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         })
     }
 
-    /// The same with these limits on speed, recovery and size. The assembler limits the reach:
+    /// The same with these limits on speed, recovery and size. The assembler checks the reach:
     /// [`Assembler::for_tree`](crate::Assembler::for_tree).
     #[must_use]
     pub const fn limits(mut self, limits: SurfaceLimits) -> Self {
@@ -171,7 +170,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         &self.tree
     }
 
-    /// Most rows and triangles checked for one frame: the sum of its slices' work.
+    /// Upper bound on the rows and triangles checked for one frame: the sum of its slices' work.
     #[must_use]
     pub const fn whole_work(&self) -> u32 {
         let rows = self.tree.vertex_count().saturating_add(self.tree.triangle_count());
@@ -224,7 +223,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         Ok((work, true))
     }
 
-    /// Measures the extrapolation of arrived rows, with at most `work` triangles. Returns whether that is over.
+    /// Measures the extrapolation of arrived rows, with at most `work` triangles. Returns whether it is finished.
     fn look_ahead<V: VertexTable + ?Sized>(
         &mut self,
         before: Option<&V>,
@@ -256,7 +255,7 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
         (self.ahead, self.is_beyond) = (f32::NAN, false);
         self.volume.begin(changed == FrameExtent::Whole);
         for (number, pass) in self.passes.iter_mut().enumerate() {
-            // What a partial frame leaves as it was has moved before, so its extrapolation is another one.
+            // Rows that a partial frame does not change moved before, so their extrapolation changes too.
             pass.begin(changed == FrameExtent::Whole || number > 0);
         }
     }
@@ -290,11 +289,11 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
             return Ok(Admission::Pending);
         }
         let (work, is_compared) = self.compare(arriving, work)?;
-        // Half of the work each, so that both keep up with the frame.
+        // Half of the work for each, so that both keep up with the frame.
         let ahead = if SURFACES > 1 { work / 2 } else { 0 };
         let (tree, size) = (&self.tree, (self.shrinkage, &self.rest));
         let Some(own) = self.passes.first_mut() else { return Ok(Admission::Pending) };
-        // What a partial frame moved replaces what was there.
+        // Moved rows of a partial frame replace the published ones.
         let replaced = if self.changed == FrameExtent::Partial { before } else { None };
         let volume = &mut self.volume;
         let sum = |rows| volume.add(tree, surface, replaced, rows);
@@ -333,8 +332,8 @@ impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
     }
 }
 
-/// The square of the edge from a triangle's centre to its third corner at rest. The metric has it times the square of the
-/// triangle's limit as a part of the tree's.
+/// The squared edge from a triangle's centre to its third corner at rest. The metric stores it times the square of the
+/// ratio of the triangle's limit to the tree's.
 fn squared_edge<I: Index>(tree: &Tree<'_, I>, row: u32) -> f32 {
     let [.., second] = tree.metric(row).map_or([0.0; 3], |metric| metric.squares);
     let limit = tree.stretch_limit(TriangleRow(row)).unwrap_or(tree.stretch());

@@ -11,18 +11,17 @@ use super::StretchError;
 use crate::math::sqrt::sqrt;
 use crate::surface::{Millis, VertexTable};
 
-/// Most that a vertex may move in this time (mm), at this speed and never farther than `recovery`; infinite without
-/// either.
+/// Upper bound (mm) on a vertex's motion in this time, at this speed and at most `recovery`; infinite without either.
 pub(crate) const fn farthest(speed: f32, recovery: f32, elapsed: Millis) -> f32 {
-    // One millisecond more than the time, because the clock counts whole ones.
+    // Plus one millisecond, because the clock counts whole ones.
     let way = speed * (elapsed.0 as f32 + 1.0);
-    // A speed or distance of NaN refuses every frame, and so does one below zero, whose square would be a limit.
+    // A speed or distance that is NaN or negative refuses every frame; the square of a negative one would be a limit.
     let most = if way <= recovery || way.is_nan() { way } else { recovery };
     if most < 0.0 { f32::NAN } else { most }
 }
 
-/// The largest squared distance of these rows from their previous positions, or `largest` if that is larger. NaN where
-/// a position is NaN.
+/// The largest squared distance of these rows from their previous positions, or `largest` if larger. NaN if a position
+/// is NaN.
 #[inline(never)]
 pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
     now: &V,
@@ -33,7 +32,7 @@ pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
     for row in rows {
         let (Some(now), Some(before)) = (now.position(row), before.position(row)) else { break };
         let squared = (now - before).length_squared();
-        // Written so that a NaN is kept.
+        // Written so that NaN is kept.
         if !(squared <= largest) {
             largest = squared;
         }
@@ -41,8 +40,8 @@ pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
     largest
 }
 
-/// The largest squares of the last step of these rows, and of its difference from `t` of the step before; or
-/// `largest` and `off` if those are larger. NaN where a position is NaN.
+/// The largest squares of the last step of these rows, and of its difference from `t` times the previous step; or
+/// `largest` and `off` if larger. NaN if a position is NaN.
 ///
 /// The difference is that of two steps, not of two positions, because a step far from the origin is rounded less than a
 /// position.
@@ -60,7 +59,7 @@ pub(crate) fn largest_change<V: VertexTable + ?Sized>(
         let step = now - before;
         let change = step - (before - earlier) * t;
         let [step, change] = [step, change].map(Vec3::length_squared);
-        // Written so that a NaN is kept.
+        // Written so that NaN is kept.
         if !(step <= largest) {
             largest = step;
         }
@@ -71,7 +70,7 @@ pub(crate) fn largest_change<V: VertexTable + ?Sized>(
     (largest, off)
 }
 
-/// Names the first of these rows that moved farther than `limit`.
+/// The error for the first of these rows that moved farther than `limit`.
 #[cold]
 pub(crate) fn too_fast<V: VertexTable + ?Sized>(
     now: &V,

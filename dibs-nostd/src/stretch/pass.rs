@@ -8,24 +8,23 @@ use super::{StretchError, rows};
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 use crate::tree::{Index, Tree, TriangleRow};
 
-/// No row.
 const NONE: u32 = u32::MAX;
 
 /// All regions, one bit each.
 pub(super) const ALL: u32 = u32::MAX;
 const _: () = assert!(REGIONS == u32::BITS as usize);
 
-/// The worst triangle of each region, and how far the measurement has come.
+/// The worst triangle of each region, and the progress of the measurement.
 #[derive(Clone, Debug)]
 pub(super) struct Pass {
     /// Regions still to be measured.
     left: u32,
-    /// Regions whose entry below is that of an abandoned frame or the one in work. The next partial frame measures
-    /// them, changed or not.
+    /// Regions whose entry below is from an abandoned or the current frame. The next partial frame measures them,
+    /// changed or not.
     unpublished: u32,
-    /// The next triangle of the region that is being measured.
+    /// The next triangle of the current region.
     next: u32,
-    /// The sum of the squares of an edge of each triangle of that region.
+    /// The sum of the squares of one edge of each triangle of the current region.
     size: f32,
     regions: [Worst; REGIONS],
 }
@@ -41,7 +40,7 @@ impl Pass {
         }
     }
 
-    /// Begins with all regions, or with those whose entry is of no published frame.
+    /// Begins with all regions, or with those whose entry is not from a published frame.
     pub const fn begin(&mut self, is_whole: bool) {
         self.next = NONE;
         self.left = if is_whole { ALL } else { self.unpublished };
@@ -52,14 +51,14 @@ impl Pass {
         self.left |= regions;
     }
 
-    /// The entries are those of the published frame.
+    /// Marks the entries as those of the published frame.
     pub const fn published(&mut self) {
         self.unpublished = 0;
     }
 
     /// Measures at most `work` triangles whose corners are below row `ready`. Returns the work left, and whether all
     /// regions are done. A region must not shrink below `shrinkage` of its size, whose square at rest is in `rest`.
-    /// `measured` is given the rows, each once.
+    /// `measured` is called with the rows, each once.
     pub fn advance<I: Index, V: VertexTable + ?Sized>(
         &mut self,
         tree: &Tree<'_, I>,
@@ -118,7 +117,6 @@ impl Pass {
     }
 }
 
-/// The rows of a region's triangles.
 fn rows_of<I: Index>(tree: &Tree<'_, I>, region: u32) -> Range<u32> {
     let rows = region_rows(tree);
     let triangles = tree.triangle_count();

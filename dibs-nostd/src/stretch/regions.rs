@@ -1,4 +1,4 @@
-//! Regions: equal runs of triangle rows, each measured by itself.
+//! Regions: equal ranges of triangle rows, each with its own measurement.
 
 use super::kernel::{Worst, root_up};
 use crate::surface::{MeasuredStretch, REGIONS, region_sigma};
@@ -9,7 +9,7 @@ pub(super) const fn region_rows<I: Index>(tree: &Tree<'_, I>) -> u32 {
     tree.triangle_count().div_ceil(REGIONS as u32)
 }
 
-/// The measurement of a whole frame from the worst triangle of each region.
+/// The measurement of a whole frame, from the worst triangle of each region.
 pub(super) fn of_regions<I: Index>(
     tree: &Tree<'_, I>,
     regions: &[Worst; REGIONS],
@@ -30,7 +30,7 @@ pub(super) fn of_regions<I: Index>(
     let mut codes = [0; REGIONS];
     for (code, region) in codes.iter_mut().zip(regions) {
         let own = within(region.squared);
-        // The least code whose stretch is at least `own`, whichever way the division rounds.
+        // The least code whose stretch is at least `own`, however the division rounds.
         let mut part = ((own / sigma * 256.0) as u8).saturating_sub(1);
         for _ in 0..2 {
             if region_sigma(sigma, part) < own {

@@ -1,8 +1,8 @@
 //! The check of many triangles, row by row: the hot loop of a measurement.
 //!
-//! Corners shared with the triangle before are carried over ([`Join`]). So is an edge's slack under the largest square
-//! `L` so far: `L r - g`, with its squares `r` at rest and `g` now. Both triangles of the edge have the same `r`,
-//! unless each triangle has its own limit (a tree that is not `UNIFORM`).
+//! Corners shared with the previous triangle are carried over ([`Join`]). So is an edge's slack under the largest
+//! square `L` so far: `L r - g`, with the squared length `r` at rest and `g` now. Both triangles of the edge have the
+//! same `r`, unless each triangle has its own limit (a tree that is not `UNIFORM`).
 //!
 //! One file, because the compiler inlines the loop as a whole.
 
@@ -20,12 +20,12 @@ use crate::surface::VertexTable;
 use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
 use crate::tree::{Index, Tree, TriangleRow, format};
 
-/// Whether the processor has vector registers and loads unaligned words. Elsewhere four triangles at a time would take more
+/// Whether the processor has vector registers and loads unaligned words. Elsewhere four triangles at a time take more
 /// instructions, not fewer.
 const WIDE: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
 
-/// Checks the triangles of `rows` up to the first with a corner at row `ready` or beyond. Raises `worst` where one is
-/// stretched more, and adds to `size` the square of an edge of each. Returns the next row to check.
+/// Checks the triangles of `rows` up to the first with a corner at row `ready` or beyond. Raises `worst` at a triangle
+/// stretched more, and adds the square of one edge of each triangle to `size`. Returns the next row to check.
 pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     surface: &V,
@@ -37,7 +37,7 @@ pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
     match tree.paths() {
         PathKind::Surface => run::<I, V, SingularValue>(tree, surface, rows, ready, worst, size),
         PathKind::EdgePath => run::<I, V, LongestEdge>(tree, surface, rows, ready, worst, size),
-        // Its elements are measured.
+        // For this kind elements are measured, not triangles.
         PathKind::Volume => Err(StretchError::NoMetric),
     }
 }
@@ -69,7 +69,7 @@ pub(super) fn look<I: Index, V: VertexTable + ?Sized>(
     true
 }
 
-/// [`scan`] for one measure: [`measure`], then the reason if it stopped early.
+/// [`scan`] for one measure: [`measure`], then the reason for an early end.
 fn run<I: Index, V: VertexTable + ?Sized, M: Measure>(
     tree: &Tree<'_, I>,
     surface: &V,
@@ -80,7 +80,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure>(
 ) -> Result<u32, StretchError> {
     let triangles = I::corners(tree.sections().triangles);
     let bytes = tree.sections().metric;
-    // Aligned words take fewer instructions than bytes, where the processor does not load unaligned ones as well.
+    // Aligned words take fewer instructions than bytes, unless the processor loads unaligned words as fast.
     let row = match bytemuck::try_cast_slice::<u8, u32>(bytes) {
         Ok(words) if !WIDE => {
             let (metrics, _) = words.as_chunks();
@@ -119,7 +119,7 @@ fn run<I: Index, V: VertexTable + ?Sized, M: Measure>(
     Err(exceeded(tree, row, squared_stretch::<M>(&metric.squares, now, limit)))
 }
 
-/// [`measure`] on rows of the metric section, undecoded; `None` where there are none.
+/// [`measure`] on undecoded rows of the metric section; `None` if there are none.
 #[expect(
     clippy::too_many_arguments,
     reason = "arguments stay in registers, fields of a struct do not"
@@ -155,7 +155,6 @@ fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits>(
 
 /// An undecoded row of the metric section.
 trait MetricBits {
-    /// The bits of its numbers.
     fn bits(&self) -> [u32; 3];
 }
 
@@ -175,7 +174,7 @@ impl MetricBits for [u8; METRIC_BYTES] {
     }
 }
 
-/// The state passed from a triangle to the next.
+/// The state passed from one triangle to the next.
 #[derive(Clone, Copy)]
 struct Before {
     centre: Vec3,
@@ -184,12 +183,11 @@ struct Before {
     edge: Vec3,
     /// The edge's slack under the largest square so far.
     left: f32,
-    /// The edge's square.
     square: f32,
 }
 
-/// Measures triangles, the first of them in row `first`, up to one that has a corner at row `ready` or beyond,
-/// or that is not certainly within `limit`. Returns its row.
+/// Measures triangles, starting in row `first`, up to one with a corner at row `ready` or beyond, or not certainly
+/// within `limit`. Returns its row.
 #[inline(never)]
 #[expect(
     clippy::too_many_arguments,
@@ -239,7 +237,7 @@ fn measure<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits, const U
     (row, worst, size)
 }
 
-/// The surface to measure: vertices below row `ready`, no triangle beyond `limit`, a square.
+/// The surface to measure: vertices below row `ready`, triangles up to `limit` (a square).
 struct Table<'a, V: ?Sized> {
     surface: &'a V,
     ready: u32,
@@ -247,7 +245,7 @@ struct Table<'a, V: ?Sized> {
 }
 
 impl<V: VertexTable + ?Sized> Table<'_, V> {
-    /// The state before the first triangle of a run, from that triangle's first two corners.
+    /// The state before the first triangle of a range, from that triangle's first two corners.
     #[inline(always)]
     fn before<I: Index>(
         &self,
@@ -261,7 +259,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let edge = if metric.join == Join::Flip { centre - other } else { other - centre };
         let [rest, ..] = metric.squares;
         let left = largest * rest - edge.length_squared();
-        // A NaN fails the quick check, so that `look_closer` measures the triangle.
+        // NaN fails the quick check, so that `look_closer` measures the triangle.
         let edge = if left > 0.0 { edge } else { Vec3::NAN };
         Some(Before { centre, third: centre, edge, left, square: 0.0 })
     }
@@ -299,7 +297,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let Before { mut centre, third, edge: mut first, mut left, .. } = before;
         let [mark, between, second] = metric.bits();
         let (rest_between, rest_second) = (f32::from_bits(between), f32::from_bits(second));
-        // The marks of `Join`, the commonest first: written out, since a match would make an enum of them.
+        // The codes of `Join`, the most frequent first: written out, since a match would make an enum of them.
         if mark as i32 >= 0 {
             if mark & 1 == 0 {
                 let [a, b] = self.first_two::<I>(corners)?;
@@ -357,7 +355,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let [.., rest_second] = metric.squares;
         let square = now.second.length_squared();
         let left = worst.squared * rest_second - square;
-        // The triangle is within the largest now, so a value below 0 is rounding.
+        // The triangle is now within the largest square, so a value below 0 is rounding.
         let left = if left > 0.0 { left } else { 0.0 };
         Some((Before { centre, third, edge: now.second, left, square }, worst))
     }
@@ -383,7 +381,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     }
 }
 
-/// A triangle's edges; `None` while a corner is not below row `ready`.
+/// A triangle's edges; `None` if a corner is not below row `ready`.
 fn edges<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     surface: &V,

@@ -1,9 +1,9 @@
-//! The volume that a closed surface encloses, whose sign tells a surface from its inside-out image.
+//! The volume that a closed surface encloses, whose sign distinguishes a surface from its inside-out image.
 //!
 //! A surface can be turned inside out through a plane, slowly and within every limit on stretch, size and speed: only
-//! the sign of its volume shows it. The volume is the sum, over the triangles, of the signed volume between each and its
-//! shadow on a plane (the divergence theorem for the field (0, 0, z)). A whole frame sums up all triangles; a partial one
-//! replaces those of the regions that it moved.
+//! the sign of its volume shows it. The volume is the sum, over the triangles, of the signed volume between each
+//! triangle and its projection onto a plane (the divergence theorem for the field (0, 0, z)). A whole frame sums over
+//! all triangles; a partial frame replaces the terms of the regions that it moved.
 
 // Requirement: F-03
 
@@ -15,28 +15,27 @@ use super::StretchError;
 use crate::surface::VertexTable;
 use crate::tree::{Index, Tree};
 
-/// Part of the reference's volume by which the sign may be the other one: a flat surface has no volume but the rounding
-/// of its vertices.
+/// Fraction of the reference volume by which the sign may be opposite: a flat surface has only the volume of its
+/// vertices' rounding.
 const FLAT: f32 = 1.0 / 64.0;
 
-/// The least volume that has a sign, as a part of the sum of its terms' sizes: a surface that is flat at rest has none but
-/// its rounding.
+/// The least volume with a sign, as a fraction of the sum of its terms' absolute values: a surface that is flat at rest
+/// has only rounding.
 const LEAST: f32 = 1.0 / 4096.0;
 
-/// The volume of the frame in work, in mm³, and of the published one.
+/// The volume of the current frame, in mm³, and of the published one.
 #[derive(Clone, Debug)]
 pub(super) struct Volume {
-    /// The sum of the terms' sizes.
+    /// The sum of the terms' absolute values.
     terms: f32,
     work: f32,
     published: f32,
-    /// The volume at rest, or that of the first frame where the tree has no rest shape. 0 if not known, and as long as
-    /// it has no sign.
+    /// The volume at rest, or of the first frame if the tree has no rest shape. 0 while unknown or without a sign.
     reference: f32,
 }
 
 impl Volume {
-    /// The watch on a surface of this tree.
+    /// The volume check for surfaces of this tree.
     ///
     /// Cost: a pass over the triangles, if the surface is closed and the tree has its rest shape.
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
@@ -54,7 +53,7 @@ impl Volume {
         (self.terms, self.work) = (0.0, if is_whole { 0.0 } else { self.published });
     }
 
-    /// Adds triangles, in place of those of the surface `before` if there is one.
+    /// Adds triangles, replacing those of the surface `before` if there is one.
     pub fn add<I: Index, V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
         &mut self,
         tree: &Tree<'_, I>,
@@ -65,7 +64,7 @@ impl Volume {
         if !tree.is_closed() {
             return;
         }
-        // Near the surface, so that the sum rounds little.
+        // A plane near the surface, so that the sum rounds little.
         let height = tree.rest_position(0).unwrap_or_default().z;
         let (mut sum, mut terms) = (0.0, 0.0);
         let count = rows.end.saturating_sub(rows.start);
@@ -82,7 +81,7 @@ impl Volume {
         self.terms += terms / 6.0;
     }
 
-    /// Whether the frame in work is not inside out.
+    /// Whether the current frame is not inside out.
     pub fn check(&self) -> Result<(), StretchError> {
         let Self { work: volume, reference, .. } = *self;
         let kept = if reference < 0.0 { -volume } else { volume };
@@ -92,7 +91,7 @@ impl Volume {
         Ok(())
     }
 
-    /// The frame in work is the published one.
+    /// Makes the current frame the published one.
     pub fn published(&mut self) {
         self.published = self.work;
         if self.reference == 0.0 {
@@ -100,13 +99,12 @@ impl Volume {
         }
     }
 
-    /// The volume of the frame in work; 0 if it is too small to have a sign.
+    /// The volume of the current frame; 0 if it is too small to have a sign.
     fn significant(&self) -> f32 {
         if self.work.abs() > LEAST * self.terms { self.work } else { 0.0 }
     }
 }
 
-/// The rest shape of a tree.
 struct Rest<'r, 't, I>(&'r Tree<'t, I>);
 
 impl<I: Index> VertexTable for Rest<'_, '_, I> {
@@ -123,7 +121,7 @@ fn at<V: VertexTable + ?Sized>(surface: &V, [a, b, c]: [u32; 3]) -> Option<[Vec3
     Some([surface.position(a)?, surface.position(b)?, surface.position(c)?])
 }
 
-/// Six times the signed volume between a triangle and its shadow on the horizontal plane at this height.
+/// Six times the signed volume between a triangle and its projection onto the horizontal plane at this height.
 fn six_volumes([a, b, c]: [Vec3; 3], height: f32) -> f32 {
     let (ab, ac) = (b - a, c - a);
     (a.z + b.z + c.z - 3.0 * height) * (ab.x * ac.y - ab.y * ac.x)

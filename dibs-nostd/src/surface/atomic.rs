@@ -6,8 +6,8 @@ pub(crate) use loom::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 #[cfg(not(loom))]
 pub(crate) use unmodelled::{AtomicBool, AtomicU32, Ordering};
 
-/// Those that no model checker follows. With the feature `portable-atomic` on a processor without compare-and-swap, each change
-/// by what was read masks interrupts; a load and a store are the processor's.
+/// Atomics that the model checker does not track. With the feature `portable-atomic`, on a processor without
+/// compare-and-swap, each read-modify-write masks interrupts; loads and stores are the processor's.
 pub(crate) mod unmodelled {
     #[cfg(not(feature = "portable-atomic"))]
     pub(crate) use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};

@@ -12,27 +12,28 @@ use super::{MeasuredStretch, Millis};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameLabel {
-    /// Number of the frame, given by the sender; wraps.
+    /// Number of the frame, set by the sender; wraps.
     pub epoch: u32,
-    /// Arrival of the frame's first packet, less the age that the surface then had, on the receiver's clock (wraps).
+    /// Arrival of the frame's first packet on the receiver's clock, less the surface's age at sending; wraps.
     pub received: Millis,
-    /// Largest distance of a vertex from the sender's position, in mm: the quantisation on the wire. A separation is
-    /// off by at most as much.
+    /// Largest distance of a vertex from the sender's position, in mm, by quantisation on the wire. It bounds the
+    /// resulting error of a separation.
     pub position_error: f32,
     /// Measured stretch of the frame against the rest shape; `None` if not measured.
     pub stretch: Option<MeasuredStretch>,
 }
 
-/// The surface after a frame.
+/// The stretch of a frame's extrapolation, and the frame's distance from the previous extrapolation.
 #[derive(Clone, Copy, Debug)]
 pub struct PredictionCheck {
     /// The largest stretch at the end of its extrapolation; NaN unless measured, and within the tree's limit.
     pub sigma: f32,
-    /// Largest distance (mm) of a vertex of this frame from its extrapolation by the two frames before; NaN if unknown.
+    /// Largest distance (mm) of a vertex of this frame from its extrapolation by the two previous frames; NaN if
+    /// unknown.
     pub shown: f32,
-    /// Units of the odometer from the frame before to that extrapolation, along the step of those two.
+    /// Odometer units from the previous frame to that extrapolation, along the step of the two previous frames.
     pub passed: u32,
-    /// Units from there to this frame, at most; the largest number if unknown.
+    /// Upper bound on the units from there to this frame; the largest number if unknown.
     pub off: u32,
 }
 
@@ -84,7 +85,7 @@ impl Position {
     }
 }
 
-/// The facts about the frame in a buffer. All zero at start, so that memory of zeros is one.
+/// The facts about the frame in a buffer. All zero at start, so that zeroed memory is valid.
 #[derive(Debug)]
 #[repr(C)]
 pub struct Head {
@@ -95,13 +96,12 @@ pub struct Head {
     stretch: [AtomicU32; MeasuredStretch::WORDS],
     /// The odometer's reading, all zero if there is none.
     motion: [AtomicU32; MotionReading::WORDS],
-    /// The numbers of [`PredictionCheck`].
     ahead: [AtomicU32; 4],
 }
 
 #[cfg_attr(not(loom), expect(clippy::new_without_default, reason = "as its buffers"))]
 impl Head {
-    /// Of no frame.
+    /// Before the first frame.
     #[cfg(not(loom))]
     #[must_use]
     pub const fn new() -> Self {
@@ -154,7 +154,7 @@ impl Head {
         }
     }
 
-    /// That of a labelled frame.
+    /// The prediction check of a labelled frame.
     pub(super) fn ahead(&self) -> PredictionCheck {
         let [sigma, shown, passed, off] =
             self.ahead.each_ref().map(|word| word.load(Ordering::Relaxed));
@@ -194,7 +194,7 @@ impl Head {
     }
 }
 
-/// One buffer, wherever it is.
+/// One buffer, in memory of any kind.
 #[derive(Clone, Copy, Debug)]
 pub struct Buffer<'m> {
     /// The facts about its frame.

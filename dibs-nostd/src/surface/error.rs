@@ -22,7 +22,7 @@ impl core::error::Error for SplitError {}
 pub struct OutOfTableError {
     /// The vertex.
     pub vertex: u32,
-    /// Vertices of the table.
+    /// Number of vertices in the table.
     pub vertices: u32,
 }
 
@@ -41,7 +41,7 @@ impl core::error::Error for OutOfTableError {}
 pub enum PublishError {
     /// Vertices of this frame were never written.
     Incomplete {
-        /// Vertices missing.
+        /// Number of missing vertices.
         missing: u32,
     },
     /// A read is in progress.

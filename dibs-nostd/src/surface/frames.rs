@@ -1,9 +1,9 @@
 //! The double buffer between the bus and the control tick: complete frames only, never torn.
 //!
 //! One side writes vertices into the back buffer, the other reads the front buffer, and one atomic word states which
-//! buffer is in front. Of three buffers the third keeps the frame before, so that the surface between the two is known.
-//! The whole module is safe code: positions are stored as the bits of `f32` in relaxed atomics, which compile to plain
-//! loads and stores.
+//! buffer is in front. With three buffers the third keeps the previous frame, so that the surface between the two is
+//! known. The whole module is safe code: positions are stored as the bits of `f32` in relaxed atomics, which compile to
+//! plain loads and stores.
 //!
 //! # Why no read is torn
 //!
@@ -12,22 +12,22 @@
 //!
 //! - A read begins with one `fetch_or` that sets READING and returns the number of the front buffer. It ends with one
 //!   `fetch_and` that clears READING.
-//! - A publication is one compare-exchange that moves the front on by one buffer and expects READING to be
-//!   clear. So the front buffer never changes while a read is in progress, and the writer writes
-//!   to the back buffer only, which is the one after it. Of three buffers, the one after that holds the frame before.
+//! - A publication is one compare-exchange that makes the next buffer the front and expects READING to be clear. So the
+//!   front buffer never changes while a read is in progress, and the writer writes only to the back buffer, the next
+//!   after the front. Of three buffers, the one after that holds the previous frame.
 //!
 //! Ordering: the compare-exchange releases the writer's stores, and the `fetch_or` acquires them, so a read sees the
 //! whole frame. The `fetch_and` releases the reader's loads, and the next compare-exchange acquires them, so the
-//! writer's next stores, which go to a buffer that was readable before, come after every load of the last read. Both
-//! hold on any number of cores.
+//! writer's next stores, which go to a buffer that was readable before, follow every load of the last read. Both hold
+//! on any number of cores.
 //!
 //! # Who waits
 //!
-//! Nobody. The reader takes two atomic operations a read, whatever the writer does. During a read the writer gets
+//! Nobody. The reader takes two atomic operations per read, whatever the writer does. During a read the writer gets
 //! [`PublishError::Busy`], keeps its frame, and publishes it at a later call. This never happens on one core where the
-//! control tick preempts the writer and finishes its read before it returns. (On ARMv7-M an atomic operation repeats
-//! when an exception comes between its load and its store: at most once an exception, and never in the handler of
-//! highest priority.)
+//! control tick preempts the writer and finishes its read before it returns. (On ARMv7-M an atomic operation repeats if
+//! an exception occurs between its load and its store: at most once per exception, and never in the handler of highest
+//! priority.)
 
 // Requirement: F-01
 
@@ -48,11 +48,11 @@ pub(super) const READING: u32 = 4;
 /// State word, bit 3: the front buffer holds a frame.
 const PUBLISHED: u32 = 8;
 
-/// A double buffer of `N` vertex positions, meant for a `static`. With 3 `BUFFERS` it keeps the frame before the
-/// published one, too, so that a frame that is read has [`interpolated`](crate::FrameGuard::interpolated) and
+/// A double buffer of `N` vertex positions, meant for a `static`. With 3 `BUFFERS` it also keeps the frame before the
+/// published one, so that a read frame has [`interpolated`](crate::FrameGuard::interpolated) and
 /// [`extrapolated`](crate::FrameGuard::extrapolated) surfaces.
 ///
-/// RAM: 12 bytes a vertex and buffer, plus some 50 a buffer. All zero at start, so it lies in `.bss`.
+/// RAM: 12 bytes for each vertex and buffer, plus some 50 for each buffer. All zero at start, so it lies in `.bss`.
 ///
 /// ```
 /// use dibs_nostd::{
@@ -129,18 +129,18 @@ impl<const N: usize, const BUFFERS: usize> Frames<N, BUFFERS> {
     }
 }
 
-/// The buffers of a surface in anybody's memory, and their state: those of [`Frames`], or of the C interface. All of it
-/// must be zero at first, and the buffers of one size.
+/// The buffers of a surface in the caller's memory, and their state: those of [`Frames`], or of the C interface. All
+/// memory must be zero at first, and the buffers of equal size.
 #[derive(Clone, Copy, Debug)]
 pub struct Buffers<'m> {
     state: &'m AtomicU32,
-    /// Of two buffers the last is the first once more.
+    /// Of two buffers, the first is repeated as the third.
     all: [Buffer<'m>; 3],
     count: u32,
 }
 
 impl<'m> Buffers<'m> {
-    /// Two buffers, or three.
+    /// With two or three buffers.
     #[must_use]
     pub const fn new(
         state: &'m AtomicU32,
@@ -153,7 +153,7 @@ impl<'m> Buffers<'m> {
         }
     }
 
-    /// The two ends. Whoever calls it sees to it that each is used once.
+    /// The two ends. The caller must use each of them only once.
     #[must_use]
     pub fn ends(self) -> (FrameWriter<'m>, FrameReader<'m>) {
         let back = self.buffer(self.roles(0).back);
@@ -188,7 +188,7 @@ impl<'m> Buffers<'m> {
         Roles { front, back, before }
     }
 
-    /// The published buffer and the one before it; of two buffers, the published one twice. `None` before the first
+    /// The published buffer and the previous one; of two buffers, the published one twice. `None` before the first
     /// frame.
     #[inline(always)]
     pub(super) fn published(&self, state: u32) -> Option<[Buffer<'m>; 2]> {
@@ -197,7 +197,7 @@ impl<'m> Buffers<'m> {
     }
 }
 
-/// Numbers of the front buffer, of the one to be written next, and of the one that held the front before.
+/// Numbers of the front buffer, of the next to be written, and of the previous front.
 #[derive(Clone, Copy, Debug)]
 struct Roles {
     front: u32,
@@ -213,9 +213,9 @@ impl<const N: usize, const BUFFERS: usize> Default for Frames<N, BUFFERS> {
 
 /// The end that writes: owned by the receiver of vertices.
 ///
-/// A frame is [`begin`](Self::begin), one [`push`](Self::push) for every vertex in the order of the rows, and
+/// A frame is one [`begin`](Self::begin), one [`push`](Self::push) for every vertex in row order, and
 /// [`publish`](Self::publish). An [`Assembler`](crate::Assembler) takes rows in any order, and proves that all have
-/// come.
+/// arrived.
 #[derive(Debug)]
 pub struct FrameWriter<'f> {
     buffers: Buffers<'f>,
@@ -227,12 +227,12 @@ pub struct FrameWriter<'f> {
 }
 
 impl<'f> FrameWriter<'f> {
-    /// Rows of a frame.
+    /// Number of rows in a frame.
     pub(crate) fn len(&self) -> u32 {
         self.back.rows.len() as u32
     }
 
-    /// Starts a frame and forgets an unfinished one. O(1).
+    /// Starts a frame and discards an unfinished one. O(1).
     pub fn begin(&mut self) {
         self.filled = 0;
     }
@@ -240,7 +240,7 @@ impl<'f> FrameWriter<'f> {
     /// Stores the position (mm) of the next row in the back buffer. O(1).
     ///
     /// # Errors
-    /// [`OutOfTableError`] when the frame is full; nothing is stored.
+    /// [`OutOfTableError`] if the frame is full; nothing is stored.
     #[inline]
     pub fn push(&mut self, position: Vec3) -> Result<(), OutOfTableError> {
         let row = self.filled;
@@ -252,7 +252,7 @@ impl<'f> FrameWriter<'f> {
         Ok(())
     }
 
-    /// Vertices not yet pushed.
+    /// Number of vertices not yet pushed.
     #[must_use]
     pub fn missing(&self) -> u32 {
         self.len().saturating_sub(self.filled)
@@ -288,7 +288,7 @@ impl<'f> FrameWriter<'f> {
         Some(FrameView::published(front))
     }
 
-    /// The published frame and the one before it, in the order of time, if three buffers keep both.
+    /// The published frame and the previous one, in the order of time, if there are three buffers.
     #[cfg(feature = "bus")]
     pub(crate) fn last_two(&self) -> Option<[FrameView<'f>; 2]> {
         let [front, before] = self.buffers.published(self.state)?;
@@ -332,7 +332,7 @@ impl<'f> FrameWriter<'f> {
             .map_err(|_| PublishError::Busy)?;
         self.back = self.buffers.buffer(self.buffers.roles(next).back);
         self.state = next;
-        // The back buffer now holds an old frame: it must be begun before it is published.
+        // The back buffer now holds an old frame: `begin` must precede the next publication.
         self.filled = 0;
         Ok(())
     }

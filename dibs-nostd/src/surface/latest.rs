@@ -3,23 +3,23 @@
 use super::Millis;
 use crate::unavailable::Unavailable;
 
-/// The frame published last and its age, for surfaces of vertices and of modes.
+/// The last published frame and its age, for surfaces of vertices and of modes.
 ///
-/// A frame received up to 16 ms ahead of the clock has age 0: another core may have stamped it. A frame farther
-/// ahead is old. No frame grows younger, if its age is read at least once in 2^31 ms.
+/// A frame received up to 16 ms ahead of the clock has age 0: another core may have stamped it. A frame farther ahead
+/// is old. No frame grows younger, if its age is read at least once in 2^31 ms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct FrameAge {
     /// Number of the frame; wraps.
     pub epoch: u32,
-    /// Arrival of its first packet, on the receiver's clock, less the age that it then had; wraps.
+    /// Arrival of its first packet on the receiver's clock, less its age at sending; wraps.
     pub received: Millis,
     /// Time since then.
     pub age: Millis,
 }
 
-/// The surface published last, if any, from [`FrameReader::latest`](crate::FrameReader::latest) or
+/// The last published surface, if any, from [`FrameReader::latest`](crate::FrameReader::latest) or
 /// [`ModalReader::latest`](crate::modes::ModalReader::latest).
 #[derive(Debug)]
 #[must_use]
@@ -37,11 +37,11 @@ impl<S> LatestSurface<S> {
         LatestSurface { surface: self.surface.map(|(surface, frame)| (of(surface), frame)) }
     }
 
-    /// The surface, if it is not older than `limit`: of a source that may lose a frame, two of its periods and the transit,
-    /// 80 ms at 30 Hz. The next frame comes a period after this one, at the earliest.
+    /// The surface, if it is at most `limit` old. For a source that may lose a frame, use two of its periods plus the
+    /// transit time: 80 ms at 30 Hz. The next frame arrives at the earliest one period after this one.
     ///
     /// # Errors
-    /// [`Unavailable::NoSurface`] before the first was published, [`Unavailable::Stale`] with its age.
+    /// [`Unavailable::NoSurface`] before the first publication, [`Unavailable::Stale`] with its age.
     #[inline]
     pub fn within(self, limit: Millis) -> Result<S, Unavailable> {
         match self.surface {
@@ -51,17 +51,16 @@ impl<S> LatestSurface<S> {
         }
     }
 
-    /// The surface, whatever its age: for a controller that leaves the age to a
-    /// [`FailSafe`](crate::failsafe::FailSafe) machine.
+    /// The surface at any age: for a controller whose [`FailSafe`](crate::failsafe::FailSafe) machine checks the age.
     ///
     /// # Errors
-    /// [`Unavailable::NoSurface`] before the first was published.
+    /// [`Unavailable::NoSurface`] before the first publication.
     #[inline]
     pub fn of_any_age(self) -> Result<S, Unavailable> {
         self.within(Millis::MAX)
     }
 
-    /// Its frame and age; `None` before the first was published.
+    /// Its frame and age; `None` before the first publication.
     #[must_use]
     pub fn frame(&self) -> Option<FrameAge> {
         self.surface.as_ref().map(|(_, frame)| *frame)

@@ -4,11 +4,11 @@
 
 use crate::tree::TriangleRow;
 
-/// Regions that a surface is divided into for its measured stretch: equal runs of triangle rows, which
-/// are patches of the surface because rows stand leaf by leaf.
+/// Number of regions of a surface with their own measured stretch: equal ranges of triangle rows, which are patches of
+/// the surface because rows are sorted by leaf.
 pub const REGIONS: usize = 32;
 
-/// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.
+/// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -18,13 +18,13 @@ pub enum Coverage {
     Measured,
     /// A bound on the stretch follows from measured frames: between two of them, or from a modal surface's weights.
     Proven,
-    /// Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface
-    /// can be missed. [`measure_stretch`](crate::measure_stretch) checks a frame.
+    /// Nothing was measured: the tree's stretch limit is assumed to hold. If it does not, a nearer part of the surface
+    /// may be missed. [`measure_stretch`](crate::measure_stretch) checks a frame.
     Assumed,
 }
 
 impl Coverage {
-    /// That of an answer from two surfaces: the weaker.
+    /// The coverage of an answer from two surfaces: the weaker.
     #[must_use]
     pub const fn or_weaker(self, other: Self) -> Self {
         match (self, other) {
@@ -37,25 +37,25 @@ impl Coverage {
 
 /// The largest stretch `sigma` of one frame, over all triangles, and that of each region.
 ///
-/// Only a measurement makes one, so a query cannot be given a stretch below the true one by mistake. A query refuses a
-/// measurement of another tree or, where that is known, of another frame.
+/// Only a measurement creates one, so a query cannot get a stretch below the true one by mistake. A query refuses a
+/// measurement of another tree or, if known, of another frame.
 ///
-/// Where triangles have their own limits, a triangle's stretch is divided by its limit and multiplied by the tree's, as
-/// the tree's radii are.
+/// If triangles have their own limits, a triangle's stretch is divided by its limit and multiplied by the tree's, like
+/// the tree's radii.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MeasuredStretch {
     sigma: f32,
     tree: u32,
-    /// The triangle that is stretched most, and [`PROVEN`].
+    /// The most stretched triangle, and the flag [`PROVEN`].
     triangle: u32,
     epoch: Option<u32>,
-    /// Each region's stretch, less one, in parts of 256 of `sigma`.
+    /// Each region's stretch, less one, in 256ths of `sigma`.
     regions: [u8; REGIONS],
 }
 
 impl MeasuredStretch {
-    /// A measurement of the frame `epoch` with the tree of this checksum: with the code of each [region's
+    /// A measurement of the frame `epoch` with the tree of this checksum, and the code of each [region's
     /// stretch](region_sigma).
     pub(crate) const fn new(
         sigma: f32,
@@ -74,7 +74,7 @@ impl MeasuredStretch {
         Self { sigma, tree, triangle: triangle | PROVEN, epoch: None, regions }
     }
 
-    /// A bound for two frames of one surface and all between them: gradients are linear in the positions, and
+    /// A bound for two frames of one surface and all surfaces between them: gradients are linear in the positions, and
     /// the largest singular value (or edge) is convex. `None` if they were measured with different trees.
     #[must_use]
     pub fn or_larger(self, other: Self) -> Option<Self> {
@@ -82,7 +82,7 @@ impl MeasuredStretch {
         self.of_both(other, larger)
     }
 
-    /// A bound for a surface made of two that were measured; `None` if with different trees.
+    /// A bound for a surface computed from two measured ones; `None` if measured with different trees.
     pub(crate) fn of_both(self, other: Self, sigma: f32) -> Option<Self> {
         let larger = if other.sigma > self.sigma { other } else { self };
         let regions = [u8::MAX; REGIONS];
@@ -91,39 +91,38 @@ impl MeasuredStretch {
         (self.tree == other.tree).then_some(both)
     }
 
-    /// The largest stretch, rounded up: at least 1 where anything kept its length, and never below a
-    /// half.
+    /// The largest stretch, rounded up: at least 1 if any length was kept, and never below a half.
     #[must_use]
     pub const fn sigma(&self) -> f32 {
         self.sigma
     }
 
-    /// The largest stretch of each region, rounded up to a 256th of [`sigma`](Self::sigma). A frame's label keeps the
-    /// whole's alone.
+    /// The largest stretch of each region, rounded up to a 256th of [`sigma`](Self::sigma). A frame's label stores only
+    /// `sigma`.
     #[must_use]
     pub fn regions(&self) -> [f32; REGIONS] {
         self.regions.map(|code| region_sigma(self.sigma, code))
     }
 
-    /// The triangle that is stretched most.
+    /// The most stretched triangle.
     #[must_use]
     pub const fn triangle(&self) -> TriangleRow {
         TriangleRow(self.triangle & !PROVEN)
     }
 
-    /// Checksum of the tree that it was measured with.
+    /// Checksum of the tree used for the measurement.
     #[must_use]
     pub const fn tree(&self) -> u32 {
         self.tree
     }
 
-    /// Number of the frame that it was measured on, if the frame has one.
+    /// Number of the measured frame, if it has one.
     #[must_use]
     pub const fn epoch(&self) -> Option<u32> {
         self.epoch
     }
 
-    /// Whether it was measured on the frame itself, or follows from other frames.
+    /// Whether the frame itself was measured, or the bound follows from other frames.
     #[must_use]
     pub const fn coverage(&self) -> Coverage {
         if self.triangle & PROVEN != 0 { Coverage::Proven } else { Coverage::Measured }
@@ -134,7 +133,6 @@ impl MeasuredStretch {
         [self.sigma.to_bits(), self.tree, self.triangle]
     }
 
-    /// The inverse of [`to_words`](Self::to_words).
     pub(crate) const fn from_words(
         [sigma, tree, triangle]: [u32; MeasuredStretch::WORDS],
         epoch: u32,
@@ -142,14 +140,13 @@ impl MeasuredStretch {
         Self::new(f32::from_bits(sigma), tree, triangle, Some(epoch), [u8::MAX; REGIONS])
     }
 
-    /// Words that a measurement takes.
     pub(crate) const WORDS: usize = 3;
 }
 
-/// Bit of the triangle of a bound that was not measured on the frame itself: no tree has so many triangles.
+/// Flag in the triangle's number: the bound was not measured on the frame itself. No tree has so many triangles.
 const PROVEN: u32 = 1 << 31;
 
-/// Stretch that a region's code stands for.
+/// The stretch that a region's code encodes.
 pub(crate) fn region_sigma(sigma: f32, code: u8) -> f32 {
     sigma * ((f32::from(code) + 1.0) * (1.0 / 256.0))
 }

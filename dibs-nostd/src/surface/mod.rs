@@ -1,4 +1,4 @@
-//! The current surface: vertex tables, and the double buffer that frames arrive in.
+//! The current surface: vertex tables, and the double buffer in which frames arrive.
 
 // Requirement: F-09
 

@@ -1,8 +1,8 @@
 //! The motion of a surface: the odometer by which a tracker's bounds run out.
 //!
 //! A bound on a distance holds until tool and surface have moved by more than its slack. An odometer is a number that
-//! grows, from frame to frame, by at least the distance that any vertex moved. Two readings of it, however many frames
-//! apart, bound the motion between them.
+//! grows, from frame to frame, by at least the largest motion of any vertex. Two readings, any number of frames apart,
+//! bound the motion between them.
 //!
 //! One file, because reading, unit and odometer keep their fields private.
 
@@ -18,9 +18,9 @@ use super::prediction::Prediction;
 use crate::math::sqrt::sqrt;
 use crate::{Index, MeasuredStretch, Tree, VertexTable};
 
-/// A surface whose motion is known: a table of positions, and the reading of its odometer.
+/// A surface whose motion is known: a table of positions with its odometer's reading.
 ///
-/// Sealed, so that only a measurement states a motion.
+/// Sealed, so that only a measurement can state a motion.
 pub trait MovingSurface: VertexTable + sealed::Sealed {
     /// The odometer's reading at this frame; `None` if the motion is not measured.
     fn motion(&self) -> Option<MotionReading>;
@@ -52,17 +52,17 @@ impl<S: MovingSurface + ?Sized> MovingSurface for &S {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotionReading {
     tree: u32,
-    /// Number of an unbroken run of measurements; no two runs share one.
+    /// Number of an unbroken sequence of measurements; no two sequences share one.
     run: u32,
     /// Length along the path through all frames, in the tree's units.
     reading: u64,
-    /// Distance from that path, of an extrapolated surface; 0 for a frame.
+    /// Distance of an extrapolated surface from that path; 0 for a frame.
     aside: u32,
-    /// The extrapolated surface's step from the frame before.
+    /// The extrapolated surface's step from the previous frame.
     prediction: Prediction,
 }
 
-/// Equal readings are one, whatever the prediction.
+/// Readings are equal whatever their predictions.
 impl PartialEq for MotionReading {
     fn eq(&self, other: &Self) -> bool {
         let reading = |motion: &Self| (motion.tree, motion.run, motion.reading, motion.aside);
@@ -73,8 +73,8 @@ impl PartialEq for MotionReading {
 impl Eq for MotionReading {}
 
 impl MotionReading {
-    /// The farthest that a vertex can have moved since an earlier reading, in the tree's [`Unit`]; `None` if the
-    /// motion was not measured all the way.
+    /// Upper bound on the motion of any vertex since an earlier reading, in the tree's [`Unit`]; `None` if the motion
+    /// was not measured over the whole time.
     #[inline]
     pub(crate) fn since(&self, before: &Self) -> Option<u64> {
         if self.tree != before.tree || self.run != before.run {
@@ -92,13 +92,13 @@ impl MotionReading {
         }
     }
 
-    /// Units from an earlier reading of a frame to this one's; `None` if the motion was not measured all the way.
+    /// Units from an earlier reading of a frame to this one; `None` if the motion was not measured over the whole time.
     pub(super) fn after(&self, before: &Self) -> Option<u64> {
         let is_one_run = self.tree == before.tree && self.run == before.run;
         if is_one_run { self.reading.checked_sub(before.reading) } else { None }
     }
 
-    /// The reading at the start of an unbroken run of measurements.
+    /// The reading at the start of an unbroken sequence of measurements.
     pub(crate) fn start(tree: u32) -> Self {
         Self { tree, run: next_run(), reading: 0, aside: 0, prediction: Prediction::NONE }
     }
@@ -108,14 +108,14 @@ impl MotionReading {
         [self.tree, self.run, self.reading as u32, (self.reading >> 32) as u32]
     }
 
-    /// The inverse of [`to_words`](Self::to_words). Memory that was never written has no reading.
+    /// The inverse of [`to_words`](Self::to_words). Memory that was never written gives no reading.
     pub(super) fn from_words([tree, run, low, high]: [u32; MotionReading::WORDS]) -> Option<Self> {
         let reading = u64::from(high) << 32 | u64::from(low);
         let start = Self { tree, run, reading, aside: 0, prediction: Prediction::NONE };
         (run != NO_RUN).then_some(start)
     }
 
-    /// Words that a frame's reading takes.
+    /// Number of words of a frame's reading.
     pub(super) const WORDS: usize = 4;
 
     /// The reading after a step in which no vertex moved farther than `farthest` (squared, rounded to nearest); `None`
@@ -126,7 +126,7 @@ impl MotionReading {
         (self.tree == unit.tree).then(|| self.along(units))
     }
 
-    /// A frame's reading, so many units farther on the path; a start where they are too many to count.
+    /// A frame's reading, this many units farther along the path; a new start if they are too many to count.
     pub(crate) fn along(self, units: u64) -> Self {
         match self.reading.checked_add(units) {
             Some(reading) => Self { reading, ..self },
@@ -134,13 +134,13 @@ impl MotionReading {
         }
     }
 
-    /// That of a surface so many units off the path; `None` if they are too many to count.
+    /// The reading of a surface this many units off the path; `None` if they are too many to count.
     pub(crate) fn beside(self, units: u64) -> Option<Self> {
         let aside = u32::try_from(units).ok()?;
         Some(Self { aside, ..self })
     }
 
-    /// This reading, of a surface on a prediction.
+    /// This reading for a surface extrapolated along a prediction.
     pub(crate) const fn on(self, prediction: Prediction) -> Self {
         Self { prediction, ..self }
     }
@@ -189,7 +189,7 @@ impl Unit {
         self.down(length).wrapping_add(1)
     }
 
-    /// A length in units, rounded up, however long it is.
+    /// A length in units, rounded up, without an upper limit.
     fn units_of(self, length: f32) -> u64 {
         ((length * self.inverse) as u64).saturating_add(1)
     }
@@ -199,14 +199,14 @@ impl Unit {
         (squared < f32::INFINITY).then(|| self.units_of(length_of_step(squared)))
     }
 
-    /// The length of so many units, to the nearest f32.
+    /// The length of this many units, rounded to the nearest f32.
     #[inline(always)]
     pub(crate) fn length(self, units: i32) -> f32 {
         units as f32 * self.length
     }
 }
 
-/// The unit in which the motion of one tree's surfaces is counted. Only a tree makes one.
+/// The unit in which the motion of one tree's surfaces is counted. Only a tree creates one.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(not(feature = "bus"), allow(dead_code, reason = "only a receiver counts with it"))]
 pub struct MotionUnit {
@@ -219,7 +219,7 @@ impl MotionUnit {
         Self { tree: tree.checksum(), unit: Unit::of(tree) }
     }
 
-    /// The unit for rows of which vertices move so many times as far.
+    /// The unit for rows whose vertices move this many times as far.
     #[cfg(feature = "nodes")]
     pub(crate) const fn times(self, amplification: f32) -> Self {
         let Unit { length, inverse } = self.unit;
@@ -242,7 +242,7 @@ impl MotionUnit {
     }
 }
 
-/// A length that is not below that of a step with this square, rounded to nearest.
+/// Upper bound on the length of a step from its square, which was rounded to nearest.
 fn length_of_step(squared: f32) -> f32 {
     // Differences and squares are rounded by a few parts in 2^24, and underflow below 1e-22.
     sqrt(squared) * (1.0 + 4.0 * f32::EPSILON) + 1e-20
@@ -251,7 +251,7 @@ fn length_of_step(squared: f32) -> f32 {
 /// Largest number of units counted for a length: more than 32 times the root sphere's radius.
 pub(crate) const FAR: i32 = 1 << 30;
 
-/// A table of positions, with the reading of its surface's [`Odometer`].
+/// A table of positions, with its surface's [`Odometer`] reading.
 ///
 /// It borrows the table, so that measured positions cannot change.
 #[derive(Debug)]
@@ -299,8 +299,8 @@ impl<V: VertexTable + ?Sized> MovingSurface for MovingTable<'_, V> {
 
 /// Measures how far a surface moves from one frame to the next.
 ///
-/// Only a measurement of consecutive frames makes a [`MotionReading`]. If `before` is not the frame measured last, by a
-/// digest of all its positions, the odometer starts anew, and trackers do too.
+/// Only a measurement of consecutive frames creates a [`MotionReading`]. If `before` is not the last measured frame, by
+/// a digest of all its positions, the odometer restarts, and so do trackers.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -322,12 +322,11 @@ impl<V: VertexTable + ?Sized> MovingSurface for MovingTable<'_, V> {
 pub struct Odometer {
     unit: Unit,
     tree: u32,
-    /// Rows of a frame.
+    /// Number of rows in a frame.
     vertices: usize,
-    /// Vertices of the surface.
     surface: usize,
     motion: Option<MotionReading>,
-    /// Digest of the frame measured last.
+    /// Digest of the last measured frame.
     digest: u64,
 }
 
@@ -345,7 +344,7 @@ impl Odometer {
         }
     }
 
-    /// An odometer for tables of other rows than the surface's vertices, which move at least as far as those.
+    /// An odometer for tables whose rows are not the surface's vertices, but move at least as far.
     #[cfg(feature = "nodes")]
     pub(crate) const fn of_rows(unit: MotionUnit, vertices: usize, surface: usize) -> Self {
         let MotionUnit { unit, tree } = unit;
@@ -360,8 +359,8 @@ impl Odometer {
         self.step(surface, surface).after()
     }
 
-    /// Measures the step from `before`, which must be the frame measured last, to `after`. Otherwise the odometer
-    /// starts anew.
+    /// Measures the step from `before`, which must be the last measured frame, to `after`. Otherwise the odometer
+    /// restarts.
     ///
     /// Cost: one pass over the vertices of both, some 15 floating point operations each.
     pub fn step<'v, V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
@@ -398,10 +397,10 @@ impl Odometer {
     }
 }
 
-/// The number of no run.
+/// No sequence has this number.
 const NO_RUN: u32 = 0;
 
-/// A new number for a run of measurements.
+/// A new number for a sequence of measurements.
 fn next_run() -> u32 {
     static NEXT: AtomicU32 = AtomicU32::new(NO_RUN + 1);
     NEXT.fetch_add(1, Ordering::Relaxed)
@@ -409,9 +408,9 @@ fn next_run() -> u32 {
 
 /// Digest of a frame: a product of 128 bits for each vertex, folded, as in wyhash.
 ///
-/// A multiplication alone carries no bit down, so that two flipped signs cancel: a mirrored or half-turned frame would be
-/// the same. Both factors depend on the vertex, so no change of one is undone by a fixed change of another. Two different
-/// frames agree with a chance of 2^-64.
+/// A multiplication alone moves no bit downwards, so two flipped signs would cancel: a mirrored or half-turned frame
+/// would have the same digest. Both factors depend on the vertex, so no change of one is undone by a fixed change of
+/// another. Two different frames have the same digest with a probability of 2^-64.
 struct Digest(u64);
 
 impl Digest {
@@ -428,7 +427,7 @@ impl Digest {
         let [first, second] = Self::KEYS;
         let factor = self.0 ^ (x << 32 | y) ^ first;
         let product = u128::from(factor) * u128::from((u64::from(vertex) << 32 | z) ^ second);
-        // The rotated state keeps what a factor of 0 would forget.
+        // The rotated state keeps what a factor of 0 would erase.
         self.0 = self.0.rotate_left(29) ^ (product >> 64) as u64 ^ product as u64;
     }
 }

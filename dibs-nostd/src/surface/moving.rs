@@ -1,8 +1,8 @@
 //! The surface between two frames and after the last, computed only for the vertices that are read.
 //!
-//! Imaging gives some tens of frames a second, a control loop ticks a thousand times, so a surface held from frame to
-//! frame jumps. A tree needs no refitting, so a surface that moves at every tick costs only the sums below, at the
-//! vertices that a query reads.
+//! Imaging gives some tens of frames a second and a control loop ticks a thousand times a second, so a surface held
+//! from frame to frame jumps. A tree needs no refitting, so a surface that moves at every tick costs only the sums
+//! below, for the vertices that a query reads.
 
 // Requirement: F-05
 
@@ -40,13 +40,13 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
         MovingTable { table: self.after, motion: self.motion }
     }
 
-    /// The largest distance that a vertex moved, rounded up (mm). Infinite where a position is not finite.
+    /// Upper bound (mm) on the motion of any vertex. Infinite if a position is not finite.
     #[must_use]
     pub const fn length(&self) -> f32 {
         if self.is_measured { self.length } else { f32::INFINITY }
     }
 
-    /// The surface between the two: `t` 0 is the earlier frame and 1 the later. It is exact, but late by a frame.
+    /// The surface between the two: `t` 0 is the earlier frame and 1 the later. It is exact, but one frame late.
     ///
     /// `t` is clamped to 0..=1. If both frames carry their stretch, so does the surface: see
     /// [`SurfaceBlend::stretch`](VertexTable::stretch).
@@ -56,11 +56,11 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
         self.unless_unmeasured(between)
     }
 
-    /// The surface after the later frame, if every vertex keeps its velocity between the two: `t` 0 is the later
-    /// frame, 1 as long after it as the earlier frame was before. It is on time, and wrong by the change of the motion.
+    /// The surface after the later frame, if every vertex keeps its velocity between the two: `t` 0 is the later frame,
+    /// 1 one frame interval after it. It is current; its error is the change of the motion.
     ///
     /// `t` is clamped to 0..=2. Beyond the frames no frame's measurement bounds the stretch: measure it
-    /// ([`measure_stretch`](crate::measure_stretch)), unless both frames carry theirs. Frames behind a bus do:
+    /// ([`measure_stretch`](crate::measure_stretch)), unless both frames carry their own, as frames from a bus do:
     /// [`FrameGuard::extrapolated`](crate::FrameGuard::extrapolated).
     #[must_use]
     pub fn beyond(&self, t: f32) -> SurfaceBlend<'v, W, V> {
@@ -76,17 +76,17 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
     }
 }
 
-/// Longest extrapolation, in units of the time between the frames. At a steady rate a frame whose way takes as long as
-/// that time is twice as old when the next one comes.
+/// Longest extrapolation, in units of the time between the frames. At a steady rate a frame whose transit takes one
+/// frame interval is two intervals old when the next one arrives.
 pub(crate) const FARTHEST: f32 = 2.0;
 
-/// The error of an extrapolation by a part `beyond` of the time between frames, if it was `shown` after one whole: that
-/// of a velocity that changes steadily.
+/// The error of an extrapolation by `beyond` frame intervals, if it was `shown` after one, for a velocity that changes
+/// at a constant rate.
 pub(crate) fn grown(shown: f32, beyond: f32) -> f32 {
     shown * beyond * (beyond + 1.0) * 0.5
 }
 
-/// A number within 0 and `most`: 0 for NaN.
+/// A number clamped to 0 to `most`: 0 for NaN.
 pub(crate) fn clamped(t: f32, most: f32) -> f32 {
     let t = if t > 0.0 { t } else { 0.0 };
     if t < most { t } else { most }
@@ -94,7 +94,7 @@ pub(crate) fn clamped(t: f32, most: f32) -> f32 {
 
 /// A surface between two frames or beyond the second: `before + t * (after - before)`.
 ///
-/// A position is within 16 * 2^-24 of the coordinates' size of the exact sum.
+/// A position differs from the exact sum by at most 16 * 2^-24 of the coordinates' size.
 #[derive(Debug)]
 pub struct SurfaceBlend<'v, W: ?Sized, V: ?Sized> {
     before: &'v W,
@@ -103,9 +103,9 @@ pub struct SurfaceBlend<'v, W: ?Sized, V: ?Sized> {
     t: f32,
     motion: Option<MotionReading>,
     ahead: PredictionCheck,
-    /// Steps from the earlier frame to the later a second; 0 where it stands still, or has no clock.
+    /// Steps per second from the earlier frame to the later; 0 if it is held, or without a clock.
     rate: f32,
-    /// The time by which it is behind the present, as far as its error does not cover it; `None` without a clock.
+    /// How far it is behind the present, beyond what its error covers; `None` without a clock.
     lag: Option<Millis>,
 }
 
@@ -119,7 +119,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
         units: u64,
     ) -> Self {
         let t = clamped(t, 1.0);
-        // Off by less than a few units, within a tracker's slack.
+        // The error is less than a few units, within a tracker's slack.
         let along = (t * units as f32) as u64;
         let motion = Some(from.along(along));
         Self { before, after, t, motion, ahead: PredictionCheck::UNKNOWN, rate: 0.0, lag: None }
@@ -146,60 +146,60 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
         }
     }
 
-    /// The same on a prediction.
+    /// The same along a prediction.
     pub(super) fn on(mut self, prediction: Prediction) -> Self {
         self.motion = self.motion.map(|motion| motion.on(prediction));
         self
     }
 
-    /// The same with what was measured of the later frame.
+    /// The same with the measurements of the later frame's prediction.
     pub(super) const fn measured(mut self, ahead: PredictionCheck) -> Self {
         self.ahead = ahead;
         self
     }
 
-    /// The same, at so many steps a second.
+    /// The same, at this many steps per second.
     pub(super) const fn at_rate(mut self, rate: f32) -> Self {
         self.rate = rate;
         self
     }
 
-    /// The same, so far behind the present.
+    /// The same, this far behind the present.
     pub(super) const fn lagging(mut self, lag: Millis) -> Self {
         self.lag = Some(lag);
         self
     }
 
-    /// The time by which this surface is behind the present: the tissue may have moved on for so long, and for the time
-    /// of its transit. For [`Observation::lag`](crate::failsafe::Observation::lag).
+    /// How far this surface is behind the present: the tissue may have moved for this time, and for its transit time.
+    /// For [`Observation::lag`](crate::failsafe::Observation::lag).
     ///
-    /// 0 for one that is extrapolated, whose error is in its [`position_error`](VertexTable::position_error); the time
-    /// since the end for one that has come to the end of its extrapolation. The time between the frames for one between
-    /// them. The age for one that is held. `None` for a surface of a [`Step`], which has no clock.
+    /// 0 if it is extrapolated, with its error in [`position_error`](VertexTable::position_error); after the end of its
+    /// extrapolation, the time since that end. The time between the frames if it is between them. Its age if it is
+    /// held. `None` for a surface of a [`Step`], which has no clock.
     #[must_use]
     pub const fn lag(&self) -> Option<Millis> {
         self.lag
     }
 
-    /// The surface's time in steps: 0 is the earlier frame, 1 the later, 2 as long after it, and 3 the end.
+    /// The surface's time in steps: 0 is the earlier frame, 1 the later, 2 one interval after it, and 3 the end.
     #[must_use]
     pub const fn t(&self) -> f32 {
         self.t
     }
 
-    /// The earlier frame; the later one for a surface that is held.
+    /// The earlier frame; the later one if the surface is held.
     #[must_use]
     pub const fn before(&self) -> &'v W {
         self.before
     }
 
-    /// Steps from the earlier frame to the later a second; 0 where it stands still, or has no clock.
+    /// Steps per second from the earlier frame to the later; 0 if it is held, or without a clock.
     #[cfg(all(feature = "bus", feature = "control"))]
     pub(crate) const fn rate(&self) -> f32 {
         self.rate
     }
 
-    /// The velocity (mm/s) of a point, by vertices and their weights: that from one frame to the other; zero for a surface
+    /// The velocity (mm/s) of a point given by vertices and weights, from one frame to the other; zero for a surface
     /// that is held, one of a [`Step`], and vertices outside of the table.
     #[must_use]
     pub fn velocity<const N: usize>(&self, vertices: [u32; N], weights: [f32; N]) -> Vec3 {
@@ -214,10 +214,10 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
         step * self.rate
     }
 
-    /// The largest distance (mm) of a vertex of a frame from its extrapolation by the two frames before, the larger of
-    /// the last two frames': an estimate of this surface's own error by the time of the next frame. Where the time
-    /// between frames grew, it is that of a velocity that changes steadily, after as long a time again.
-    /// [`position_error`](VertexTable::position_error) includes it as far as it has grown. `None` for a surface that is
+    /// The largest distance (mm) of a vertex of a frame from its extrapolation by the two previous frames; the larger
+    /// value of the last two frames. It estimates this surface's own error at the time of the next frame. If the frame
+    /// interval grew, it is scaled as for a velocity that changes at a constant rate.
+    /// [`position_error`](VertexTable::position_error) includes the part reached so far. `None` for a surface that is
     /// not extrapolated.
     #[must_use]
     pub fn residual(&self) -> Option<f32> {
@@ -266,10 +266,10 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for SurfaceBl
         Some(before + (after - before) * self.t)
     }
 
-    /// A bound by those of the frames: gradients are linear in the positions, and the largest singular value (or edge)
-    /// is convex. Between the frames that is the mean of theirs by `t`. Beyond, it is the mean of the later frame's and
-    /// that of the end of the extrapolation if that was measured, and else their sum by the triangle inequality. `None`
-    /// where a frame was not measured.
+    /// A bound by the frames' stretches: gradients are linear in the positions, and the largest singular value (or
+    /// edge) is convex. Between the frames it is their mean by `t`. Beyond, it is the mean of the later frame's and
+    /// that of the end of the extrapolation if that was measured, otherwise their sum by the triangle inequality.
+    /// `None` if a frame was not measured.
     fn stretch(&self) -> Option<MeasuredStretch> {
         let (before, after) = (self.before.stretch()?, self.after.stretch()?);
         let (t, beyond) = (self.t, self.t - 1.0);
@@ -282,13 +282,13 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for SurfaceBl
         } else {
             t * new + beyond * old
         };
-        // The sum is rounded by three halves of a unit in its last place at most.
+        // The sum is rounded by at most three halves of a unit in its last place.
         before.of_both(after, sigma * (1.0 + 2.0 * f32::EPSILON))
     }
 
-    /// The frames' errors, by their part in each position, and of an extrapolated surface the change of the motion: the
-    /// [error that the last frames showed](SurfaceBlend::residual), growing as if the velocity changed steadily, three
-    /// times as much at the end. That is an estimate: no measurement of the past bounds it.
+    /// The frames' errors, weighted as in each position, plus for an extrapolated surface the change of the motion: the
+    /// [residual of the last frames](SurfaceBlend::residual), growing as for a velocity that changes at a constant
+    /// rate, to three times its size at the end. That is an estimate: no measurement of the past bounds it.
     fn position_error(&self) -> f32 {
         let (before, after) = (self.before.position_error(), self.after.position_error());
         let frames = (1.0 - self.t).abs() * before + self.t * after;

@@ -1,7 +1,7 @@
-//! Where a mesh is as a whole: a rotation and a shift, checked.
+//! The pose of a whole mesh: a rotation and a shift, checked.
 //!
-//! Quaternions are kept as they came, of any length near one: every rotation divides by its square. So a check costs no
-//! rounding.
+//! Quaternions are stored as received, of any length near one: every rotation divides by the squared length. So a check
+//! causes no rounding.
 
 // Requirement: F-08
 
@@ -16,10 +16,10 @@ use crate::MAX_COORDINATE;
 #[cfg(feature = "control")]
 pub(crate) use step::PoseStep;
 
-/// Most by which the square of a quaternion's length may differ from one.
+/// Largest difference of a quaternion's squared length from one.
 const MOST_OFF: f32 = 1.0 / 1_048_576.0;
 
-/// Where a mesh is as a whole: its point `p` is at `rotation p + shift`.
+/// The pose of a whole mesh: its point `p` is at `rotation p + shift`.
 ///
 /// ```
 /// use dibs_nostd::{PoseError, RigidPose, glam::{Quat, Vec3}};
@@ -40,16 +40,16 @@ pub struct RigidPose {
     shift: Vec3,
 }
 
-/// Why numbers are no rigid pose.
+/// Why numbers are not a rigid pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum PoseError {
     /// A number is infinite or not a number.
     NotFinite,
-    /// The quaternion is no rotation's: the square of its length is not within 2^-20 of 1.
+    /// The quaternion is not a rotation: its squared length is not within 2^-20 of 1.
     NoRotation {
-        /// The square of its length.
+        /// Its squared length.
         squared: f32,
     },
     /// The shift is longer than a quarter of [`MAX_COORDINATE`] on an axis.
@@ -74,13 +74,13 @@ impl fmt::Display for PoseError {
 impl core::error::Error for PoseError {}
 
 impl RigidPose {
-    /// The mesh's own frame.
+    /// The identity: mesh and world coordinates are the same.
     pub const IDENTITY: Self = Self { turn: Turn { axis: Vec3::ZERO, w: 1.0 }, shift: Vec3::ZERO };
 
-    /// A rotation about the mesh's origin, and then a shift (mm).
+    /// A rotation about the mesh's origin, followed by a shift (mm).
     ///
     /// # Errors
-    /// [`PoseError`]: a number that is not finite or too large, or no rotation.
+    /// [`PoseError`]: a number is not finite or too large, or the quaternion is not a rotation.
     pub fn new(rotation: Quat, shift: Vec3) -> Result<Self, PoseError> {
         let pose = Self::kept(rotation, shift);
         if !(pose.turn.axis.is_finite() && pose.turn.w.is_finite() && shift.is_finite()) {
@@ -118,32 +118,32 @@ impl RigidPose {
         self.shift
     }
 
-    /// Where a point of the mesh is.
+    /// Transforms a point from mesh to world coordinates.
     #[must_use]
     pub fn apply(&self, point: Vec3) -> Vec3 {
         self.turn.apply(point) + self.shift
     }
 
-    /// The point of the mesh that is there.
+    /// Transforms a point from world to mesh coordinates.
     #[must_use]
     pub fn apply_inverse(&self, point: Vec3) -> Vec3 {
         self.turn.inverse().apply(point - self.shift)
     }
 
-    /// Where a vector of the mesh points.
+    /// Rotates a vector from mesh to world coordinates.
     #[must_use]
     pub fn rotate(&self, vector: Vec3) -> Vec3 {
         self.turn.apply(vector)
     }
 
-    /// The vector of the mesh that points there.
+    /// Rotates a vector from world to mesh coordinates.
     #[must_use]
     pub fn rotate_inverse(&self, vector: Vec3) -> Vec3 {
         self.turn.inverse().apply(vector)
     }
 }
 
-/// A rotation, as a quaternion of any length. (glam's own has other bits on processors with vectors.)
+/// A rotation, as a quaternion of any length. (glam's own gives other bits on processors with vector registers.)
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 struct Turn {
@@ -161,7 +161,7 @@ impl Turn {
         Self { axis: -self.axis, w: self.w }
     }
 
-    /// What the rotation adds to a vector: the less it turns, the smaller, and the smaller is its rounding.
+    /// The rotated vector minus the vector: small for small rotations, and so is its rounding.
     fn adds(&self, vector: Vec3) -> Vec3 {
         let across = self.axis.cross(vector);
         (across * self.w + self.axis.cross(across)) * (2.0 / self.squared())

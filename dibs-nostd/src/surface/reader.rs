@@ -1,5 +1,5 @@
-//! The control tick's end of the buffers: the published frame, held still, and the surface between it and the one
-//! before.
+//! The control tick's end of the buffers: the published frame, locked during the read, and the surface between it and
+//! the previous one.
 
 use glam::Vec3;
 
@@ -20,7 +20,7 @@ use crate::time::elapsed;
 #[derive(Debug)]
 pub struct FrameReader<'f> {
     buffers: Buffers<'f>,
-    /// Epoch and age of the frame read last.
+    /// Epoch and age of the last frame read.
     ageing: (u32, Ageing),
 }
 
@@ -36,7 +36,7 @@ impl<'f> FrameReader<'f> {
     }
 
     /// The published frame and its age at `now`, on the receiver's clock. [`LatestSurface::within`] a limit gives the
-    /// frame, held as by [`read`](Self::read).
+    /// frame, locked as by [`read`](Self::read).
     #[inline]
     pub fn latest(&mut self, now: Millis) -> LatestSurface<FrameGuard<'_>> {
         let (epoch_before, before) = self.ageing;
@@ -49,9 +49,9 @@ impl<'f> FrameReader<'f> {
         LatestSurface::new(Some((guard, FrameAge { epoch, received, age: ageing.oldest })))
     }
 
-    /// The published frame, held for as long as the guard lives; `None` before the first.
+    /// The published frame, locked while the guard lives; `None` before the first.
     ///
-    /// Keep the guard for one query, not longer: no frame is published meanwhile. A leaked guard keeps the surface at
+    /// Keep the guard for one query, not longer: meanwhile no frame is published. A leaked guard keeps the surface at
     /// its present frame, whose age then grows. This does not check the age: use [`latest`](Self::latest).
     #[inline]
     pub fn read(&mut self) -> Option<FrameGuard<'_>> {
@@ -70,12 +70,12 @@ fn read<'g>(buffers: &'g Buffers<'_>) -> Option<FrameGuard<'g>> {
     Some(FrameGuard { state: buffers.state(), view, before, age: Millis(0) })
 }
 
-/// The published frame, held still: a [`VertexTable`] that carries its measured stretch and its position error.
+/// The published frame, locked: a [`VertexTable`] with its measured stretch and its position error.
 #[derive(Debug)]
 pub struct FrameGuard<'f> {
     state: &'f AtomicU32,
     view: FrameView<'f>,
-    /// The frame before, if there are three buffers.
+    /// The previous frame, if there are three buffers.
     before: FrameView<'f>,
     /// Age of the frame when it was read.
     age: Millis,
@@ -97,11 +97,11 @@ impl FrameGuard<'_> {
 
 /// With three buffers the surface moves between frames.
 ///
-/// Both surfaces below hold the published frame until a second one has come whose motion was measured, from
+/// Both surfaces below hold the published frame until a second one with measured motion has arrived from
 /// [`Assembler::continuous`](crate::Assembler::continuous). Their time is that of [`FrameReader::latest`]; a frame from
-/// [`FrameReader::read`] is as it was received.
+/// [`FrameReader::read`] is as received.
 impl<'f> FrameGuard<'f> {
-    /// The surface as long ago as the time between the last two frames: certain, and late by that time.
+    /// The surface one frame interval ago, interpolated between the last two frames: exact, but late by that time.
     #[must_use]
     pub fn interpolated(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
         match self.last_step() {
@@ -113,20 +113,20 @@ impl<'f> FrameGuard<'f> {
         }
     }
 
-    /// The surface now, if every vertex has kept its velocity since the last frame: on time, and wrong by the change of
-    /// the motion. It carries that error, as the last frames showed it, in its
-    /// [`position_error`](VertexTable::position_error), and so into each answer's accuracy.
+    /// The current surface, if every vertex has kept its velocity since the last frame: its error is the change of the
+    /// motion. The error, estimated from the last frames, is part of its
+    /// [`position_error`](VertexTable::position_error), and so of each answer's accuracy.
     ///
-    /// It goes on for twice the time between the last two frames, and is held then: long enough for frames at a steady
-    /// rate whose way to here takes as long as the time between them. It is held at once before the third frame, which
-    /// shows the error, and where the surface, moved on for so long, would be stretched beyond the tree's limit. The
+    /// The extrapolation lasts for twice the time between the last two frames; then the surface is held. That suffices
+    /// for frames at a steady rate with a transit of one frame interval. The surface is held at once before the third
+    /// frame, which gives the first estimate, and if the extrapolation would be stretched beyond the tree's limit. The
     /// time for which it is held is its [`lag`](SurfaceBlend::lag).
     #[must_use]
     pub fn extrapolated(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
         let (ahead, before) = (self.view.buffer.head.ahead(), self.before.buffer.head.ahead());
         match self.last_step() {
             Some(step) if ahead.sigma >= 0.0 && ahead.shown >= 0.0 => {
-                // The change of the motion may have been none by chance. False for NaN.
+                // A single small residual may be by chance. False for NaN.
                 let is_worse = before.shown > ahead.shown;
                 let shown = if is_worse { before.shown } else { ahead.shown };
                 let lag = Millis(self.age.0.saturating_sub(step.end().0));
@@ -137,20 +137,20 @@ impl<'f> FrameGuard<'f> {
         }
     }
 
-    /// The frame that was published before this one; as it was at the start, if there is none.
+    /// The previous published frame; zeros as at the start, if there is none.
     #[cfg(loom)]
     #[must_use]
     pub fn before(&self) -> &FrameView<'f> {
         &self.before
     }
 
-    /// Number of the buffer of this frame: they take turns, and the first frame is in that with the number 1.
+    /// Number of this frame's buffer: buffers alternate, and the first frame is in number 1.
     #[cfg(all(feature = "bus", feature = "control"))]
     pub(crate) fn number(&self) -> u32 {
         self.state.load(Ordering::Relaxed) & FRONT
     }
 
-    /// This frame as it was received.
+    /// This frame as received.
     pub(crate) fn held(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
         SurfaceBlend::held(&self.view, self.view.motion()).lagging(self.age)
     }
@@ -199,20 +199,19 @@ impl MovingSurface for FrameGuard<'_> {
 /// The step from a published frame to the next.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LastStep {
-    /// Readings of the odometer.
     from: MotionReading,
     motion: MotionReading,
     units: u64,
-    /// Time between the two, on the receiver's clock, above 0.
+    /// Time between the two frames, on the receiver's clock, above 0.
     interval: Millis,
 }
 
 impl LastStep {
-    /// `None` where the motion between the two was not measured, or they are of one time.
+    /// `None` if the motion between the two was not measured, or they have the same time.
     pub fn between(before: &FrameView<'_>, after: &FrameView<'_>) -> Option<Self> {
         let (from, motion) = (before.motion()?, after.motion()?);
         let units = motion.after(&from)?;
-        // Of two captures in the wrong order, or of one time, no velocity follows.
+        // Two captures in the wrong order, or at the same time, give no velocity.
         let interval = after.label().received.since(before.label().received);
         (interval > Millis(0) && interval < Millis(1 << 31)).then_some(Self {
             from,
@@ -222,7 +221,7 @@ impl LastStep {
         })
     }
 
-    /// The surface between the two, `age` after the later, less the time between them.
+    /// The surface between the two, for `age` after the later less the time between them.
     fn inside<'v, V: VertexTable>(
         &self,
         [before, after]: [&'v V; 2],
@@ -233,7 +232,8 @@ impl LastStep {
         between.at_rate(self.rate(t, 1.0))
     }
 
-    /// The surface `age` after the later frame, if every vertex keeps its velocity. `ahead` was measured of that.
+    /// The surface `age` after the later frame, if every vertex keeps its velocity. `ahead` has the measurements of
+    /// this extrapolation.
     fn outside<'v, V: VertexTable>(
         &self,
         [before, after]: [&'v V; 2],
@@ -246,7 +246,7 @@ impl LastStep {
         between.on(prediction).measured(ahead).at_rate(self.rate(t, FARTHEST))
     }
 
-    /// The part of the step that an extrapolation adds to the later frame after this time.
+    /// The fraction of the step that an extrapolation adds to the later frame after this time.
     #[cfg(feature = "bus")]
     pub fn ahead(&self, age: Millis) -> f32 {
         clamped(self.elapsed(age), FARTHEST)
@@ -263,7 +263,7 @@ impl LastStep {
         Millis((self.interval.0 as f32 * FARTHEST) as u32)
     }
 
-    /// Steps a second of a surface that is held from `most` on.
+    /// Steps per second; 0 from `most` on, where the surface is held.
     fn rate(&self, t: f32, most: f32) -> f32 {
         if t < most { 1_000.0 / self.interval.0 as f32 } else { 0.0 }
     }
@@ -273,16 +273,15 @@ impl LastStep {
     }
 }
 
-/// A view of one buffer: a [`VertexTable`] with the facts about its frame, once that is published.
+/// A view of one buffer: a [`VertexTable`] with the facts about its frame, once published.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameView<'f> {
     pub(super) buffer: Buffer<'f>,
-    /// Whether the buffer's label is that of its positions.
+    /// Whether the buffer's label belongs to its positions.
     pub(super) is_published: bool,
 }
 
 impl<'f> FrameView<'f> {
-    /// The view of a labelled buffer.
     pub(super) const fn published(buffer: Buffer<'f>) -> Self {
         Self { buffer, is_published: true }
     }
@@ -292,7 +291,6 @@ impl<'f> FrameView<'f> {
         self.buffer.head.label()
     }
 
-    /// Its odometer's reading.
     pub(crate) fn motion(&self) -> Option<MotionReading> {
         self.buffer.head.motion()
     }

@@ -16,23 +16,23 @@ pub trait VertexTable {
     /// Position of one vertex in the mesh's unit (mm), or `None` outside the table.
     fn position(&self, vertex: u32) -> Option<Vec3>;
 
-    /// Number of these positions' frame, if it has one, so that a measurement on another frame is refused.
+    /// Number of the frame, if it has one, so that a measurement of another frame is refused.
     fn epoch(&self) -> Option<u32> {
         None
     }
 
-    /// The stretch measured on these positions, if any: a query then searches smaller spheres than the tree's limit
-    /// gives.
+    /// The stretch measured on these positions, if any: a query then searches smaller spheres than with the tree's
+    /// limit.
     fn stretch(&self) -> Option<MeasuredStretch> {
         None
     }
 
-    /// Largest error (mm) of a position in the table, say by quantisation. Every answer's accuracy includes it.
+    /// Largest error (mm) of a position in the table, for example by quantisation. Every answer's accuracy includes it.
     fn position_error(&self) -> f32 {
         0.0
     }
 
-    /// Whether the table holds no vertex.
+    /// Whether the table is empty.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -85,9 +85,8 @@ impl<T: VertexTable + ?Sized> VertexTable for &T {
 
 /// A table of 16-bit positions, 6 bytes a vertex: `position = origin + step * row`.
 ///
-/// Against the position that was quantised, each axis is off by at most `step / 2` plus the f32 rounding of the result.
-/// The table carries that as its [`position_error`](VertexTable::position_error), so every answer's accuracy includes
-/// it.
+/// Each axis differs from the original position by at most `step / 2` plus the f32 rounding of the result. This is the
+/// table's [`position_error`](VertexTable::position_error), so every answer's accuracy includes it.
 ///
 /// ```
 /// use dibs_nostd::{QuantisedVertices, VertexTable, glam::Vec3};

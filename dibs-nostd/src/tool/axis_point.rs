@@ -7,8 +7,8 @@ use crate::math::vec3x4::Vec3x4;
 
 /// A point of another tool's axis: a sphere without radius.
 ///
-/// A separate type gives it a separate search. If the depth of an axis and the query of a sphere share one, the
-/// compiler inlines it into neither, and spheres take a tenth more instructions.
+/// A separate type gives it a separate instance of the search. If the depth of an axis and the query of a sphere shared
+/// one, the compiler would inline it into neither, and spheres would take a tenth more instructions.
 #[derive(Clone, Copy)]
 pub struct AxisPoint(pub Vec3);
 

@@ -48,7 +48,6 @@ pub(super) fn edge_to_point(corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
 /// axis.
 pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
     let (corner_along, edge_along) = (corner.dot(axis.direction), edge.dot(axis.direction));
-    // The edge projected along the axis.
     let corner_across = corner - corner_along * axis.direction;
     let edge_across = edge - edge_along * axis.direction;
     let across_squared = edge_across.dot(edge_across);
@@ -69,11 +68,11 @@ pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
     nearly_parallel(axis, corner, edge, along)
 }
 
-/// [`edge_to_segment`] for an edge whose direction across the axis is lost in rounding, and so `along`; the ends are
+/// [`edge_to_segment`] for an edge whose direction across the axis, and so `along`, is lost in rounding; the ends are
 /// then nearly as close.
 ///
-/// No test shows that each candidate is needed: if the direction is off by `u` times the edge, the distance along the
-/// edge varies by as little. They are kept because the module's bound relies on them.
+/// No test shows that each candidate is needed: if the direction has an error of `u` times the edge, the distance along
+/// the edge varies by as little. They are kept because the module's bound relies on them.
 #[cold]
 #[inline(never)]
 fn nearly_parallel(axis: &Axis, corner: Vec3, edge: Vec3, along: f32) -> OnEdge {

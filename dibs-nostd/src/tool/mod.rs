@@ -84,11 +84,11 @@ pub struct AxisPair {
     /// Square of the distance. Computed from differences to the axis' start; at large coordinates it is more accurate
     /// than the difference of the two points below. Exactly 0 where the axis pierces a triangle that is not a sliver.
     pub distance_squared: f32,
-    /// The axis' point of the pair.
+    /// The pair's point on the axis.
     pub on_axis: Vec3,
     /// Parameter of `on_axis`: 0 at the axis' start, 1 at its end; 0 for a sphere.
     pub axis_parameter: f32,
-    /// The triangle's point of the pair.
+    /// The pair's point on the triangle.
     pub on_surface: Vec3,
     /// Weights of the three corners at `on_surface`: not negative, sum 1 within rounding.
     pub barycentric: [f32; 3],
@@ -132,7 +132,7 @@ mod sealed {
     use crate::math::vec3x4::Vec3x4;
 
     pub trait Sealed: Sized {
-        /// The shortest vectors from the axis to four points, with the same bits as [`Tool::axis_to`] gives for each.
+        /// The shortest vectors from the axis to four points, with the same bits as four calls of [`Tool::axis_to`].
         fn axis_to_four(&self, points: &Vec3x4) -> Vec3x4;
 
         /// From the axis' start to its end, each component within 2^-23 of the axis' length.
@@ -178,8 +178,8 @@ fn clamp(x: f32, high: f32) -> f32 {
     }
 }
 
-/// [`clamp`] without a branch, for an `x` that no branch predicts. NaN becomes an arbitrary number; the caller's
-/// `offset` keeps the NaN.
+/// [`clamp`] without a branch, for an unpredictable `x`. NaN becomes an arbitrary number; the caller's `offset` keeps
+/// the NaN.
 #[inline(always)]
 fn clamp_any(x: f32, high: f32) -> f32 {
     if cfg!(target_arch = "arm") {

@@ -2,13 +2,13 @@
 //!
 //! # Method
 //! Call the *foot* the axis' point nearest to the triangle's plane: an end, or where the axis crosses the plane. If the
-//! foot projects into the triangle, that projection is the answer. Otherwise the answer lies on an edge that the
-//! projection is beyond. (Proof: at the optimum the separation `d` has an in-plane part in the normal cone of the
-//! triangle's boundary there, and going back along the axis to the foot, towards the plane, can only go further out
-//! along that part, because `d` is perpendicular to the axis or the optimum is an end.) So most triangles cost one
+//! foot projects into the triangle, that projection is the answer. Otherwise the answer is on an edge for which the
+//! projection is on the outer side. (Proof: at the optimum the separation `d` has an in-plane part in the normal cone
+//! of the triangle's boundary there, and moving back along the axis to the foot, towards the plane, can only go further
+//! out along that part, because `d` is perpendicular to the axis or the optimum is an end.) So most triangles cost one
 //! projection and one or two edges.
 //!
-//! A search rejects most triangles by a plane before.
+//! A search rejects most triangles by a plane before this test.
 //!
 //! # Why the error is bounded, whatever the shape
 //! Everything is computed relative to the axis' start, so that all numbers are rounded relative to
@@ -40,10 +40,10 @@ use glam::Vec3;
 pub(crate) const SLIVER: f32 = 1.0 / 65_536.0;
 /// Square of the sine below which the axis counts as parallel to the plane: 2^-24.
 const PARALLEL: f32 = 1.0 / 16_777_216.0;
-/// Squared lengths below this divide nothing: 2^-100, the square of 1e-15.
+/// Squared lengths below this are not used as divisors: 2^-100, the square of 1e-15.
 pub(super) const TINY: f32 = 7.888_609e-31;
-/// Squared lengths below this make no clear plane, because products of four of them underflow: 2^-40,
-/// the square of 1e-6.
+/// Squared lengths below this give no clear plane, because products of four of them underflow: 2^-40, the square of
+/// 1e-6.
 const SMALL: f32 = 9.094_947e-13;
 
 /// The closest pair between a point and a triangle, if closer than the limit.
@@ -158,7 +158,7 @@ fn closest_of_all(axis: &Axis, corners: &[Vec3; 3], limit_squared: f32) -> Optio
     Some(best.pair_on(axis, a, ab, ac))
 }
 
-/// A pair found so far: its length along the axis, and the weights of the second and third corner.
+/// A pair found so far: the length along the axis, and the weights of the second and third corner.
 #[derive(Clone, Copy)]
 pub(super) struct Candidate {
     pub distance_squared: f32,
@@ -168,13 +168,13 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// The limit as a pair: any pair below it improves on it.
+    /// The limit as a pair: any pair below it is an improvement.
     #[inline(always)]
     fn none(limit_squared: f32) -> Self {
         Self { distance_squared: limit_squared, along: 0.0, v: 0.0, w: 0.0 }
     }
 
-    /// Takes `other` if it is strictly closer, which no NaN is.
+    /// Takes `other` if it is strictly closer; never if it is NaN.
     #[inline(always)]
     fn improve(&mut self, other: Self) {
         if other.distance_squared < self.distance_squared {
@@ -208,7 +208,6 @@ impl Candidate {
     }
 }
 
-/// A set of the triangle's edges.
 #[derive(Clone, Copy)]
 struct Edges(u32);
 
@@ -228,7 +227,7 @@ impl Edges {
     }
 }
 
-/// A triangle's plane, spanned by `ab` and the height `rise` on it that ends in the third corner.
+/// A triangle's plane, spanned by the edge `ab` and the height `rise` on it through the third corner.
 struct Plane {
     ab_squared: f32,
     ac_squared: f32,
@@ -236,7 +235,7 @@ struct Plane {
     ab_inverse: f32,
     rise_inverse: f32,
     rise: Vec3,
-    /// The height's foot, in units of `ab`.
+    /// The foot of the height, in units of `ab`.
     skew: f32,
 }
 
@@ -245,7 +244,7 @@ struct Projection {
     distance_squared: f32,
     v: f32,
     w: f32,
-    /// The edges whose outer side it is on.
+    /// The edges for which it is on the outer side.
     edges: Edges,
 }
 
@@ -268,7 +267,7 @@ impl Plane {
         }
     }
 
-    /// Whether the plane's tilt is certain enough to choose the edges by. False for NaN.
+    /// Whether the plane's tilt is certain enough to select the edges. False for NaN.
     #[inline(always)]
     fn is_clear(&self) -> bool {
         self.rise_squared > SLIVER * self.ac_squared
@@ -276,7 +275,7 @@ impl Plane {
             && self.ab_squared > SMALL
     }
 
-    /// Whether there is a plane to project into, however uncertain its tilt.
+    /// Whether there is a plane to project onto, however uncertain its tilt.
     #[inline(always)]
     fn exists(&self) -> bool {
         self.ab_squared > TINY && self.rise_squared > TINY
@@ -284,13 +283,13 @@ impl Plane {
 
     /// A vector perpendicular to the plane, `|ab|` times `|rise|` long.
     ///
-    /// Not `ab.cross(ac)`: in a sliver, rounding would tilt that along `ab` too, levered by its length.
+    /// Not `ab.cross(ac)`: in a sliver, rounding would also tilt that along `ab`, magnified by its length.
     #[inline(always)]
     fn normal(&self, ab: Vec3) -> Vec3 {
         ab.cross(self.rise)
     }
 
-    /// Projects the point that is `to_a` before the first corner.
+    /// Projects the point from which `to_a` leads to the first corner.
     #[inline(always)]
     fn project(&self, to_a: Vec3, ab: Vec3) -> Projection {
         let x = -to_a.dot(ab) * self.ab_inverse;

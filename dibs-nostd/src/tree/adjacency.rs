@@ -1,8 +1,8 @@
 //! Adjacency: the three neighbours of each triangle.
 //!
-//! A row of 16-bit codes holds the low 16 bits of its neighbours' rows. An orientable surface has every directed edge
-//! once, so among the few rows with those bits the neighbour is the one with the reversed edge. A border edge has the
-//! largest code, and no such row.
+//! A row holds the low 16 bits of each neighbour's row. An orientable surface has every directed edge once, so among
+//! the few rows with those bits the neighbour is the one with the reversed edge. A border edge has the largest code,
+//! and no such row.
 
 use super::{FormatError, Tree, TriangleRow, format};
 use crate::Index;
@@ -11,7 +11,7 @@ use crate::Index;
 pub(crate) const MAX_NARROW_TRIANGLES: u32 = 1 << 18;
 
 impl<I: Index> Tree<'_, I> {
-    /// Whether the tree holds its triangles' neighbours, so that its surface has sides.
+    /// Whether the tree has adjacency, so that its surface has sides.
     #[must_use]
     pub const fn has_adjacency(&self) -> bool {
         !self.sections.adjacency.is_empty()
@@ -24,8 +24,7 @@ impl<I: Index> Tree<'_, I> {
 
     /// The triangle across an edge: 0 leads from the first corner to the second, 1 to the third, 2 back to the
     /// first. `None` at a border, outside the table, or where the tree has no adjacency.
-    ///
-    /// Cost: up to 65,535 triangles one table row read; beyond, triangle rows, too, at most four.
+    /// Cost: one read of a table row for up to 65,535 triangles; beyond, also at most four triangle rows.
     #[must_use]
     pub const fn neighbour(&self, triangle: TriangleRow, edge: u32) -> Option<TriangleRow> {
         match self.row_across(triangle.0, edge) {
@@ -34,10 +33,9 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
-    /// The row of the triangle across an edge.
     #[inline]
     pub(crate) const fn row_across(&self, triangle: u32, edge: u32) -> Option<u32> {
-        // A code that no two rows share is the row itself.
+        // If no two rows share a code, it is the row itself.
         if self.header.triangles <= u16::MAX as u32 {
             return match format::neighbour_code::<I>(self.sections.adjacency, triangle, edge) {
                 Some(row) if row < self.header.triangles => Some(row),
@@ -50,7 +48,6 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
-    /// The triangle across an edge, and the number of that edge in it.
     #[inline]
     pub(crate) const fn across(&self, triangle: u32, edge: u32) -> Option<(u32, u32)> {
         let Some(code) = format::neighbour_code::<I>(self.sections.adjacency, triangle, edge)
@@ -76,7 +73,7 @@ impl<I: Index> Tree<'_, I> {
     }
 }
 
-/// Both ends of an edge of a triangle.
+/// Both end vertices of a triangle's edge.
 const fn edge_of([a, b, c]: [u32; 3], edge: u32) -> (u32, u32) {
     match edge {
         0 => (a, b),
@@ -98,7 +95,7 @@ const fn edge_between([a, b, c]: [u32; 3], from: u32, to: u32) -> Option<u32> {
     }
 }
 
-/// Checks that every neighbour exists and has this triangle as its neighbour. A turn around a vertex then closes, or
+/// Checks that every neighbour exists and has this triangle as its neighbour. A walk around a vertex then closes, or
 /// ends at a border. Returns whether every edge has a neighbour.
 pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<bool, FormatError> {
     let triangles = tree.header.triangles;

@@ -28,9 +28,9 @@ pub enum FormatError {
     },
     /// The index width is not that of the tree type.
     Width {
-        /// Bytes an index takes in the tree type.
+        /// Bytes of an index in the tree type.
         expected: u8,
-        /// Bytes an index takes in these bytes.
+        /// Bytes of an index in these bytes.
         found: u8,
     },
     /// The checksum does not match: the bytes changed since they were written.
@@ -52,12 +52,12 @@ pub enum FormatError {
         /// The section's kind, see [`crate::format::section`].
         kind: u32,
     },
-    /// A section of a kind that this crate does not read, and must not skip.
+    /// A section of an unknown kind that must not be skipped.
     Kind {
         /// The section's kind.
         kind: u32,
     },
-    /// A node's children do not follow those of the node before it.
+    /// A node's children do not follow those of the previous node.
     NodeOrder {
         /// Row of the first child that is out of place.
         node: u32,
@@ -76,12 +76,12 @@ pub enum FormatError {
         /// The radius code.
         code: u32,
     },
-    /// A leaf's triangles do not follow the leaf before it, or run beyond the table.
+    /// A leaf's triangles do not follow the previous leaf's, or extend beyond the table.
     Leaf {
         /// First triangle of the leaf.
         first: u32,
     },
-    /// The first or second corner of a triangle, not a leaf's first, is new to the leaf.
+    /// The first or second corner of a triangle (other than a leaf's first) is new to the leaf.
     Patch {
         /// Row of the triangle.
         triangle: u32,
@@ -100,7 +100,7 @@ pub enum FormatError {
         /// Row of the vertex order.
         row: u32,
     },
-    /// A triangle's rest metric is not finite, is negative, or continues an edge that the row before does not have.
+    /// A triangle's rest metric is not finite, is negative, or continues an edge that the previous row does not have.
     Metric {
         /// Row of the triangle.
         triangle: u32,
@@ -162,7 +162,10 @@ impl fmt::Display for FormatError {
             Self::Radius { node, code } => write!(f, "node {node} has radius code {code}"),
             Self::Leaf { first } => write!(f, "the leaf at triangle {first} is out of order"),
             Self::Patch { triangle, vertex } => {
-                write!(f, "corner {vertex} of triangle {triangle} is not where its leaf needs it")
+                write!(
+                    f,
+                    "corner {vertex} of triangle {triangle} is new to its leaf, but not third"
+                )
             }
             Self::Corner { triangle, vertex } => {
                 write!(f, "triangle {triangle} uses missing vertex {vertex}")

@@ -1,4 +1,4 @@
-//! The facts by which both ends of a bus see that they mean the same surface.
+//! The facts by which both ends of a bus check that they have the same surface.
 
 // Requirement: M-06
 
@@ -6,20 +6,20 @@ use core::fmt;
 
 use super::Unit;
 
-/// A surface's unit and size, as one end of a bus states them.
+/// A surface's unit and size, as stated by one end of a bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SurfaceFacts {
-    /// Unit of the mesh's file; `None` where it is not known.
+    /// Unit of the mesh's file; `None` if unknown.
     pub unit: Option<Unit>,
-    /// Vertices; 0 where it is not known.
+    /// Number of vertices; 0 if unknown.
     pub vertices: u32,
-    /// Triangles; 0 where it is not known.
+    /// Number of triangles; 0 if unknown.
     pub triangles: u32,
 }
 
 impl SurfaceFacts {
-    /// Whether nothing that both state differs.
+    /// Whether all facts that both sides state are equal.
     ///
     /// ```
     /// use dibs_nostd::{SurfaceFacts, format::Unit};

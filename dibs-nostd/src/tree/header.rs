@@ -6,7 +6,7 @@ use crate::tree::format::{
 };
 use crate::tree::{FormatError, Index, Unit};
 
-/// The header's fields that a query needs.
+/// The header's fields used by queries.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Header {
     pub paths: PathKind,
@@ -18,9 +18,9 @@ pub(crate) struct Header {
     pub stretch: f32,
     pub radius_unit: f32,
     pub position_error: f32,
-    /// 1 where there is an origin section, else 0.
+    /// 1 if there is an origin section, else 0.
     pub origin: u32,
-    /// Roots besides the first. The roots are the first rows of the node table.
+    /// Number of roots less one. The roots are the first rows of the node table.
     pub other_roots: u32,
     /// Rows of the section table.
     pub sections: u32,
@@ -63,10 +63,9 @@ impl Header {
     }
 }
 
-/// The largest code of a unit.
 const MAX_UNIT: u32 = Unit::Micrometre.code() as u32;
 
-/// A header field. The length was checked, so it exists.
+/// A header field. The length has been checked, so it exists.
 const fn field(bytes: &[u8], offset: usize) -> Result<u32, FormatError> {
     match u32_at(bytes, offset) {
         Some(value) => Ok(value),

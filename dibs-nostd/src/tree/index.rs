@@ -1,4 +1,4 @@
-//! The two widths of vertex indices: one code, chosen by a type parameter.
+//! The two widths of vertex indices, chosen by a type parameter.
 
 mod sealed {
     pub trait Sealed: Sized {

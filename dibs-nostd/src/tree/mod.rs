@@ -1,4 +1,4 @@
-//! The tree: a validated view of bytes that stay where they are, in flash or in a file.
+//! The tree: a validated view of bytes in flash or in a file.
 //!
 //! One file, because it is the view's whole interface.
 
@@ -53,14 +53,14 @@ use sections::Sections;
 
 /// A deformation invariant bounding sphere tree with its triangles.
 ///
-/// `I` is the index width, `u16` for up to 65,536 vertices or `u32`. The tree borrows its bytes, holds no position
-/// (only the vertex that each sphere is pinned to) and never changes: see `docs/format.md`.
+/// `I` is the index width, `u16` for up to 65,536 vertices or `u32`. The tree borrows its bytes, holds no positions
+/// (only the vertex to which each sphere is pinned) and never changes: see `docs/format.md`.
 #[derive(Clone, Copy, Debug)]
 pub struct Tree<'a, I> {
     sections: Sections<'a>,
     header: Header,
-    /// The checksum if no edge of the surface is a border, else its complement. After a fault in memory it is neither, and
-    /// the tree counts as open: a depth then takes longer, and is right.
+    /// The checksum if no edge of the surface is a border, else its complement. After a memory fault it is neither, and
+    /// the tree counts as open: then a depth takes longer, but is correct.
     closed: u32,
     width: PhantomData<I>,
 }
@@ -68,12 +68,12 @@ pub struct Tree<'a, I> {
 impl<'a, I: Index> Tree<'a, I> {
     /// Validates the bytes of a tree, and returns a view of them.
     ///
-    /// Call it once, at start-up; for a generated tree [`TreeBytes::validate`] does. Checks the layout, the CRC-32, and
-    /// that the tree is well formed: children after parents, every index inside its table, every triangle in exactly
-    /// one leaf, depth as stated. It cannot check that the radii cover this mesh: the builder proves that. (It is
-    /// `const`, but slow in a constant: the compiler takes a second or two for every thousand triangles.)
+    /// Call it once, at start-up; for a generated tree [`TreeBytes::validate`] does so. It checks the layout, the
+    /// CRC-32, and that the tree is well formed: children after parents, every index inside its table, every triangle
+    /// in exactly one leaf, depth as stated. It cannot check that the radii cover this mesh: the builder proves that.
+    /// (It is `const`, but slow in a constant: the compiler takes a second or two for every thousand triangles.)
     ///
-    /// Cost: linear in the bytes, no memory beyond a fixed stack of [`format::MAX_STACK`] words.
+    /// Cost: linear in the bytes, no memory besides a fixed stack of [`format::MAX_STACK`] words.
     ///
     /// # Errors
     /// [`FormatError`] names the first defect and its value.
@@ -89,11 +89,11 @@ impl<'a, I: Index> Tree<'a, I> {
         Ok(tree)
     }
 
-    /// Checks this view (the decoded header and the places of the sections) against the bytes. The view lies in RAM,
-    /// which a [`Scrub`] does not read: check that of a [`Query`](crate::Query), `query.tree()`, once a tick or once a
+    /// Checks this view (the decoded header and the section offsets) against the bytes. The view is in RAM, which a
+    /// [`Scrub`] does not read: check the view of a [`Query`](crate::Query), `query.tree()`, once a tick or once a
     /// round of the scrub.
     ///
-    /// Cost: some hundred instructions, whatever the size of the tree.
+    /// Cost: some hundred instructions for any size of tree.
     ///
     /// # Errors
     /// [`FormatError::Field`] or [`FormatError::Section`] name the change.
@@ -102,8 +102,8 @@ impl<'a, I: Index> Tree<'a, I> {
         self.sections.check::<I>(bytes, &self.header)
     }
 
-    /// The same tree on a copy of its bytes, say in tightly coupled memory, without another validation. The header's
-    /// values stay the validated ones.
+    /// The same tree on a copy of its bytes, for example in tightly coupled memory, without another validation. The
+    /// header's values stay the validated ones.
     ///
     /// # Errors
     /// [`FormatError`] if the copy's sections are not where this tree's layout has them.
@@ -118,7 +118,7 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
-    /// Checksum of all of the tree's bytes, which differs between two trees of one mesh.
+    /// Checksum of all bytes of the tree; it differs between two trees of one mesh.
     #[must_use]
     pub const fn checksum(&self) -> u32 {
         self.header.checksum
@@ -131,7 +131,7 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.mesh_id
     }
 
-    /// Number of vertices: rows that a vertex table for this tree must have.
+    /// Number of vertices, which is the number of rows of a vertex table for this tree.
     #[must_use]
     pub const fn vertex_count(&self) -> u32 {
         self.header.vertices
@@ -143,21 +143,21 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.triangles
     }
 
-    /// Vertices of the mesh's file, those of no triangle too: positions that a frame in the file's order has. Of STL, which
-    /// does not number them, its distinct positions.
+    /// Number of vertices in the mesh's file, including those without a triangle: a frame in the file's order has this
+    /// many positions. For STL, which does not number vertices, its distinct positions.
     #[must_use]
     pub const fn file_vertex_count(&self) -> u32 {
         self.header.file_vertices
     }
 
-    /// Triangles of the mesh's file, those too that the builder dropped; polygons count as the triangles that they were
-    /// cut into.
+    /// Number of triangles in the mesh's file, including those that the builder dropped; polygons count as the
+    /// triangles into which they were cut.
     #[must_use]
     pub const fn file_triangle_count(&self) -> u32 {
         self.header.file_triangles
     }
 
-    /// The unit of the mesh's file; `None` where the builder was not told. The tree's lengths are in millimetres.
+    /// The unit of the mesh's file; `None` if the builder was not told. The tree's lengths are in millimetres.
     #[must_use]
     pub const fn unit(&self) -> Option<Unit> {
         Unit::from_code(self.header.unit as u8)
@@ -170,21 +170,21 @@ impl<'a, I: Index> Tree<'a, I> {
         SurfaceFacts { unit: self.unit(), vertices, triangles }
     }
 
-    /// Number of nodes: inner ones, leaves and the roots.
+    /// Number of nodes: inner nodes, leaves and roots.
     #[must_use]
     pub const fn node_count(&self) -> u32 {
         self.header.nodes
     }
 
-    /// Number of roots, 1 to 64: of surfaces that share no vertex. They are the first nodes.
+    /// Number of roots, 1 to 64: one for each of the surfaces that share no vertex. They are the first nodes.
     #[must_use]
     #[doc(hidden)]
     pub const fn roots(&self) -> u32 {
         self.header.other_roots + 1
     }
 
-    /// Entries that a traversal's stack must hold: one, and for every level of the tree one less than the most siblings
-    /// there.
+    /// Stack entries that a traversal needs: one, plus for every level of the tree the largest number of siblings there
+    /// less one.
     #[must_use]
     pub const fn stack(&self) -> u32 {
         self.header.stack
@@ -197,8 +197,9 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.position_error
     }
 
-    /// The point of the mesh's file, in millimetres, that all of the tree's coordinates count from: those of vertices,
-    /// tools and answers. Zero unless the file's coordinates are so far from their own origin that f32 would lose them.
+    /// The point of the mesh's file, in millimetres, that is the origin of the tree's coordinates: those of vertices,
+    /// tools and answers. Zero unless the file's coordinates are so far from their own origin that f32 would lose
+    /// precision.
     #[must_use]
     pub const fn origin(&self) -> [f64; 3] {
         format::origin(self.sections.origin)
@@ -207,7 +208,7 @@ impl<'a, I: Index> Tree<'a, I> {
     /// A point of the mesh's file (mm) in the tree's coordinates: less the [origin](Self::origin), in f64, then
     /// rounded.
     ///
-    /// Cost: three subtractions in f64, which a processor without them computes by some hundred instructions.
+    /// Cost: three subtractions in f64, some hundred instructions on a processor without f64.
     #[must_use]
     pub const fn local(&self, point: [f64; 3]) -> Vec3 {
         let ([x, y, z], [x0, y0, z0]) = (point, self.origin());
@@ -220,7 +221,7 @@ impl<'a, I: Index> Tree<'a, I> {
         self.header.stretch
     }
 
-    /// The measure of stretch that the limit bounds.
+    /// The measure of stretch to which the limit applies.
     #[must_use]
     pub const fn paths(&self) -> PathKind {
         self.header.paths
@@ -232,7 +233,7 @@ impl<'a, I: Index> Tree<'a, I> {
         self.sections.nodes.len() + self.sections.triangles.len()
     }
 
-    /// Bytes of the adjacency; 0 where the tree has none.
+    /// Bytes of the adjacency; 0 if the tree has none.
     #[must_use]
     pub const fn adjacency_bytes(&self) -> usize {
         self.sections.adjacency.len()
@@ -249,8 +250,8 @@ impl<'a, I: Index> Tree<'a, I> {
         format::triangle::<I>(self.sections.triangles, row)
     }
 
-    /// The mesh's number of the vertex in `row`; `None` outside the table or where the tree was emitted without its
-    /// vertex order.
+    /// The mesh's number of the vertex in `row`; `None` outside the table or if the tree was emitted without its vertex
+    /// order.
     ///
     /// ```
     /// use dibs_build::{Builder, generate};
@@ -269,15 +270,15 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
-    /// Rest position of the vertex in `row` (mm); `None` outside the table or where the tree was
-    /// emitted without its rest shape.
+    /// Rest position of the vertex in `row` (mm); `None` outside the table or if the tree was emitted without its rest
+    /// shape.
     #[must_use]
     pub const fn rest_position(&self, row: u32) -> Option<Vec3> {
         format::rest_position(self.sections.rest, row)
     }
 
-    /// Rest metric of a triangle (`docs/format.md`);
-    /// `None` outside the table or where the tree was emitted without its metric.
+    /// Rest metric of a triangle (`docs/format.md`); `None` outside the table or if the tree was emitted without its
+    /// metric.
     #[doc(hidden)]
     #[inline(always)]
     #[must_use]
@@ -285,8 +286,8 @@ impl<'a, I: Index> Tree<'a, I> {
         format::metric(self.sections.metric, row)
     }
 
-    /// Stretch limit of a triangle: the tree's, or less where the tree was built with limits for each
-    /// triangle. `None` outside the table.
+    /// Stretch limit of a triangle: the tree's, or less if the tree was built with limits for each triangle. `None`
+    /// outside the table.
     #[must_use]
     pub const fn stretch_limit(&self, TriangleRow(row): TriangleRow) -> Option<f32> {
         if self.sections.limits.is_empty() {
@@ -298,9 +299,10 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
-    /// Label of a triangle's tissue: a margin and a stiffness for each, or none. Ask for the contacts of each label with
-    /// [`Options::contacts_of`](crate::Options::contacts_of): of the whole surface's contacts, none need be on a part that
-    /// is within its margin beside a nearer one. `None` outside the table or where the tree was built without labels.
+    /// Label of a triangle's tissue, for a margin and a stiffness of its own. Query the contacts of each label with
+    /// [`Options::contacts_of`](crate::Options::contacts_of): the contacts of the whole surface may include none on a
+    /// part that is within its margin but next to a nearer part. `None` outside the table or if the tree was built
+    /// without labels.
     ///
     /// ```
     /// use dibs_build::{Builder, generate};
@@ -340,8 +342,8 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
-    /// Pin, geodesic radius (mm, rounded up) and link of a node, for tools that walk the tree; `None`
-    /// outside the table. Row 0 is the root.
+    /// Pin, geodesic radius (mm, rounded up) and link of a node, for programs that walk the tree; `None` outside the
+    /// table. Row 0 is the root.
     #[must_use]
     pub const fn node(&self, row: u32) -> Option<(u32, f32, Link)> {
         match self.record(row) {
@@ -358,34 +360,31 @@ impl<'a, I: Index> Tree<'a, I> {
         format::node::<I>(self.sections.nodes, row)
     }
 
-    /// As [`Self::record`], faster at run time.
+    /// As [`Self::record`], but faster at run time.
     #[inline(always)]
     pub(crate) fn whole_record(&self, row: u32) -> Option<Node> {
         format::whole_node::<I>(self.sections.nodes, row)
     }
 
-    /// As [`several::copy_nodes`].
     #[cfg(feature = "wide")]
     #[inline(always)]
     pub(crate) fn copy_nodes(&self, first: u32, count: u32, to: &mut [u8]) -> Option<()> {
         several::copy_nodes::<I>(self.sections.nodes, first, count, to)
     }
 
-    /// As [`several::leaf_vertices`].
     #[cfg(feature = "wide")]
     #[inline(always)]
     pub(crate) fn leaf_vertices(&self, first: u32, count: u32) -> Option<[u32; 12]> {
         several::leaf_vertices::<I>(self.sections.triangles, first, count)
     }
 
-    /// As [`several::four_triangles`].
     #[cfg(feature = "wide")]
     #[inline(always)]
     pub(crate) fn four_triangles(&self, first: u32, count: u32) -> Option<[[u32; 4]; 3]> {
         several::four_triangles::<I>(self.sections.triangles, first, count)
     }
 
-    /// The nodes of a run of rows; `None` unless all exist.
+    /// The nodes in a range of rows; `None` unless all exist.
     #[inline(always)]
     pub(crate) fn records(&self, first: u32, count: u32) -> Option<impl Iterator<Item = Node>> {
         let mut rows = format::run(self.sections.nodes, first, count, format::node_bytes::<I>())?;
@@ -396,7 +395,7 @@ impl<'a, I: Index> Tree<'a, I> {
         }))
     }
 
-    /// The corners of a run of triangles; `None` unless all exist.
+    /// The corners of a range of triangles; `None` unless all exist.
     #[inline(always)]
     pub(crate) fn triangles(
         &self,

@@ -6,18 +6,18 @@ use glam::Vec3;
 
 use super::{Index, Tree, format};
 
-/// The number in the mesh's file of each row, or of rows that have the file's order.
+/// The number in the mesh's file of each row, unless rows have the file's order.
 #[derive(Clone, Copy, Debug)]
 pub struct VertexOrder<'t, I> {
     numbers: &'t [u8],
     rows: u32,
-    /// Positions of a frame in the file's order.
+    /// Number of positions of a frame in the file's order.
     positions: u32,
     width: PhantomData<I>,
 }
 
 impl<'t, I: Index> VertexOrder<'t, I> {
-    /// The order of a tree's vertices; that of the rows where the tree was emitted without its vertex order.
+    /// The order of a tree's vertices; the row order if the tree was emitted without its vertex order.
     pub const fn of(tree: &Tree<'t, I>) -> Self {
         let (numbers, rows) = (tree.sections.order, tree.vertex_count());
         let positions = if numbers.is_empty() { rows } else { tree.file_vertex_count() };
@@ -30,8 +30,8 @@ impl<'t, I: Index> VertexOrder<'t, I> {
         Self { numbers: &[], rows, positions: rows, width: PhantomData }
     }
 
-    /// Positions in the file's order, by row; `None` where they are not as many as the file has. A number beyond them is
-    /// not a position.
+    /// Positions in the file's order, read by row; `None` if their number is not the file's. A number beyond them has
+    /// no position.
     pub fn rows<'p, P: Copy + Into<Vec3>>(
         &self,
         positions: &'p [P],

@@ -1,4 +1,4 @@
-//! Types for two kinds of numbers that are easily confused with each other, and with rows of a vertex table.
+//! Types for two kinds of numbers that are easily confused with each other and with rows of a vertex table.
 
 // Requirement: A-12
 
@@ -16,7 +16,7 @@ impl fmt::Display for TriangleRow {
     }
 }
 
-/// A vertex, by its number in the mesh, from 0: for reports to people, and for data in the mesh's order.
+/// A vertex, by its number in the mesh, from 0: for messages to people, and for data in the mesh's order.
 /// [`Tree::vertex_number`](crate::Tree::vertex_number) finds it from the row in a vertex table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

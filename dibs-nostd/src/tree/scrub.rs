@@ -10,11 +10,11 @@ use crate::tree::format::{CRC, u32_at};
 /// An endless background check of a tree's bytes against their checksum.
 ///
 /// Validation at start-up does not see later changes of the flash, and a query does not detect every flipped bit: a
-/// radius or an index that is wrong but possible gives a wrong answer. A scrub detects it within two rounds, with a
-/// bounded number of bytes in each call: the present round may have passed the place already.
+/// radius or an index that is wrong but possible gives a wrong answer. A scrub detects a change within two rounds,
+/// since the current round may be past it already, with a bounded number of bytes in each call.
 ///
-/// With 64 bytes a tick at 1 kHz, a tree of 100 kB takes 1.6 s a round. [`CRC`] lists the damage that the checksum
-/// detects for certain; of other damage one pattern in 2^32 passes.
+/// With 64 bytes a tick at 1 kHz, a round over a tree of 100 kB takes 1.6 s. [`CRC`] lists the damage that the checksum
+/// certainly detects; of other damage one pattern in 2^32 is missed.
 ///
 /// ```
 /// use dibs_nostd::{CorruptTreeError, Scrub};
@@ -65,7 +65,7 @@ impl fmt::Display for CorruptTreeError {
 impl core::error::Error for CorruptTreeError {}
 
 impl<'a> Scrub<'a> {
-    /// A check of all bytes of a tree, as they were given to [`Tree::from_bytes`](crate::Tree::from_bytes).
+    /// A check of all bytes of a tree, the same as given to [`Tree::from_bytes`](crate::Tree::from_bytes).
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0, digest: CRC.digest(), rounds: 0 }
@@ -101,7 +101,7 @@ impl<'a> Scrub<'a> {
         }
     }
 
-    /// Rounds finished; wraps.
+    /// Completed rounds; wraps.
     #[must_use]
     pub const fn rounds(&self) -> u32 {
         self.rounds
@@ -145,7 +145,6 @@ mod tests {
         }
     }
 
-    /// Every bit of the decoded header, and every place of a section.
     #[test]
     fn every_flipped_bit_of_the_decoded_header_is_found() {
         let mesh = dibs_build::generate::heart(320).expect("a valid size").mesh;

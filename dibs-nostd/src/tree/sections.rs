@@ -1,4 +1,4 @@
-//! The sections of a tree: their kinds, lengths and places.
+//! The sections of a tree: their kinds, lengths and offsets.
 //!
 //! To add one: its kind in [`section`], a row in [`rules`], a field of [`Sections`] and of its `all`.
 
@@ -9,7 +9,7 @@ use crate::tree::format::{
 use crate::tree::header::Header;
 use crate::tree::{FormatError, Index};
 
-/// The parts of a tree's bytes; an optional one that is absent is empty.
+/// The parts of a tree's bytes; an absent optional part is empty.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sections<'a> {
     pub nodes: &'a [u8],
@@ -18,7 +18,7 @@ pub(crate) struct Sections<'a> {
     pub rest: &'a [u8],
     pub metric: &'a [u8],
     pub limits: &'a [u8],
-    /// What moves the surface: modes, or the nodes of a tree with volume paths.
+    /// The coarse model that moves the surface: modes, or the nodes of a tree with volume paths.
     pub coarse: &'a [u8],
     pub adjacency: &'a [u8],
     pub origin: &'a [u8],
@@ -30,7 +30,7 @@ pub(crate) struct Sections<'a> {
 #[derive(Clone, Copy)]
 struct Rule {
     kind: u32,
-    /// Its bytes; `None` where a later check decides.
+    /// Its bytes; `None` if a later check decides.
     length: Option<u64>,
     required: bool,
 }
@@ -66,7 +66,7 @@ const fn rules<I: Index>(header: &Header) -> [Rule; COUNT] {
             required: is_volume,
         },
         Rule::optional(section::ADJACENCY, triangles, triangle_bytes::<I>()),
-        // Where the header has none, the section must be absent or empty.
+        // If the header has no origin, the section must be absent or empty.
         Rule { required: origin == 1, ..Rule::optional(section::ORIGIN, origin, ORIGIN_BYTES) },
         Rule::optional(section::LABELS, triangles, 1),
         // `shells::check` checks it.
@@ -167,7 +167,7 @@ impl<'a> Sections<'a> {
         [nodes, triangles, order, rest, metric, limits, coarse, adjacency, origin, labels, solids]
     }
 
-    /// Checks that each section is still at its place in the bytes.
+    /// Checks that each section is still at its offset in the bytes.
     pub fn check<I: Index>(&self, bytes: &[u8], header: &Header) -> Result<(), FormatError> {
         let found = find::<I>(bytes, header)?;
         let places = self.all().into_iter().zip(found.all());

@@ -1,13 +1,13 @@
-//! The shells of a tree: surfaces that share no vertex, a root each, and the solids that they bound.
+//! The shells of a tree: surfaces that share no vertex, with one root each, and the solids that they bound.
 //!
 //! A closed shell that faces outwards bounds a solid; shells that face inwards and lie in it at rest are its cavities.
-//! Open surfaces bound none.
+//! Open surfaces bound no solid.
 
 use super::format::{self, SOLID_BYTES, section};
 use super::{FormatError, Tree};
 use crate::Index;
 
-/// The solid of a surface that bounds none.
+/// The solid of an open surface, which bounds none.
 pub(crate) const OPEN: u32 = u32::MAX;
 
 /// A set of a tree's roots: one bit each.
@@ -28,13 +28,13 @@ impl RootSet {
         self.0.wrapping_shr(root) & 1 != 0
     }
 
-    /// The least root.
+    /// The lowest root.
     #[inline(always)]
     pub const fn first(self) -> u32 {
         self.0.trailing_zeros()
     }
 
-    /// A number that tells the shells of one solid, or all, from others.
+    /// A number that distinguishes the shells of one solid, or all shells, from others.
     pub const fn key(self) -> u32 {
         if self.0 == Self::ALL.0 { u32::MAX } else { self.first() }
     }
@@ -57,7 +57,6 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
-    /// The root above a triangle.
     pub(crate) fn root_of(&self, triangle: u32) -> u32 {
         let mut found = 0;
         for root in 1..=self.header.other_roots {
@@ -77,8 +76,8 @@ impl<I: Index> Tree<'_, I> {
         }
     }
 
-    /// The shells that decide together on which side a point is whose closest sheet is that of a root: those of its
-    /// solid. An open surface decides where it is the closest of all.
+    /// The shells that together decide the side of a point whose closest sheet belongs to a root: those of its solid.
+    /// An open surface decides where it is the closest of all.
     pub(crate) fn shells_of(&self, root: u32) -> RootSet {
         let Some(solid) = self.solid_of(root) else { return RootSet::ALL };
         let mut shells = RootSet::of(solid);

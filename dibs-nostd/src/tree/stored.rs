@@ -7,10 +7,10 @@ use crate::{FormatError, Index, Scrub, Tree};
 
 /// The bytes of a tree in flash, not validated yet.
 ///
-/// No query takes these bytes: [`validate`](Self::validate), called once at start-up, makes a [`Tree`] of them. The
-/// sizes of buffers and stacks are constants before that, so that a `static` can be declared with them.
+/// No query takes these bytes: [`validate`](Self::validate), called once at start-up, gives a [`Tree`]. Sizes of
+/// buffers and stacks are available as constants before that, so that a `static` can be declared with them.
 ///
-/// The module that [`include_tree!`](crate::include_tree) includes has one as `TREE`.
+/// The module included by [`include_tree!`](crate::include_tree) has one as `TREE`.
 ///
 /// ```
 /// use dibs_nostd::{Query, TreeBytes};
@@ -57,13 +57,13 @@ impl<'a, I: Index> TreeBytes<'a, I> {
         self.bytes
     }
 
-    /// Vertices that the header states: rows of a vertex table. 0 where there is no header.
+    /// Number of vertices in the header, which is the number of rows of a vertex table. 0 if there is no header.
     #[must_use]
     pub const fn vertex_count(&self) -> usize {
         self.word(field::VERTICES)
     }
 
-    /// Entries that the header states for a query's stack. 0 where there is no header.
+    /// Stack entries of a query, from the header. 0 if there is no header.
     #[must_use]
     pub const fn stack(&self) -> usize {
         self.word(field::STACK)

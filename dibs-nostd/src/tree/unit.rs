@@ -1,4 +1,4 @@
-//! Units of length that mesh files are in.
+//! Units of length of mesh files.
 
 use core::fmt;
 
@@ -25,7 +25,7 @@ impl Unit {
     pub const ALL: [Self; 5] =
         [Self::Millimetre, Self::Centimetre, Self::Metre, Self::Inch, Self::Micrometre];
 
-    /// The millimetres of one.
+    /// The number of millimetres in one unit.
     #[must_use]
     pub const fn millimetres(self) -> f64 {
         match self {
@@ -49,7 +49,7 @@ impl Unit {
         }
     }
 
-    /// The number that stands for this unit in a tree's header, 1 to 5; 0 is a unit that is not known.
+    /// The code of this unit in a tree's header, 1 to 5; 0 is an unknown unit.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {

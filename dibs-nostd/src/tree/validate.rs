@@ -1,4 +1,4 @@
-//! The well-formedness checker: whether header and sections are a tree.
+//! Validation: whether header and sections form a tree.
 
 // Requirement: M-01
 
@@ -43,10 +43,9 @@ pub(super) const fn well_formed<I: Index>(
 }
 
 /// Reads every node once, in order. Nodes are in breadth-first order, so each link to children must point to the first
-/// rows that no earlier link has. This proves a tree that includes every node.
+/// rows to which no earlier link points. This proves a tree that includes every node.
 const fn nodes<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let header = parts.header;
-    // The first level is the roots.
     let roots = header.other_roots + 1;
     let (mut level_end, mut next_node) = (roots, roots);
     let (mut stack, mut most_siblings) = (roots, 1);
@@ -88,8 +87,8 @@ const fn nodes<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     }
 }
 
-/// Walks the tree once, depth first: the leaves' triangles must come as 0, 1, 2, ..., so that every triangle is in one
-/// leaf. `nodes` has proven that it is a tree, and the entries that may wait.
+/// Walks the tree once, depth first: the leaves' triangles must be 0, 1, 2, ..., so that every triangle is in one leaf.
+/// `nodes` has proven that it is a tree, and the number of stack entries.
 const fn leaves<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let header = parts.header;
     // The mask keeps the index from panicking.
@@ -134,8 +133,8 @@ const fn leaves<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
 
 const _: () = assert!(MAX_STACK.is_power_of_two() && MAX_LEAF_TRIANGLES.is_power_of_two());
 
-/// Checks that, after a leaf's first triangle, only a triangle's third corner is new to the leaf: a query tests only
-/// those to reject a leaf.
+/// Checks that, after a leaf's first triangle, only a triangle's third corner is new to the leaf: to reject a leaf, a
+/// query tests only those.
 const fn patch<I: Index>(parts: &Parts<'_, I>, first: u32, count: u32) -> Result<(), FormatError> {
     // Third corners of the leaf's triangles; the mask keeps the index from panicking.
     const MASK: usize = MAX_LEAF_TRIANGLES as usize - 1;
@@ -194,7 +193,7 @@ const fn tables<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     let origin = format::origin(sections.origin);
     let mut axis = 0;
     while axis < 3 {
-        // By its bits: a processor may compute f64 in software only.
+        // By its bits: the processor may have no f64 instructions.
         if (origin[axis].to_bits() >> 52) & 0x7FF == 0x7FF {
             return Err(FormatError::Origin { axis: axis as u8 });
         }
@@ -224,7 +223,7 @@ const fn tables<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
     Ok(())
 }
 
-/// Whether a triangle's metric is valid, and the row before has the edge that it continues.
+/// Whether a triangle's metric is valid, and the previous row has the edge that it continues.
 const fn is_metric<I: Index>(parts: &Parts<'_, I>, row: u32) -> bool {
     let Some(metric) = parts.metric(row) else { return false };
     let [first, second, third] = metric.squares;
@@ -236,7 +235,7 @@ const fn is_metric<I: Index>(parts: &Parts<'_, I>, row: u32) -> bool {
         },
         _ => false,
     };
-    // A NaN is in no range.
+    // NaN is in no range.
     first < f32::INFINITY
         && second.abs() < f32::INFINITY
         && third >= 0.0
@@ -244,7 +243,6 @@ const fn is_metric<I: Index>(parts: &Parts<'_, I>, row: u32) -> bool {
         && is_joined
 }
 
-/// The corners of a triangle, its centre first.
 const fn centre_first<I: Index>(parts: &Parts<'_, I>, row: u32) -> Option<[u32; 3]> {
     match (parts.metric(row), parts.triangle(row)) {
         (Some(metric), Some(corners)) => Some(metric.centre_first(corners)),

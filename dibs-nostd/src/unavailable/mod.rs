@@ -8,7 +8,7 @@ pub use query::QueryError;
 
 use crate::time::Millis;
 
-/// Why there is no proximity to act on.
+/// Why there is no proximity for a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -25,12 +25,12 @@ pub enum Unavailable {
     Query(QueryError),
     /// The tree's bytes changed since they were validated: [`Scrub`](crate::Scrub).
     CorruptTree,
-    /// No good packet came within the time allowed.
+    /// No good packet was received within the allowed time.
     LinkLost {
         /// Time since the last one.
         silence: Millis,
     },
-    /// No heartbeat came within the time allowed.
+    /// No heartbeat was received within the allowed time.
     HeartbeatLost {
         /// Time since the last one.
         silence: Millis,
@@ -42,15 +42,15 @@ pub enum Unavailable {
     },
     /// The transit of the surface was longer than allowed, or is unknown.
     Delayed {
-        /// From the status that it echoes to its arrival; [`Millis::MAX`] if it echoes none.
+        /// Time from the status that the frame echoes to its arrival; [`Millis::MAX`] if it echoes none.
         transit: Millis,
     },
-    /// The surface was older than allowed when it was sent: its source stands still.
+    /// The surface was older than allowed when it was sent: its source has stopped.
     SourceStale {
         /// Its age then.
         age: Millis,
     },
-    /// More packets were forged than allowed since the last publication.
+    /// More packets were forged than allowed.
     Forgeries {
         /// Packets without a genuine tag.
         count: u32,

@@ -38,9 +38,9 @@ pub enum QueryError {
     },
     /// The stretch was measured on another frame.
     OtherFrame {
-        /// Number of the frame that is searched.
+        /// Number of the searched frame.
         expected: u32,
-        /// Number of the frame that was measured.
+        /// Number of the measured frame.
         found: u32,
     },
     /// No triangle was found as close as the nearest pin: the surface is stretched beyond the query's limit, or the
@@ -51,7 +51,7 @@ pub enum QueryError {
     },
     /// The tree has no adjacency, so a triangle's neighbours are unknown.
     NoAdjacency,
-    /// A list of contacts with no room, or too much.
+    /// A list of contacts with capacity zero, or too large.
     Contacts {
         /// Contacts that the list holds.
         capacity: u32,
@@ -96,7 +96,7 @@ impl fmt::Display for QueryError {
             Self::Uncovered { pin } => {
                 write!(
                     f,
-                    "no triangle found within reach of vertex {pin}: over-stretched or corrupt"
+                    "no triangle is as close as vertex {pin}: over-stretched or corrupt"
                 )
             }
             Self::NoAdjacency => f.write_str(
@@ -104,7 +104,7 @@ impl fmt::Display for QueryError {
                  it was built without adjacency",
             ),
             Self::Contacts { capacity, near } => {
-                write!(f, "a list cannot hold {capacity} contacts and look at {near} triangles")
+                write!(f, "a list cannot hold {capacity} contacts and compare {near} triangles")
             }
             Self::Margin { bits } => write!(f, "a margin cannot be {}", f32::from_bits(bits)),
             Self::BlendTime { bits } => {

@@ -18,11 +18,11 @@ pub enum Body<'a> {
     Weights(Weights<'a>),
     /// A frame ends: all of it was sent.
     Commit(Commit),
-    /// Where the surface of a frame is as a whole.
+    /// The pose of a frame's surface.
     Pose(Result<RigidPose, PoseError>),
     /// A sign of life from the sender.
     Heartbeat(Heartbeat),
-    /// The receiver's state, with its counters or as the answer to a hello: all that comes back.
+    /// The receiver's state, with its counters or as the answer to a hello: the only packet from receiver to sender.
     Status(StatusReport<'a>),
     /// The sender's request for a status.
     Hello(Hello),
@@ -31,7 +31,7 @@ pub enum Body<'a> {
 /// The first packet of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Begin {
-    /// The sender's session, all of it.
+    /// The sender's session, all 32 bits.
     pub session: u32,
     /// The contents of the frame.
     pub content: Content,
@@ -53,9 +53,8 @@ pub struct Begin {
 pub struct Freshness {
     /// Time since the surface was captured, in ms; 65,535 stands for that or more.
     pub age_ms: u16,
-    /// [`Status::clock`](super::Status::clock) of the newest status that the sender had taken; `None` before the first.
-    /// The packet was made after that status, so the receiver's clock alone bounds the time that both were on their
-    /// way.
+    /// [`Status::clock`](super::Status::clock) of the newest status received by the sender; `None` before the first.
+    /// The packet was made after that status, so the receiver's clock alone bounds the transit time of both.
     pub echo: Option<u32>,
 }
 
@@ -96,7 +95,7 @@ impl Encoding {
     }
 }
 
-/// A run of consecutive vertices.
+/// A range of consecutive vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertices<'a> {
     /// Row of the first vertex, in the tree's vertex order.
@@ -150,7 +149,7 @@ pub(crate) const fn quantised_row(row: &[u8; 6]) -> [u16; 3] {
     [u16::from_le_bytes([x0, x1]), u16::from_le_bytes([y0, y1]), u16::from_le_bytes([z0, z1])]
 }
 
-/// A run of consecutive mode weights.
+/// A range of consecutive mode weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights<'a> {
     /// Number of the first mode.
@@ -164,8 +163,8 @@ pub struct Weights<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commit {
     /// Wrapping sum over the frame's begin packet and all its packets of content: of their
-    /// [`Code::contribution`](super::Code::contribution) if tagged, else of their scrambled checksums. It detects a mix
-    /// of two frames that happen to share session and epoch.
+    /// [`Code::contribution`](super::Code::contribution) if tagged, else of their scrambled checksums. It detects a
+    /// mixture of two frames with the same session and epoch.
     pub digest: u32,
 }
 
@@ -173,21 +172,21 @@ pub struct Commit {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Heartbeat {
-    /// The sender's session, all of it.
+    /// The sender's session, all 32 bits.
     pub session: u32,
-    /// One more in each heartbeat of the session; wraps.
+    /// Incremented in each heartbeat of the session; wraps.
     pub beat: u32,
-    /// [`Status::clock`](super::Status::clock) of the newest status that the sender had taken; `None` before the first.
+    /// [`Status::clock`](super::Status::clock) of the newest status received by the sender; `None` before the first.
     pub echo: Option<u32>,
 }
 
-/// The sender's request for an answer. With a key its tag is under the challenge 0, because the sender may not know the
-/// receiver's yet: so nobody without the key collects answers to nonces of his own.
+/// The sender's request for an answer. With a key its tag uses the challenge 0, because the sender may not know the
+/// receiver's yet: so nobody without the key can collect answers to chosen nonces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Hello {
-    /// The sender's session, all of it.
+    /// The sender's session, all 32 bits.
     pub session: u32,
-    /// A random number that the answer repeats, which a recorded answer cannot.
+    /// A random number that the answer repeats; a recorded answer cannot repeat a new one.
     pub nonce: u64,
 }

@@ -34,7 +34,7 @@ pub const fn dlc_of(bytes: usize) -> Option<u8> {
     })
 }
 
-/// Bytes of a message with this data length code; its upper four bits do not count.
+/// Bytes of a message with this data length code; the code's upper four bits are ignored.
 #[must_use]
 pub(super) const fn length_of(dlc: u8) -> usize {
     match dlc & 15 {
@@ -64,7 +64,7 @@ impl Identifiers {
         if base <= 0x7FD { Some(Self { base }) } else { None }
     }
 
-    /// The identifier to send a packet under.
+    /// The identifier with which to send a packet.
     #[must_use]
     pub fn of(self, packet: &[u8]) -> u16 {
         match packet.get(1).map(|kind| kind & !kind::TAGGED) {

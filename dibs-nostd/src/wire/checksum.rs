@@ -1,8 +1,8 @@
 //! The packets' CRC-32, four bytes at a time.
 //!
-//! The `crc` crate with its small table goes byte by byte, which would be most of a packet's cost to a receiver. With
-//! its large table (16 KiB) a panic branch survives. So this computes the same remainder with four tables of 1 KiB,
-//! made from the crate's; a test compares the two.
+//! The `crc` crate with its small table works byte by byte, which would be most of a packet's cost to a receiver. With
+//! its large table (16 KiB) a panic branch remains. So this module computes the same remainder with four tables of 1
+//! KiB, made from the crate's; a test compares the two.
 
 /// `TABLES[k][byte]`: the remainder of a byte followed by `k` zero bytes.
 static TABLES: [[u32; 256]; 4] = tables();
@@ -43,8 +43,8 @@ pub(super) fn checksum(bytes: &[u8]) -> u32 {
     !remainder
 }
 
-/// An untagged packet's contribution to its frame's digest: its checksum through a bijection that breaks the checksum's
-/// linearity (the last step of `MurmurHash3`).
+/// An untagged packet's contribution to its frame's digest: its checksum through a bijection that removes the
+/// checksum's linearity (the last step of `MurmurHash3`).
 #[inline]
 pub(super) const fn scrambled(checksum: u32) -> u32 {
     let mixed = (checksum ^ (checksum >> 16)).wrapping_mul(0x85EB_CA6B);

@@ -14,11 +14,11 @@ use super::{Code, Direction, Mac};
 /// Each direction has a key of its own, derived from the shared key and the receiver's id (NIST SP 800-108, counter
 /// mode): a packet for one receiver is a forgery to another, and so is a packet returned to its sender.
 ///
-/// The cipher is that of the crate `aes`, in constant time, without tables. A board with a hardware cipher implements
-/// [`Mac`] with it.
+/// The cipher is the crate `aes`, in constant time, without tables. A board with a hardware cipher implements [`Mac`]
+/// with it.
 ///
-/// RAM: two expanded keys, some 800 bytes, and half as much again while a code is computed. The keys are not erased on
-/// drop.
+/// RAM: two expanded keys, some 800 bytes, and half as much again while a code is computed. Dropping it does not erase
+/// the keys.
 ///
 /// ```
 /// use dibs_nostd::wire::{AesCmac, Encoding, FrameEncoder, FrameId};
@@ -59,7 +59,7 @@ impl AesCmac {
     /// Codes under a shared key, for the receiver with this id, bound to its challenge.
     ///
     /// No two receivers under one key may have the same id. The receiver draws the challenge when it starts: a random
-    /// number, or a counter that survives a restart. With 0, recordings of an earlier run are believed until a later
+    /// number, or a counter that survives a restart. With 0, recordings of an earlier run are accepted until a later
     /// session has published.
     #[must_use]
     pub fn new(key: &[u8; 16], receiver: u32, challenge: u64) -> Self {
@@ -70,7 +70,7 @@ impl AesCmac {
         }
     }
 
-    /// The same key, bound to another challenge: for a sender that has read it from an answer.
+    /// The same key with another challenge: for a sender that has received it in an answer.
     #[must_use]
     pub fn with_challenge(mut self, challenge: u64) -> Self {
         self.challenge = challenge;

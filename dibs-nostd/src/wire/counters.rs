@@ -51,9 +51,9 @@ events! {
     Published: "published",
     /// A frame was abandoned because another began.
     Abandoned: "abandoned",
-    /// A packet had come before, and was ignored.
+    /// A packet had arrived before, and was ignored.
     Duplicate: "duplicate",
-    /// A heartbeat was taken.
+    /// A heartbeat was accepted.
     Heartbeat: "heartbeat",
     /// Bytes between two zeros of a stream were not a packet.
     Framing: "framing",
@@ -61,7 +61,7 @@ events! {
     Damaged: "damaged",
     /// Another protocol version.
     Version: "version",
-    /// The checksum is right but the form is wrong: the sender's fault.
+    /// The checksum is right but the form is wrong: an error of the sender.
     Malformed: "malformed",
     /// A packet of another mesh.
     WrongMesh: "wrong mesh",
@@ -73,13 +73,13 @@ events! {
     Unexpected: "unexpected",
     /// A frame began while the previous one was still being checked.
     Busy: "busy",
-    /// A partial frame on another base than the published frame.
+    /// A partial frame whose base is not the published frame.
     Base: "base",
-    /// Rows of a partial frame came before the published frame's rows were copied.
+    /// Rows of a partial frame arrived before the published frame's rows were copied.
     NotReady: "not ready",
     /// Another number of rows than this receiver's.
     RowCount: "row count",
-    /// Another content or encoding than the frame's, or than this receiver takes.
+    /// Another content or encoding than the frame's, or one that this receiver does not accept.
     Encoding: "encoding",
     /// Rows outside the surface.
     OutOfRange: "out of range",
@@ -89,9 +89,9 @@ events! {
     Gaps: "gaps",
     /// A coordinate that is infinite or not a number.
     NotFinite: "not finite",
-    /// A coordinate larger than the receiver allows.
+    /// A coordinate beyond the receiver's limit.
     TooFar: "too far",
-    /// The packets do not add up to the commit's digest.
+    /// The packets do not match the commit's digest.
     Digest: "digest",
     /// The gate refused the surface: stretched too far, or not measured.
     Stretch: "stretch",
@@ -104,7 +104,7 @@ events! {
 }
 
 impl Event {
-    /// Whether a packet or a frame was refused.
+    /// Whether the event is the refusal of a packet or frame.
     #[must_use]
     pub const fn is_rejection(self) -> bool {
         self as u8 >= Self::Framing as u8
@@ -148,14 +148,14 @@ impl Counters {
         self.0.get(event as usize).copied().unwrap_or(0)
     }
 
-    /// All rejections together.
+    /// The sum of all rejections.
     #[must_use]
     pub fn rejected(&self) -> u32 {
         let rejections = Event::ALL.into_iter().filter(|event| event.is_rejection());
         rejections.fold(0, |sum, event| sum.saturating_add(self.of(event)))
     }
 
-    /// Copies the counters in a status: a sender's copy is complete after a few statuses. Counters of later protocol
+    /// Copies the counters of a status: after a few statuses the sender has all of them. Counters of later protocol
     /// versions are skipped.
     pub fn update(&mut self, report: &StatusReport<'_>) {
         let slots = self.0.iter_mut().skip(usize::from(report.first_counter));

@@ -13,14 +13,14 @@ pub enum PacketError {
         /// Bytes received.
         bytes: usize,
     },
-    /// The checksum does not match: damaged on the way, or not a packet at all.
+    /// The checksum does not match: the packet was damaged, or is none.
     Checksum {
         /// In the packet.
         stated: u32,
         /// Of the bytes received.
         computed: u32,
     },
-    /// A version that this receiver does not speak.
+    /// A version that this receiver does not support.
     Version {
         /// In the packet.
         version: u8,
@@ -40,7 +40,7 @@ pub enum PacketError {
         /// In the packet.
         sequence: u16,
     },
-    /// The length does not follow from kind and count.
+    /// The length does not match kind and count.
     Length {
         /// Bytes received.
         bytes: usize,
@@ -83,14 +83,14 @@ impl fmt::Display for PacketError {
                     "the packet states checksum {stated:#010x}, its bytes have {computed:#010x}"
                 )
             }
-            Self::Version { version } => write!(f, "protocol version {version} is not spoken here"),
+            Self::Version { version } => write!(f, "protocol version {version} is not supported"),
             Self::Kind { kind } => write!(f, "packet kind {kind} does not exist"),
             Self::Reserved { offset } => write!(f, "the field at byte {offset} must be zero"),
             Self::Sequence { sequence } => {
-                write!(f, "sequence number {sequence} does not go with the packet's kind")
+                write!(f, "sequence number {sequence} does not fit the packet's kind")
             }
             Self::Length { bytes, expected } => {
-                write!(f, "the packet has {bytes} bytes where its kind and count make {expected}")
+                write!(f, "the packet has {bytes} bytes, its kind and count require {expected}")
             }
             Self::Empty => write!(f, "a packet of vertices or weights without any"),
             Self::Content { content } => write!(f, "frame content {content} does not exist"),

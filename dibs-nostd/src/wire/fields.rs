@@ -1,4 +1,4 @@
-//! Little-endian fields of a packet, read and written one after the other.
+//! Little-endian fields of a packet, read and written in sequence.
 
 /// Reads fields from bytes whose length has been checked; zeros past the end.
 pub(super) struct Fields<'a>(pub &'a [u8]);

@@ -2,8 +2,8 @@
 
 /// The name of a frame: its mesh, the run of its sender, and its number within that run.
 ///
-/// Frames are ordered by (session, epoch): a sender that starts again takes a later session, and may number its frames
-/// from any epoch.
+/// Frames are ordered by (session, epoch): a sender that restarts takes a later session, and may number its frames from
+/// any epoch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct FrameId {

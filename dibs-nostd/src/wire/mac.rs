@@ -4,13 +4,13 @@
 
 /// Bytes of a tag: the first 48 bits of a message authentication code.
 ///
-/// With 48 bits a CAN-FD message holds six quantised positions or three `f32` ones, and a guess is
-/// right once in 2^48. AUTOSAR's `SecOC` takes 24 to 64 bits.
+/// With 48 bits a CAN-FD message holds six quantised positions or three `f32` ones, and a guess is right once in 2^48.
+/// AUTOSAR's `SecOC` takes 24 to 64 bits.
 pub const TAG_BYTES: usize = 6;
 
-/// Makes the authentication codes of packets.
+/// Computes the authentication codes of packets.
 ///
-/// Sender and receiver hold the same key, the same receiver id and the same *challenge*: a number that the receiver
+/// Sender and receiver have the same key, the same receiver id and the same *challenge*: a number that the receiver
 /// draws when it starts and reports in its status, so that earlier recordings are not genuine.
 pub trait Mac {
     /// Whether packets carry a tag. A receiver takes only tagged packets, or only packets without a tag.
@@ -20,7 +20,7 @@ pub trait Mac {
     /// key of this direction. Cost: linear in the packet.
     fn code(&self, direction: Direction, session: u32, packet: &[u8]) -> Code;
 
-    /// The challenge in use; 0 where there is none.
+    /// The current challenge; 0 if there is none.
     fn challenge(&self) -> u64 {
         0
     }
@@ -33,21 +33,21 @@ pub enum Direction {
     ToReceiver,
     /// Statuses.
     ToSender,
-    /// Hellos: as to the receiver, with the challenge 0 in place of the one in use.
+    /// Hellos: as to the receiver, but with the challenge 0.
     Greeting,
 }
 
 /// A packet's message authentication code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Code {
-    /// The part that travels with the packet.
+    /// The part sent with the packet.
     pub tag: [u8; TAG_BYTES],
-    /// A part that never travels: [`Commit::digest`](super::Commit::digest) sums it over the frame, so that only a
-    /// holder of the key can tell which packets of two frames add up.
+    /// A part that is never sent: [`Commit::digest`](super::Commit::digest) is its sum over the frame, so that without
+    /// the key nobody can tell which packets of two frames give the same sum.
     pub contribution: u32,
 }
 
-/// No authentication: a receiver believes everyone who can write to the bus.
+/// No authentication: a receiver accepts packets from everyone who can write to the bus.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoMac;
 

@@ -1,10 +1,10 @@
-//! The wire protocol: surfaces as packets of at most one transport unit, and statuses on the way back.
+//! The wire protocol: surfaces as packets of at most one transport unit, and statuses in the other direction.
 //!
 //! The byte layout is specified in `docs/wire.md`. A frame is one [`Begin`] packet, packets of [`Vertices`] or
-//! [`Weights`], and one [`Commit`]; a pose may come between. [`FrameEncoder`] and [`WeightsEncoder`] make the packets on the sender's side,
-//! [`Packet::decode`] reads one in place on the receiver's, and the [`Assembler`](crate::Assembler) makes frames of
-//! them. A [`Heartbeat`] is the sender's sign of life, a [`Status`] reports the published frame to the sender, a
-//! [`Hello`] asks for an [`Answer`].
+//! [`Weights`], and one [`Commit`]; a pose may follow the begin. [`FrameEncoder`] and [`WeightsEncoder`] make the
+//! packets on the sender's side, [`Packet::decode`] reads one in place on the receiver's, and the
+//! [`Assembler`](crate::Assembler) makes frames of them. A [`Heartbeat`] is the sender's sign of life, a [`Status`]
+//! reports the published frame to the sender, a [`Hello`] asks for an [`Answer`].
 //!
 //! On a byte stream each packet is framed with COBS: [`enframe`] and [`Deframer`]. On UDP a packet is
 //! one datagram, on CAN-FD one message: [`canfd`].
@@ -31,7 +31,7 @@ mod stream;
 
 #[cfg(feature = "authenticity")]
 pub use self::cmac::AesCmac;
-/// A packet's contents, for the senders of `dibs-build`: a receiver hands bytes to its assembler.
+/// A packet's contents, for the senders of `dibs-stream`: a receiver passes bytes to its assembler.
 #[doc(hidden)]
 pub use body::{Begin, Body, Commit, Content, Heartbeat, Hello, Rows, Vertices, Weights};
 pub use body::{Encoding, Freshness};
@@ -84,7 +84,7 @@ pub const MAX_ROWS: u32 = (1 << 24) - 1;
 #[doc(hidden)]
 pub const MAX_CONTENT_PACKETS: u32 = 65_534;
 
-/// The place of a posed frame's pose.
+/// The sequence number of a posed frame's pose.
 pub(crate) const POSE_SEQUENCE: u16 = 1;
 
 /// Most weights that a modal frame can have.
@@ -104,11 +104,11 @@ mod kind {
     /// A status that answers a hello.
     pub const ANSWER: u8 = 9;
     pub const POSE: u8 = 10;
-    /// Set in the kind of a packet that carries a tag.
+    /// Set in the kind of a packet with a tag.
     pub const TAGGED: u8 = 0x80;
 }
 
-/// Length of a packet with this many bytes of content: up to 64, rounded up to a length of CAN-FD.
+/// Length of a packet with this many bytes of content: up to 64 rounded up to a CAN-FD length.
 const fn padded(bytes: usize) -> usize {
     match canfd::dlc_of(bytes) {
         Some(dlc) => canfd::length_of(dlc),

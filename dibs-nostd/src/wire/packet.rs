@@ -15,22 +15,22 @@ use super::{
 use crate::surface::{PoseError, RigidPose};
 use crate::tree::{SurfaceFacts, Unit};
 
-/// A packet whose checksum and form are right. It borrows the bytes that it was decoded from.
+/// A packet with valid checksum and form. It borrows the decoded bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Packet<'a> {
     /// Identity of the surface's mesh: `Tree::mesh_id`.
     pub mesh_id: u32,
-    /// The lower half of the session; [`Begin`], [`Heartbeat`], [`Status`] and [`Hello`] have all of it.
+    /// The low half of the session; [`Begin`], [`Heartbeat`], [`Status`] and [`Hello`] have all of it.
     pub session_low: u16,
     /// Number of the frame; wraps.
     pub epoch: u32,
-    /// Place of the packet in its frame: 0 for a begin, from 1 for the packets after it.
+    /// Sequence number of the packet in its frame: 0 for a begin, from 1 for the packets after it.
     pub sequence: u16,
     /// The packet's CRC-32.
     pub checksum: u32,
     /// The contents of the packet.
     pub body: Body<'a>,
-    /// The bytes under the tag, and the tag.
+    /// The authenticated bytes, and the tag.
     tag: Option<(&'a [u8], &'a [u8; TAG_BYTES])>,
 }
 
@@ -107,7 +107,7 @@ impl<'a> Packet<'a> {
                 zero(&[u8::from(first != 0)], 15)?;
             }
         }
-        // Only the packets after a frame's begin have a place in it.
+        // Only the packets after a frame's begin have a sequence number.
         let is_placed = matches!(
             kind,
             kind::FLOAT_VERTICES
@@ -147,8 +147,8 @@ impl<'a> Packet<'a> {
         Ok(Self { mesh_id, session_low, epoch, sequence, checksum: stated, body, tag })
     }
 
-    /// The packet's contribution to its frame's digest, if the packet is genuine in this session: its tag is that of
-    /// `mac`, or it carries none and `mac` requires none. Compares in constant time.
+    /// The packet's contribution to its frame's digest, if the packet is genuine in this session: its tag matches
+    /// `mac`, or it has none and `mac` requires none. Compares in constant time.
     #[must_use]
     #[inline]
     pub fn verify<M: Mac>(&self, mac: &M, session: u32) -> Option<u32> {
@@ -182,7 +182,6 @@ impl<'a> Packet<'a> {
     }
 }
 
-/// Bytes of a status before its counters.
 pub(super) const STATUS_BYTES: usize = 20;
 
 /// Bit of a begin's form, and of a heartbeat's: the word before the body is an echo.
@@ -191,7 +190,7 @@ pub(super) const HAS_ECHO: u8 = 0x80;
 /// Bit of a begin's form: the frame comes with a pose.
 pub(super) const HAS_POSE: u8 = 0x40;
 
-/// The session, whose lower half is in the header.
+/// The session from its two halves; the header has the low one.
 fn session_of(high: u16, low: u16) -> u32 {
     u32::from(high) << 16 | u32::from(low)
 }
@@ -217,7 +216,7 @@ fn begin(
     if matches!(content, Content::Partial { .. }) != (back != 0) {
         return Err(PacketError::Sequence { sequence: back });
     }
-    // A modal frame's weights are counted where others have their box.
+    // A modal frame has its number of weights where others have their box.
     let offset = HEADER_BYTES + 12;
     let (rows, offset) = match content {
         Content::Modal => {
@@ -281,7 +280,7 @@ fn heartbeat(
     Ok(Heartbeat { session, beat: fields.u32(), echo: echo_of(flags, echo)? })
 }
 
-/// The fields that every status begins with.
+/// The common fields of all statuses.
 fn status_head(
     fields: &mut Fields<'_>,
     session_low: u16,

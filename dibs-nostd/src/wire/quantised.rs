@@ -8,11 +8,11 @@ use crate::math::sqrt::sqrt;
 
 /// The box of 16-bit positions: `position = origin + step * row` on each axis.
 ///
-/// It travels in every frame's begin packet and costs 24 bytes: so the sender can fit it to each frame, and sender and
-/// receiver cannot disagree about it.
+/// It is part of every frame's begin packet and takes 24 bytes: so the sender can fit it to each frame, and sender and
+/// receiver always use the same box.
 ///
-/// Against the position that was quantised, each axis of the result is off by at most `step / 2` plus f32 rounding of
-/// 2^-22 of the largest coordinate: see [`error`](Self::error).
+/// Each axis of a decoded position differs from the original by at most `step / 2` plus f32 rounding of 2^-22 of the
+/// largest coordinate: see [`error`](Self::error).
 ///
 /// ```
 /// use dibs_nostd::{wire::QuantisedBox, glam::Vec3};
@@ -35,7 +35,7 @@ impl QuantisedBox {
     /// mm.
     ///
     /// # Errors
-    /// [`BoxError`] when a step is not positive or a corner is not finite.
+    /// [`BoxError`] if a step is not positive or a corner is not finite.
     pub fn new(origin: Vec3, step: Vec3) -> Result<Self, BoxError> {
         let candidate = Self { origin, step };
         let positive = step.x > 0.0 && step.y > 0.0 && step.z > 0.0;
@@ -59,7 +59,7 @@ impl QuantisedBox {
             low = zip(low, position.to_array(), |a, b| if b < a { b } else { a });
             high = zip(high, position.to_array(), |a, b| if b > a { b } else { a });
         }
-        // The smallest step must still move the largest coordinate, or the box has no inside.
+        // The smallest step must still change the largest coordinate, or the box has no inside.
         let mut step = f32::MIN_POSITIVE;
         for (low, high) in low.into_iter().zip(high) {
             for candidate in
@@ -100,7 +100,7 @@ impl QuantisedBox {
 
     /// The row nearest to a position, `None` outside the box (by more than half a step).
     ///
-    /// Computed in f64 for an error of exactly half a step: meant for senders.
+    /// Computed in f64, so that the error is at most half a step: meant for senders.
     #[must_use]
     pub fn quantise(&self, position: Vec3) -> Option<[u16; 3]> {
         let axis = |position: f32, origin: f32, step: f32| {
@@ -114,7 +114,7 @@ impl QuantisedBox {
         ])
     }
 
-    /// Largest distance of a decoded position from the one that was quantised, in mm.
+    /// Largest distance of a decoded position from the original, in mm.
     ///
     /// Half a step along each axis, plus the f32 rounding of product and sum: at most 2^-24 of the
     /// product, whose size is at most `|position| + |origin|`, and 2^-24 of the position; together
@@ -128,8 +128,8 @@ impl QuantisedBox {
         let upper = self.upper_corner().to_array();
         let axes = zip(self.origin.to_array(), upper, rounding);
         let axes = Vec3::from(axes) + self.step * 0.5;
-        // The squares of steps below 1e-19 mm lose digits, and all of them below 1e-22; so do those of a box that is
-        // hardly inside f32's range. Then the sum of the axes, which is not less than the root of their squares.
+        // The squares of steps below 1e-19 mm lose digits, below 1e-22 all of them; so do those of a box near the
+        // limits of f32. Then the sum of the axes is used, which is at least the root of their squares.
         let squared = axes.length_squared();
         let length = if (1e-34..=f32::MAX).contains(&squared) {
             sqrt(squared)

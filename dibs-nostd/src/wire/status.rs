@@ -2,21 +2,21 @@
 
 use crate::tree::SurfaceFacts;
 
-/// The frame that the receiver has published, and its needs.
+/// The frame that the receiver has published, and its requests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Status {
-    /// The frame published last; `None` before the first.
+    /// The last published frame; `None` before the first.
     pub published: Option<PublishedStatus>,
-    /// Partial frames were refused for their base: send a whole frame.
+    /// Partial frames were refused because of their base: send a whole frame.
     pub wants_whole: bool,
     /// The controller's safety state: 0 not reported, 1 nominal, 2 degraded, 3 safe.
     pub safety: u8,
     /// Number of the status in the receiver's run; wraps.
     pub number: u32,
-    /// The receiver's clock when it made this status, in ms: the sender's next frames echo it.
+    /// The receiver's clock at this status, in ms: the sender's next frames echo it.
     pub clock: u32,
-    /// Where it answers a [`Hello`](super::Hello): the status then carries no counters and no stretch.
+    /// The answer to a [`Hello`](super::Hello), if this is one: the status then has no counters and no stretch.
     pub answer: Option<Answer>,
 }
 
@@ -40,9 +40,9 @@ pub struct PublishedStatus {
     pub session: u32,
     /// Its number.
     pub epoch: u32,
-    /// Time since its first packet arrived, plus the age that it then had, in ms.
+    /// Time since its first packet arrived, plus its age at sending, in ms.
     pub age_ms: u32,
-    /// Its measured stretch, `None` where the receiver does not measure, and in an answer.
+    /// Its measured stretch; `None` if the receiver does not measure it, and in an answer.
     pub stretch: Option<f32>,
 }
 

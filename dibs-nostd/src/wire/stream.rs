@@ -1,9 +1,9 @@
 //! Packets on a byte stream: COBS frames, each ended by a zero byte.
 //!
-//! The coding is that of the `cobs` crate, and a test compares this decoder with that crate's. The crate's buffered
-//! decoder reports a packet that overran the buffer as complete but cut short. Its state machine takes some thirty
+//! The coding is that of the `cobs` crate, and a test compares this decoder with the crate's. The crate's buffered
+//! decoder reports a packet that exceeded the buffer as complete, but truncated. Its state machine takes some thirty
 //! instructions a byte on a Cortex-M7, more than the rest of a packet's cost; this one takes a third of that, and less
-//! where bytes come in slices.
+//! if bytes come in slices.
 
 use core::fmt;
 
@@ -14,8 +14,7 @@ pub const fn framed_bytes(bytes: usize) -> usize {
     bytes.saturating_add(bytes / 254).saturating_add(2)
 }
 
-/// Writes a packet to `out` as one COBS frame with the zero that ends it; `None` where `out` is shorter than
-/// [`framed_bytes`].
+/// Writes a packet to `out` as one COBS frame with its final zero; `None` if `out` is shorter than [`framed_bytes`].
 ///
 /// ```
 /// use dibs_nostd::wire::{enframe, framed_bytes};
@@ -28,7 +27,7 @@ pub fn enframe<'b>(packet: &[u8], out: &'b mut [u8]) -> Option<&'b [u8]> {
     out.get(..used.checked_add(1)?)
 }
 
-/// Takes packets of at most `MTU` bytes out of a byte stream, one byte at a time.
+/// Extracts packets of at most `MTU` bytes from a byte stream, one byte at a time.
 ///
 /// After damage it resynchronises at the next zero byte. O(1) for each byte.
 ///
@@ -42,18 +41,18 @@ pub fn enframe<'b>(packet: &[u8], out: &'b mut [u8]) -> Option<&'b [u8]> {
 /// ```
 #[derive(Debug)]
 pub struct Deframer<const MTU: usize> {
-    /// No vector: a finished packet is lent out until the next byte, which is the first of another.
+    /// No vector: a finished packet is lent until the next byte, which is the first of another packet.
     packet: [u8; MTU],
     /// Bytes decoded so far; one more than `MTU` for a packet that does not fit.
     bytes: usize,
-    /// Bytes to come before the next code byte.
+    /// Bytes left before the next code byte.
     left: u8,
     /// Whether the next code byte also stands for a zero in the packet.
     is_zero_due: bool,
 }
 
 impl<const MTU: usize> Deframer<MTU> {
-    /// A deframer at the start of a stream, or anywhere in one.
+    /// A deframer that may start anywhere in a stream.
     #[must_use]
     pub const fn new() -> Self {
         Self { packet: [0; MTU], bytes: 0, left: 0, is_zero_due: false }
@@ -62,7 +61,7 @@ impl<const MTU: usize> Deframer<MTU> {
     /// Takes one byte, and returns the packet that it completes, if any. The packet is valid until the next call.
     ///
     /// # Errors
-    /// [`StreamError`] at the end of a packet that is too long, or of one that was cut or damaged.
+    /// [`StreamError`] at the end of a packet that is too long, truncated or damaged.
     #[inline]
     pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], StreamError>> {
         if byte == 0 {
@@ -78,7 +77,7 @@ impl<const MTU: usize> Deframer<MTU> {
     }
 
     /// Takes bytes up to the end of the first packet among them. Returns the number taken, and the packet. Call it
-    /// again with the rest. It costs less than [`push`](Self::push) for each byte.
+    /// again with the rest. It costs less than [`push`](Self::push) of each byte.
     ///
     /// ```
     /// use dibs_nostd::wire::Deframer;
@@ -90,7 +89,7 @@ impl<const MTU: usize> Deframer<MTU> {
     #[inline]
     pub fn extend(&mut self, bytes: &[u8]) -> (usize, Option<Result<&[u8], StreamError>>) {
         let mut rest = bytes;
-        // Each turn takes at least one byte.
+        // Each iteration takes at least one byte.
         while let Some((&byte, after)) = rest.split_first() {
             if byte == 0 {
                 return (bytes.len() - after.len(), self.end());
@@ -180,12 +179,12 @@ impl<const MTU: usize> Default for Deframer<MTU> {
 pub enum StreamError {
     /// More bytes than a packet may have.
     TooLong {
-        /// Bytes of the packet, at least.
+        /// Bytes of the packet so far.
         bytes: usize,
         /// The largest packet.
         limit: usize,
     },
-    /// A zero before the end that the frame's own counts announce.
+    /// A zero before the end that the COBS counts announce.
     Cut {
         /// Bytes decoded.
         bytes: usize,

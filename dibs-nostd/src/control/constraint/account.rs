@@ -7,16 +7,16 @@ use glam::Vec3;
 use super::{GainError, positive};
 use crate::math::sqrt::sqrt;
 
-/// Keeps the account of the energy that a wall's force gives to the hand, relative to the wall, and reduces the force where
-/// the energy given would exceed the energy received by more than a stated tank.
+/// Keeps an account of the energy that a wall's force gives to the hand, relative to the wall, and reduces the force
+/// where the energy given would exceed the energy received by more than a stated tank.
 ///
-/// A spring in continuous time gives back the energy that it received. Sampling, a frame that moves the wall in one tick,
-/// a hold that ends and a saturation that yields give more. The account counts force times relative velocity (a passivity
-/// observer: Hannaford & Ryu, IEEE T-RA 2002) and takes from the force the part along an outward motion that the
-/// account does not cover. A force against an inward motion is never made less. The hand's energy counts up to the
-/// spring's own, so that a damper fills no account.
+/// A spring in continuous time returns the energy that it received. Sampling, a frame that moves the wall in one tick,
+/// the end of a hold and a saturation that yields give more. The account sums force times relative velocity (a
+/// passivity observer: Hannaford & Ryu, IEEE T-RA 2002) and removes from the force the part along an outward motion
+/// that the account does not cover. A force against an inward motion is never reduced. The energy received from the
+/// hand is limited to the spring's own, so that a damper does not fill the account.
 ///
-/// Between two ticks the force changes by a largest step, unless the account or its end needs more.
+/// Between two ticks the force changes by at most a largest step, unless the account or its end requires more.
 ///
 /// ```
 /// use dibs_nostd::constraint::EnergyAccount;
@@ -44,11 +44,12 @@ pub struct EnergyAccount {
     force: Vec3,
 }
 
-/// The part of the balance that a tick may give: as it runs out, the force falls by that part of itself a tick.
+/// The fraction of the balance that a tick may give: as the balance runs out, the force falls by this fraction of
+/// itself per tick.
 const PART: f32 = 1.0 / 16.0;
 
 impl EnergyAccount {
-    /// An account with a full tank (mJ), for forces that change by at most `step` (N) a tick, of a wall with this
+    /// An account with a full tank (mJ), for forces that change by at most `step` (N) per tick, of a wall with this
     /// stiffness (N/mm).
     ///
     /// # Errors
@@ -60,16 +61,17 @@ impl EnergyAccount {
         Ok(Self { tank, step, stiffness, balance: tank, force: Vec3::ZERO })
     }
 
-    /// The energy (mJ) that may still be given. It is below 0 after a tick whose motion took more than the last one foretold.
+    /// The energy (mJ) that may still be given. Below 0 after a tick whose motion took more than predicted from the
+    /// last one.
     #[must_use]
     pub const fn balance(&self) -> f32 {
         self.balance
     }
 
-    /// The force to apply for the next period (s), of the `force` that a constraint asks for.
+    /// The force to apply for the next period (s), for the `force` computed by a constraint.
     ///
-    /// `velocity` (mm/s) is the tool's relative to the wall since the last tick, as for the constraint. Where an input is not
-    /// finite, the force falls to zero by its steps.
+    /// `velocity` (mm/s) is the tool's relative to the wall since the last tick, as for the constraint. If an input is
+    /// not finite, the force falls to zero in steps.
     ///
     /// Cost: some 60 f32 operations and two roots.
     #[must_use]
@@ -113,8 +115,8 @@ mod tests {
 
     const TICK: f32 = 0.001;
 
-    /// The most energy given to a hand of 200 g, and the largest step of the force, in 10 s at a wall that jumps with its
-    /// frames, is lost now and then, and saturates.
+    /// The most energy given to a hand of 200 g, and the largest step of the force, in 10 s at a wall that jumps with
+    /// its frames, is sometimes lost, and saturates.
     fn pushed(seed: u32, has_account: bool) -> (f32, f32) {
         let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
         let wall = ForbiddenRegion::new(spring, 5.0).unwrap();
@@ -189,7 +191,7 @@ mod tests {
             let force = account.pass(wanted, Vec3::X * -40.0, TICK);
             assert_eq!(force, wanted);
         }
-        // What was not given is not given back.
+        // Energy that was not given is not returned.
         assert!(account.balance() <= 1.0 + 4.0 * 4.0 / 2.0 + 1e-3);
         for bad in [f32::NAN, f32::INFINITY] {
             let force = account.pass(Vec3::Y * bad, Vec3::ZERO, TICK);

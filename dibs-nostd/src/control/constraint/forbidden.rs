@@ -14,8 +14,8 @@ use crate::unavailable::Unavailable;
 ///
 /// `F = min(max_force, max(0, K (margin - d) - B v))` for `d < margin`, else 0,
 ///
-/// where `v` is the tool's speed out of the surface, negative on approach. Inside, `d` is below zero, and the spring
-/// grows with the depth up to saturation. Without a side the output is the hold. For a query that asked for none
+/// where `v` is the tool's speed out of the surface, negative on approach. Inside, `d` is negative, and the spring
+/// force grows with the depth up to saturation. Without a side the output is the hold. If the query asked for no side
 /// ([`Options::unsigned`](crate::Options::unsigned)), the direction is that of the best pair found.
 ///
 /// ```
@@ -51,8 +51,8 @@ impl ForbiddenRegion {
 
     /// The force on the tool at this tick.
     ///
-    /// `velocity` (mm/s) is that of the tool's closest point relative to the surface; the tool's absolute velocity
-    /// takes the surface as standing still.
+    /// `velocity` (mm/s) is that of the tool's closest point relative to the surface. The tool's absolute velocity may
+    /// be used if the surface does not move.
     #[must_use]
     pub fn force(
         &self,

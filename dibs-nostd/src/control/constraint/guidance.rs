@@ -1,4 +1,4 @@
-//! Keeps the tool near: a spring to a stand-off from the surface.
+//! Keeps the tool near the surface: a spring to a stand-off.
 
 use glam::Vec3;
 
@@ -46,10 +46,10 @@ impl Guidance {
         Ok(Self { spring, stand_off, dead_band: 0.0 })
     }
 
-    /// The same, free within `dead_band` mm of the stand-off, at least 0.
+    /// The same with a dead band: no force within `dead_band` mm of the stand-off, at least 0.
     ///
     /// # Errors
-    /// [`GainError`] when it is negative or not finite.
+    /// [`GainError`] if it is negative or not finite.
     pub const fn dead_band(self, dead_band: f32) -> Result<Self, GainError> {
         let dead_band = tri!(not_negative("dead_band", dead_band));
         Ok(Self { dead_band, ..self })

@@ -10,31 +10,30 @@
 //!
 //! - For any input a force is finite and never larger than `max_force` (up to the direction's rounding).
 //! - It is computed from the lower end of the [certified interval](crate::Proximity::interval).
-//! - Where the surface has sides (a tree with adjacency, see [`Side`](crate::Side)), it leads outwards from first
-//!   contact to any depth, and its size is continuous through contact and through the surface. Where it has none, or
-//!   the query was [`unsigned`](crate::Options::unsigned), the tool is taken to be outside, and a query that its budget
-//!   cut short never weakens the force.
-//! - Where the side is undefined, the output is the hold, never [`Inactive`](ConstraintState::Inactive): the tool may be inside.
-//!   At the surface alone, both sides have much the same separation, and the constraint acts on it. A [`Tracker`](crate::Tracker)
-//!   has a side or is at the surface, whatever its budget, after a first certain tick and as long as the surface's motion is
-//!   measured and not more than was stated.
+//! - If the surface has sides (a tree with adjacency, see [`Side`](crate::Side)), the force leads outwards from first
+//!   contact to any depth, and its size is continuous through contact and through the surface. If it has none, or the
+//!   query was [`unsigned`](crate::Options::unsigned), the tool is taken to be outside, and a query cut short by its
+//!   budget never weakens the force.
+//! - If the side is undefined, the output is the hold, never [`Inactive`](ConstraintState::Inactive): the tool may be
+//!   inside. Only at the surface itself, where both sides have nearly the same separation, the constraint acts on it.
+//!   After a first certain tick a [`Tracker`](crate::Tracker) always has a side or is at the surface, for any budget,
+//!   as long as the surface's motion is measured and not larger than stated.
 //! - If the proximity is unknown, the surface stale, or a number not finite, the output is the *hold*: pure damping
-//!   against the tool's velocity, saturated the same way, and the state gives the reason. For a velocity that is not
+//!   against the tool's velocity with the same saturation, and the state gives the reason. For a velocity that is not
 //!   finite it is zero.
 //!
 //! # Passivity
 //!
-//! A sampled virtual wall generates energy; an [`EnergyAccount`] bounds that energy, and the force's steps. Without one
-//! there is no promise. Colgate and Schenkel ("Passivity of a class of sampled-data systems", J.
-//! Robotic Systems 14, 1997; ACC 1994) show that with sampling period `T`, stiffness `K` and damping `B` it is passive
-//! exactly if the device's own physical damping `b` satisfies `b > K T / 2 + |B|`, for velocities by backward
-//! difference; a velocity filter and delays need more. [`SpringDamper::device_damping`] computes that figure. Beyond
-//! it:
+//! A sampled virtual wall generates energy; an [`EnergyAccount`] bounds that energy, and the force's steps. Without an
+//! account nothing is promised. Colgate and Schenkel ("Passivity of a class of sampled-data systems", J. Robotic
+//! Systems 14, 1997; ACC 1994) show that with sampling period `T`, stiffness `K` and damping `B` it is passive exactly
+//! if the device's own physical damping `b` satisfies `b > K T / 2 + |B|`, for velocities by backward difference; a
+//! velocity filter and delays need more. [`SpringDamper::device_damping`] computes that value. Other effects:
 //!
 //! - On entering a margin the damper acts at once: the force jumps by `B` times the approach speed.
 //! - Where two parts of the surface are equally near (the medial axis), the closest point jumps from one tick to the
-//!   next, and with it the force's direction, but not its size. So it does in a narrow gap whose margins overlap: choose
-//!   the margin below half the gap. A tracker does not turn to and fro with the last digits of a pose.
+//!   next, and with it the force's direction, but not its size. The same happens in a narrow gap whose margins overlap:
+//!   choose the margin below half the gap. A tracker does not oscillate with the last digits of a pose.
 //! - A moving surface moves the wall: it does work on the tool, as a beating heart would.
 //! - Saturation: a hand that pushes harder than `max_force` gets through.
 
@@ -111,7 +110,7 @@ pub enum ConstraintState {
     Safe(Unavailable),
 }
 
-/// A spring and a damper with a largest force, which every constraint has. The constraint's constructor checks it.
+/// A spring and damper with a largest force, used by every constraint. The constraint's constructor checks it.
 ///
 /// ```
 /// use dibs_nostd::constraint::SpringDamper;
@@ -123,26 +122,26 @@ pub enum ConstraintState {
 pub struct SpringDamper {
     stiffness: f32,
     damping: f32,
-    /// `None` for that of `damping`.
+    /// `None`: the same as `damping`.
     hold_damping: Option<f32>,
     max_force: f32,
 }
 
 impl SpringDamper {
-    /// A spring of a stiffness in N/mm, above 0, without damping. It needs its [largest force](Self::max_force) too.
+    /// A spring of a stiffness in N/mm, above 0, without damping. Its [largest force](Self::max_force) must be set too.
     #[must_use]
     pub const fn stiffness(stiffness: f32) -> Self {
         Self { stiffness, damping: 0.0, hold_damping: None, max_force: f32::INFINITY }
     }
 
-    /// The same with a damping in N s/mm, at least 0. The hold damps as much, unless
-    /// [`hold_damping`](Self::hold_damping) is set.
+    /// The same with a damping in N s/mm, at least 0. The hold uses it too, unless [`hold_damping`](Self::hold_damping)
+    /// is set.
     #[must_use]
     pub const fn damping(self, damping: f32) -> Self {
         Self { damping, ..self }
     }
 
-    /// The same with another damping (N s/mm, at least 0) for the hold; 0 lets go of the tool.
+    /// The same with another damping (N s/mm, at least 0) for the hold; with 0 the hold applies no force.
     #[must_use]
     pub const fn hold_damping(self, damping: f32) -> Self {
         Self { hold_damping: Some(damping), ..self }
@@ -154,7 +153,7 @@ impl SpringDamper {
         Self { max_force, ..self }
     }
 
-    /// Itself if every parameter is in its range and finite; otherwise [`GainError`] names one that is not.
+    /// Returns `self` if every parameter is finite and in range; otherwise [`GainError`] with one that is not.
     const fn checked(self) -> Result<Self, GainError> {
         tri!(positive("stiffness", self.stiffness));
         tri!(not_negative("damping", self.damping));
@@ -163,7 +162,6 @@ impl SpringDamper {
         Ok(self)
     }
 
-    /// The damping of the hold.
     const fn held(&self) -> f32 {
         match self.hold_damping {
             Some(damping) => damping,
@@ -171,9 +169,8 @@ impl SpringDamper {
         }
     }
 
-    /// The device's own damping (N s/mm) must be above this for a passive wall at a sampling period
-    /// of `tick` seconds: `K T / 2 + B` (Colgate and Schenkel 1997), or the hold's damping if that is
-    /// larger.
+    /// The device's own damping (N s/mm) must exceed this for a passive wall at a sampling period of `tick` seconds:
+    /// `K T / 2 + B` (Colgate and Schenkel 1997), or the hold's damping if larger.
     ///
     /// ```
     /// use dibs_nostd::constraint::SpringDamper;
@@ -186,8 +183,8 @@ impl SpringDamper {
         if wall > self.held() { wall } else { self.held() }
     }
 
-    /// Force along the approach's direction of a spring displaced by `length` mm; at least `least` N: 0 for a force
-    /// that never pulls.
+    /// Force along the approach's direction of a spring displaced by `length` mm; at least `least` N, which is 0 for a
+    /// force that never pulls.
     fn along(&self, approach: &Approach, length: f32, least: f32) -> ConstraintForce {
         let force = self.stiffness * length - self.damping * approach.speed;
         let (force, state) = if force >= self.max_force {
@@ -220,20 +217,20 @@ impl SpringDamper {
         let wanted = self.held() * (largest * length);
         let size = if wanted > self.max_force { self.max_force } else { wanted };
         let force = scaled / length * -size;
-        // Not finite at rest, or from a velocity that is not finite.
+        // NaN from a velocity of zero, or from one that is not finite.
         let force = if force.is_finite() { force } else { Vec3::ZERO };
         ConstraintForce { force, state: ConstraintState::Safe(reason) }
     }
 }
 
-/// The part of a closest pair that a constraint needs.
+/// The data of a closest pair that a constraint uses.
 #[derive(Clone, Copy)]
 struct Approach {
     /// Unit vector that leads out.
     direction: Vec3,
     /// Conservative separation, in mm; negative for the depth of a penetration.
     separation: f32,
-    /// Speed along the direction, in mm/s: positive when the tool leaves.
+    /// Speed along the direction, in mm/s: positive when the tool moves away.
     speed: f32,
     velocity: Vec3,
 }
@@ -251,7 +248,7 @@ impl Approach {
                 let inside = sum_down(proximity.lower, -2.0 * proximity.axis_distance);
                 sum_down(inside, -proximity.accuracy)
             }
-            // If the tool is inside, the direction leads in.
+            // If the tool is inside, the direction leads inwards.
             Side::Undefined(NoSide::CutShort) => return Err(Unavailable::CutShort),
             Side::Undefined(_) => return Err(Unavailable::NoSide),
             _ => proximity.interval().lower,

@@ -1,4 +1,4 @@
-//! Keeps the tool out by all its contacts: the force and the torque from a proxy that is held outside.
+//! Keeps the tool out by all its contacts: force and torque from a proxy that stays outside.
 
 // Requirement: C-03
 
@@ -39,37 +39,42 @@ impl defmt::Format for Wrench {
 /// Keeps the tool out of a margin around the surface, by all its contacts.
 ///
 /// A proxy (god object: Zilles & Salisbury 1995; Ruspini et al. 1997) is the position nearest to the tool at which no
-/// contact would be within the margin. A spring draws the tool there. With one contact this is a
-/// [`ForbiddenRegion`](super::ForbiddenRegion); in a corner it holds against both walls, and two contacts with one wall
-/// count as one, up to 6 %. The force of each contact acts at its point of the tool, which gives the torque.
+/// contact would be within the margin. A spring pulls the tool there. With one contact this is a
+/// [`ForbiddenRegion`](super::ForbiddenRegion); in a corner it holds against both walls; two contacts with one wall
+/// count as one, within 6 %. The force of each contact acts at its point of the tool, which gives the torque.
 ///
-/// The displacement `t` has the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest contacts that
-/// are active, each of which yields by a 16th. An active set finds it exactly but for rounding. If no two contacts face
-/// each other, `t` clears each contact of activation 1 by at least its depth.
+/// The displacement `t` has the least `|t|^2` under `n . t >= margin - d` for each of the eight deepest active
+/// contacts, each of which yields by a 16th. An active set method finds it exactly except for rounding. If no two
+/// contacts face each other, `t` clears each contact of activation 1 by at least its depth.
 ///
-/// `t` is continuous in depths, normals and *activations*. A contact's activation, from 0 to 1, is the part of its
-/// depth by which it would move the proxy alone. The deepest has 1. Another has less where it is less than a 16th as
-/// deep, and 0 at the margin's edge; and less where it begins or ends beside a deeper one, at the edge of its wall: 0
-/// within some 7 degrees of that edge, seen from the tool's axis, and 1 from 10 degrees on. So a contact begins and
-/// ends without force, and where two tie both have 1. Beside a wall's edge the force changes by up to 45 K depth /
-/// distance of the axis a mm, for a stiffness K.
+/// `t` is continuous in depths, normals and *activations*. A contact's activation, from 0 to 1, is the fraction of its
+/// depth by which it would move the proxy alone. The deepest contact has 1. Another has less if it is less than a 16th
+/// as deep, and 0 at the margin's edge; and less where it begins or ends next to a deeper one, at the edge of its wall:
+/// 0 within some 7 degrees of that edge, seen from the tool's axis, and 1 from 10 degrees on. So a contact begins and
+/// ends without force, and where two tie both have 1. Next to a wall's edge the force changes by up to
+/// `45 K depth / distance` of the axis per mm, for a stiffness `K`.
 ///
-/// Steps remain where two walls are less than 15 degrees apart, which may be one contact: up to a quarter of the force,
-/// a twelfth in size, as measured outside hearts and brains with the axis at least 0.02 mm from the surface. Where walls
-/// face each other, both within the margin, both together push the proxy sideways along the tilt between them: there
-/// such a step changes the size too, by up to all of the force. Measured with a sphere of 1 mm and a margin of 5 mm: from
-/// 4.1 to 0.2 N within 3 nm in a gap of 3 mm whose walls are uneven by 0.2 mm; more than 10 % of the size on 17 % of the
-/// paths of half a mm there, and on 3 % in a gap of 6 mm. Choose a margin less than half of the narrowest gap, less the
-/// tool's radius. At an open rim, where a contact's side may end, a step is up to half of the force. Where the tool
-/// crosses or is inside, the deepest contact's direction jumps on the medial axis, and with it the force. Nearer than
-/// some 16 accuracies the direction is not known: there the force turned by up to 75 degrees, of the same size. Where
-/// room, list or budget ends, activations are 1, and a ninth active contact does not act: there steps have no bound. The
-/// torque steps with a contact's point, where that slides along a wall. From a list that is not
+/// Steps of the force remain in these cases:
+/// - Two walls less than 15 degrees apart, which may be one contact: up to a quarter of the force, a twelfth in size,
+///   as measured outside hearts and brains with the axis at least 0.02 mm from the surface.
+/// - Two walls that face each other, both within the margin: together they push the proxy sideways along the tilt
+///   between them, and a step may change the size by up to the whole force. Measured with a sphere of 1 mm and a margin
+///   of 5 mm: from 4.1 to 0.2 N within 3 nm in a gap of 3 mm whose walls are uneven by 0.2 mm; more than 10 % of the
+///   size on 17 % of the paths of half a mm there, and on 3 % in a gap of 6 mm. Choose a margin below half of the
+///   narrowest gap, less the tool's radius.
+/// - An open rim, where a contact's side may end: up to half of the force.
+/// - A tool that crosses or is inside: the deepest contact's direction jumps on the medial axis. Nearer than some 16
+///   accuracies the direction is not known: there the force turned by up to 75 degrees at the same size.
+/// - Memory, list or budget ran out, so that activations are 1, or there is a ninth active contact, which does not act:
+///   steps are not bounded.
+///
+/// The torque also steps where a contact's point slides along a wall. From a list that is not
 /// [complete](crate::ContactIter::is_complete) the force is at least that of the closest pair.
 ///
 /// The damper acts against the tool's speed into the surface, relative to the surface's velocity.
 ///
-/// Cost: about 30 f32 operations a step for each contact within the margin; at most 32 steps, about as many as there
+/// Cost: about 30 f32 operations per step for each contact within the margin; at most 32 steps, usually about one per
+/// contact.
 /// are contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -78,7 +83,7 @@ pub struct Proxy {
     margin: f32,
 }
 
-/// A wall that is this many times less deep than the deepest has a smaller activation.
+/// A wall whose depth is less than the deepest divided by this has a reduced activation.
 const SHALLOW: f32 = 16.0;
 
 /// A contact within the margin.
@@ -95,7 +100,7 @@ struct Held {
 impl Held {
     const NONE: Self = Self { wall: Wall::NONE, lever: Vec3::ZERO, speed: 0.0, push: 0.0 };
 
-    /// The moment of its push.
+    /// The moment of the push.
     fn turned(&self) -> Vec3 {
         self.lever.cross(self.wall.normal * self.push)
     }
@@ -116,7 +121,7 @@ impl Proxy {
     ///
     /// `contacts` are those of [`Contacts::within`](crate::Contacts::within) this margin or more, deepest first, each
     /// within `accuracy` (mm); `velocity` (mm/s) is the tool's at `origin`, `angular` (1/s) its angular velocity. An
-    /// error instead of contacts gives the hold. For a label, ask for its contacts
+    /// error instead of contacts gives the hold. For one label, query its contacts
     /// ([`Options::contacts_of`](crate::Options::contacts_of)).
     #[must_use]
     pub fn wrench<'c>(
@@ -136,14 +141,14 @@ impl Proxy {
         let mut free = held.iter_mut();
         for contact in contacts {
             let depth = self.margin - sum_down(contact.separation, -accuracy);
-            // Written so that NaN stays.
+            // Written so that NaN is kept.
             if depth <= 0.0 {
                 continue;
             }
             if !is_in {
                 (is_in, deepest) = (true, depth);
             }
-            // A contact without activation takes no slot from one that has some.
+            // A contact with activation 0 must not take the slot of one with more.
             if contact.activation <= 0.0 {
                 continue;
             }
@@ -195,7 +200,7 @@ impl Proxy {
         } else {
             (0.0, ConstraintState::Active)
         };
-        // One scale for both keeps the proportion of force and torque.
+        // One scale for both keeps the ratio of force and torque.
         let scale = if length > 0.0 { size / length } else { 0.0 };
         let (force, torque) = (moved * scale, turned * scale);
         if force.is_finite() && torque.is_finite() {

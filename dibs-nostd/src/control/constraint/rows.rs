@@ -12,15 +12,15 @@ use crate::query::Contact;
 ///
 /// A vector field inequality (Marinho et al., IEEE T-RO 2019) that includes the surface's velocity. Under it a
 /// contact's separation falls towards [`stand_off`](Self::stand_off) no faster than exponentially, at a rate of
-/// [`gain`](Self::gain); below the stand-off it must grow. Plain arrays, for any solver of quadratic programs.
+/// [`gain`](Self::gain); below the stand-off it must grow. It has plain arrays, for any solver of quadratic programs.
 ///
-/// Where a tool crosses the surface or is inside, and its deepest point is inside the axis, two triangles bound the
-/// depth, one to each side. The row is then the mean of both triangles' rows, with the weights that cancel the motion
-/// along the axis: the rate of the separation. The deepest point is known within the depth's tolerance
+/// If a tool crosses the surface or is inside, and its deepest point is in the interior of the axis, two triangles
+/// bound the depth, one on each side. The row is then the mean of both triangles' rows, with the weights that cancel
+/// the motion along the axis: the rate of the separation. The deepest point is known within the depth's tolerance
 /// ([`Options::depth_tolerance`](crate::Options::depth_tolerance)); of triangles that tie within it, the row has two.
-/// Between opposite walls its factors are small, and 0 between parallel ones: no small motion makes the tool less deep,
-/// so a row below its stand-off has no solution unless the solver may relax it. Where the budget ended before the
-/// second triangle was found, the row is that of the closest triangle.
+/// Between opposite walls its factors are small, and 0 between parallel ones: no small motion reduces the depth, so a
+/// row below its stand-off has no solution unless the solver may relax it. If the budget ended before the second
+/// triangle was found, the row is that of the closest triangle.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -49,9 +49,9 @@ use crate::query::Contact;
 pub struct VelocityRow {
     /// Factors of the linear velocity: the contact's normal, or the mean of two.
     pub linear: [f32; 3],
-    /// Factors of the angular velocity (mm): the lever arm's product with those.
+    /// Factors of the angular velocity (mm): the cross product of the lever arm with `linear`.
     pub angular: [f32; 3],
-    /// The least sum allowed (mm/s).
+    /// The smallest allowed sum (mm/s).
     pub least: f32,
     /// The surface's velocity along the normal (mm/s).
     surface: f32,
@@ -64,8 +64,8 @@ pub struct VelocityRow {
 }
 
 impl VelocityRow {
-    /// The row of a contact whose separation is within `accuracy` (mm), for the velocity of the tool at `origin`:
-    /// without a [gain](Self::gain) the tool may not come nearer at all.
+    /// The row of a contact whose separation is within `accuracy` (mm), for the velocity of the tool at `origin`.
+    /// Without a [gain](Self::gain) the tool may not approach at all.
     ///
     /// Cost: some tens of f32 operations.
     #[must_use]
@@ -107,7 +107,7 @@ impl VelocityRow {
         Self { least: self.surface - self.gain * left, ..self }
     }
 
-    /// Whether a velocity satisfies it.
+    /// Whether a velocity satisfies the inequality.
     #[must_use]
     pub fn allows(&self, linear: Vec3, angular: Vec3) -> bool {
         Vec3::from_array(self.linear).dot(linear) + Vec3::from_array(self.angular).dot(angular)

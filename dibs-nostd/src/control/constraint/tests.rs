@@ -60,7 +60,7 @@ fn the_wall_is_a_spring_and_a_damper() {
     assert!(close(at(2.0, 0.0).force, Vec3::Y * 2.0));
     assert!(close(at(2.0, -100.0).force, Vec3::Y * 3.0));
     assert_eq!(at(2.0, -100.0).state, ConstraintState::Active);
-    // Leaving fast, the damper outweighs the spring: no force, not a pull.
+    // Moving away fast, the damper exceeds the spring: no force instead of a pull.
     assert_eq!(at(2.0, 1000.0).force, Vec3::ZERO);
     assert_eq!(at(2.0, 1000.0).state, ConstraintState::Active);
     assert!(close(at(0.0, 300.0).force, Vec3::Y * 3.0));
@@ -126,7 +126,7 @@ fn the_hold_damps_and_says_why() {
         let free = ForbiddenRegion::new(free, 3.0).unwrap();
         assert_eq!(free.force(&Err(reason), Vec3::ONE).force, Vec3::ZERO);
     }
-    // A query's answer that gives no direction.
+    // A query's answer without a direction.
     let touching = wall().force(&Ok(pair(-RADIUS, Vec3::ZERO)), Vec3::X);
     assert_eq!(touching.state, ConstraintState::Safe(Unavailable::NoDirection));
 }
@@ -146,7 +146,7 @@ fn without_side(reason: NoSide, gap: f32) -> Proximity {
     Proximity { side: Side::Undefined(reason), accuracy: 1e-4, ..pair(gap, Vec3::X) }
 }
 
-/// Near or far, the tool may be inside, and the direction may lead in.
+/// Near or far, the tool may be inside, and the direction may lead inwards.
 #[test]
 fn a_tool_without_a_side_is_held_at_any_distance() {
     for (reason, held) in NO_SIDES {
@@ -161,7 +161,7 @@ fn a_tool_without_a_side_is_held_at_any_distance() {
     }
 }
 
-/// On either side of the surface, a tool whose axis is at it gets the same force.
+/// A tool whose axis is at the surface gets the same force on either side.
 #[test]
 fn a_tool_at_the_surface_is_pushed_out() {
     let soft = SpringDamper::stiffness(0.5).max_force(5.0);
@@ -191,7 +191,7 @@ fn proxy_and_rows_count_from_the_lower_end() {
         proxy.wrench(Ok(contacts.iter()), accuracy, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO)
     };
     assert!((force(2.0, 0.5).force - Vec3::X * 0.75).length() < 1e-4);
-    // Within the margin by its accuracy alone.
+    // Within the margin only because of its accuracy.
     assert_eq!(force(3.2, 0.1), Wrench::NONE);
     assert!((force(3.2, 0.4).force - Vec3::X * 0.1).length() < 1e-4);
 
@@ -202,7 +202,7 @@ fn proxy_and_rows_count_from_the_lower_end() {
     assert!(!row(0.25).allows(Vec3::X * -15.1, Vec3::ZERO));
 }
 
-/// Contacts at the edges of walls, which have activation 0, are many along a fine surface.
+/// A fine surface has many contacts at the edges of walls, with activation 0.
 #[test]
 fn a_contact_without_activation_takes_no_slot() {
     let proxy = Proxy::new(SpringDamper::stiffness(1.0).max_force(9.0), 3.0).unwrap();
@@ -279,14 +279,14 @@ fn gains_out_of_range_are_named() {
     }
     assert_eq!(named(SpringDamper::stiffness(0.0).max_force(1.0)), "stiffness");
     assert_eq!(named(SpringDamper::stiffness(1.0).max_force(0.0)), "max_force");
-    // A largest force has to be said.
+    // The largest force must be set.
     assert_eq!(named(SpringDamper::stiffness(1.0)), "max_force");
     assert_eq!(ForbiddenRegion::new(SPRING, 0.0).unwrap_err().parameter, "margin");
 }
 
 #[test]
 fn a_passive_wall_asks_for_damping_in_the_device() {
-    // K T / 2 + B, and the hold's where that is more.
+    // K T / 2 + B, or the hold's damping if larger.
     assert!((SPRING.device_damping(0.001) - 0.011).abs() < 1.0e-7);
     let held = SPRING.hold_damping(0.5);
     assert!((held.device_damping(0.001) - 0.5).abs() < 1.0e-7);
@@ -341,8 +341,8 @@ proptest! {
         }
     }
 
-    /// The wall never pulls, is silent outside its margin, and its push never shrinks when the
-    /// surface may be nearer.
+    /// The wall never pulls, gives no force outside its margin, and its push never shrinks when the surface may be
+    /// nearer.
     #[test]
     fn the_wall_only_pushes(
         direction in unit(), gap in -3.0_f32..10.0, slack in 0.0_f32..5.0, accuracy in 0.0_f32..0.1,

@@ -5,21 +5,18 @@
 //!
 //! `c |t|^2 + sum of weight max(0, wanted - normal . t)^2`, `wanted = (1 + c) depth`,
 //!
-//! of three unknowns. A wall *acts* where its term is not 0; while the same walls act, the function is quadratic. The
+//! of three unknowns. A wall *acts* while its term is not 0; while the same walls act, the function is quadratic. The
 //! search starts at `t = 0`, where every wall with a depth above 0 acts. A step leads towards the minimum of the
-//! present quadratic, up to the first point at which a wall begins or ceases to act. One wall does not reverse the next
-//! step (Sherman & Morrison), so every step lowers the function, and a step that meets no such point ends at its
-//! minimum.
+//! current quadratic, up to the first point at which a wall starts or stops acting. One wall does not reverse the next
+//! step (Sherman & Morrison), so every step lowers the function, and a step without such a point ends at its minimum.
 
 use glam::Vec3;
 
-/// Most walls.
 pub(super) const MOST: usize = 8;
 
-/// Part of its depth by which a wall yields under its force, so that two contacts with one wall divide the force.
+/// Fraction of its depth by which a wall yields under its force, so that two contacts with one wall share the force.
 pub(super) const COMPLIANCE: f32 = 1.0 / 16.0;
 
-/// Most steps.
 const STEPS: u32 = 32;
 
 /// One wall, and the tool's depth in it.
@@ -27,19 +24,19 @@ const STEPS: u32 = 32;
 pub(super) struct Wall {
     /// Unit vector that leads out.
     pub normal: Vec3,
-    /// The depth (mm), plus the yield of the wall where it holds alone.
+    /// The depth (mm), plus the wall's yield if it acts alone.
     wanted: f32,
-    /// How stiff it is beside the others, from 0 to 1.
+    /// Its stiffness relative to the others, from 0 to 1.
     weight: f32,
     acts: bool,
 }
 
 impl Wall {
-    /// None.
+    /// No wall.
     pub const NONE: Self = Self { normal: Vec3::ZERO, wanted: 0.0, weight: 0.0, acts: false };
 
-    /// A wall with the tool `depth` mm in it, above 0. Alone, it would move the tool by `activation` times that, from 0
-    /// to 1.
+    /// A wall with the tool at `depth` (mm, above 0). Alone it would move the tool by `activation` (0 to 1) times the
+    /// depth.
     pub fn new(normal: Vec3, depth: f32, activation: f32) -> Self {
         let weight = COMPLIANCE * activation / (1.0 + COMPLIANCE - activation);
         Self { normal, wanted: depth * (1.0 + COMPLIANCE), weight, acts: true }
@@ -48,7 +45,7 @@ impl Wall {
     /// Its part of the displacement (mm), along its normal.
     pub fn push(&self, moved: Vec3) -> f32 {
         let left = self.left(moved);
-        // Written so that NaN stays.
+        // Written so that NaN is kept.
         if left <= 0.0 { 0.0 } else { left * self.weight / COMPLIANCE }
     }
 
@@ -57,7 +54,6 @@ impl Wall {
     }
 }
 
-/// The displacement.
 pub(super) fn displacement(mut walls: [Wall; MOST]) -> Vec3 {
     let mut at = Vec3::ZERO;
     let mut is_refined = false;
@@ -77,7 +73,7 @@ pub(super) fn displacement(mut walls: [Wall; MOST]) -> Vec3 {
         match first {
             Some(wall) => wall.acts = !wall.acts,
             None if is_refined => break,
-            // One more step, from there: rounding is relative to the step.
+            // One more step from here: rounding is relative to the step.
             None => is_refined = true,
         }
     }

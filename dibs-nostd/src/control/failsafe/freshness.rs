@@ -1,10 +1,10 @@
-//! Limits on faults that the age alone does not show: delay in transit, a source that stands still, forgeries.
+//! Limits on faults that the age alone does not show: transit delay, a source that stopped, forgeries.
 
 use super::{LimitError, Limits, Link, State, Watch};
 use crate::surface::Millis;
 use crate::unavailable::Unavailable;
 
-/// The limits. By default transit is watched, with the limits on age, and the rest is not.
+/// The limits. By default transit has the limits on age, and the others are off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -18,7 +18,7 @@ impl Freshness {
     pub const OFF: Self =
         Self { transit: Transit::AsAge, source_age: Watch::OFF, forgeries: Watch::OFF };
 
-    /// The transit of a frame, as far as it counts.
+    /// The transit time that counts for the margin.
     pub const fn transit(&self, link: &Link) -> Millis {
         match self.transit {
             Transit::LeftOut => Millis(0),
@@ -42,7 +42,7 @@ impl Freshness {
     }
 }
 
-/// What becomes of transit.
+/// How the transit time is used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -51,33 +51,33 @@ enum Transit {
     AsAge,
     /// In the margin, with limits of its own.
     Watched(Watch),
-    /// Left out of margin and limits.
+    /// In neither the margin nor the limits.
     LeftOut,
 }
 
-/// A frame that was older when it was sent is not published, because its packets cannot say how old.
+/// A frame that was older when sent is not published, because its packets cannot state the age.
 const OLDEST: Millis = Millis(u16::MAX as u32 - 1);
 
 impl Limits {
-    /// Limits on the transit of the published frame, measured from the status that it echoes: no clock of the sender is
-    /// needed. Normally it is the time between two statuses plus the latency there and back. A frame without an echo is
-    /// beyond every limit. By default these are the limits on age. The margin includes this time.
+    /// Limits on the transit time of the published frame, measured from the status that it echoes: no clock of the
+    /// sender is needed. Normally it is the time between two statuses plus the latency in both directions. A frame
+    /// without an echo is beyond every limit. By default these are the limits on age. The margin includes this time.
     #[must_use]
     pub const fn transit(mut self, watch: Watch) -> Self {
         self.freshness.transit = Transit::Watched(watch);
         self
     }
 
-    /// Leaves transit out of the margin and out of the limits: for a bus whose delay is
-    /// short for reasons that this machine does not see. A delay is then not detected, and no margin covers it.
+    /// Leaves transit out of the margin and the limits: for a bus whose delay is known to be short by other means. A
+    /// delay is then not detected, and no margin covers it.
     #[must_use]
     pub const fn without_transit(mut self) -> Self {
         self.freshness.transit = Transit::LeftOut;
         self
     }
 
-    /// Limits on the age of the published frame when it was sent: a source that stands still while its
-    /// sender lives.
+    /// Limits on the age of the published frame when it was sent: they detect a source that stopped while its sender is
+    /// alive.
     ///
     /// # Errors
     /// [`LimitError::Untrippable`] if the safe limit is 65,534 ms or more: no frame older than that is published.
@@ -91,11 +91,11 @@ impl Limits {
     }
 
     /// Limits on forged packets, of which [`BusHealth::FORGERIES_A_SECOND`](crate::BusHealth::FORGERIES_A_SECOND) are
-    /// forgotten each second, whatever is published.
+    /// subtracted each second, independent of publications.
     ///
     /// # Errors
-    /// [`LimitError::Untrippable`] if the second limit is [`Link::MOST_FORGERIES`] or more, which no link reports more
-    /// of. [`Watch::OFF`] is allowed.
+    /// [`LimitError::Untrippable`] if the second limit is at least [`Link::MOST_FORGERIES`], the largest count that a
+    /// link reports. [`Watch::OFF`] is allowed.
     pub const fn forgeries(mut self, watch: Watch<u32>) -> Result<Self, LimitError> {
         if watch.safe() >= Link::MOST_FORGERIES && watch.safe() != Watch::<u32>::OFF.safe() {
             return Err(LimitError::Untrippable { safe: watch.safe() });

@@ -18,7 +18,7 @@ pub struct Watch<T = Millis> {
 /// A time of half the clock's range or more is ambiguous.
 const LONGEST: u32 = i32::MAX as u32;
 
-/// A quantity that a [`Watch`] has limits on.
+/// The type of a quantity limited by a [`Watch`].
 #[doc(hidden)]
 pub trait Watched: Copy + PartialOrd + sealed::Sealed {
     /// Its largest value.
@@ -69,11 +69,10 @@ impl<T: Watched> Watch<T> {
 }
 
 impl Watch {
-    /// Limits on a time: longer ones than `degraded` lead to the degraded state, longer ones than `safe` to the safe
-    /// state.
+    /// Limits on a time: a time above `degraded` leads to the degraded state, above `safe` to the safe state.
     ///
     /// # Errors
-    /// [`LimitError`] when `safe` is below `degraded`, or not below 2^31 ms.
+    /// [`LimitError`] if `safe` is below `degraded`, or not below 2^31 ms.
     pub const fn new(degraded: Millis, safe: Millis) -> Result<Self, LimitError> {
         match check(degraded.0, safe.0) {
             Ok(()) => Ok(Self { degraded, safe }),
@@ -86,7 +85,7 @@ impl Watch<u32> {
     /// Limits on a count of frames or packets, in the same way.
     ///
     /// # Errors
-    /// [`LimitError`] when `safe` is below `degraded`, or not below 2^31.
+    /// [`LimitError`] if `safe` is below `degraded`, or not below 2^31.
     pub const fn count(degraded: u32, safe: u32) -> Result<Self, LimitError> {
         match check(degraded, safe) {
             Ok(()) => Ok(Self { degraded, safe }),
@@ -107,9 +106,9 @@ const fn check(degraded: u32, safe: u32) -> Result<(), LimitError> {
 
 /// The machine's limits, and its conditions for recovery.
 ///
-/// Only the age must be watched. The transit of frames has the same limits, unless they are given or
-/// [left out](Self::without_transit); every other input is off by default. By default one good
-/// frame, 1,000 clear steps and an acknowledgement recover.
+/// Only limits on the age are required. The transit of frames has the same limits, unless others are given or it is
+/// [left out](Self::without_transit); every other input is off by default. By default one good frame, 1,000 clear steps
+/// and an acknowledgement are needed to recover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -125,7 +124,7 @@ pub struct Limits {
     automatic: bool,
 }
 
-/// Steps that a state lasts at least before it improves, by default: a second of a loop at 1 kHz.
+/// The default number of steps that a state lasts before it improves: a second of a loop at 1 kHz.
 const DWELL: u32 = 1_000;
 
 impl Limits {
@@ -175,7 +174,7 @@ impl Limits {
     /// Frames that must be published in a row, with every input within its first limit, to recover.
     ///
     /// # Errors
-    /// [`LimitError`] for 0, with which a fault would recover without a new surface.
+    /// [`LimitError`] for 0, with which a fault would end without a new surface.
     pub const fn recovery(self, frames: u16) -> Result<Self, LimitError> {
         if frames == 0 {
             return Err(LimitError::Recovery { frames });
@@ -183,8 +182,9 @@ impl Limits {
         Ok(Self { recovery_frames: frames, ..self })
     }
 
-    /// Steps in a row with every input within its first limit, before the one that recovers: 1,000 by default. Whoever
-    /// can trip a limit at will makes the state change no more often than that. Getting worse takes no time.
+    /// Steps in a row with every input within its first limit, before the one that recovers: 1,000 by default. It
+    /// bounds how often an attacker who can exceed a limit at will makes the state change. The state gets worse at
+    /// once.
     #[must_use]
     pub const fn dwell(self, steps: u32) -> Self {
         Self { dwell: steps, ..self }
@@ -202,13 +202,13 @@ impl Limits {
         self.automatic
     }
 
-    /// Frames in a row that recover.
+    /// Frames in a row needed to recover.
     #[must_use]
     pub const fn recovery_frames(&self) -> u16 {
         self.recovery_frames
     }
 
-    /// Steps in a row that must be clear before the one that recovers.
+    /// Clear steps in a row needed before the one that recovers.
     #[must_use]
     pub const fn dwell_steps(&self) -> u32 {
         self.dwell
@@ -220,7 +220,7 @@ impl Limits {
         self.age
     }
 
-    /// Distance that tissue may move within a time, in mm, rounded up.
+    /// Upper bound on the tissue's motion within a time, in mm, rounded up.
     #[must_use]
     pub fn margin(&self, time: Millis) -> f32 {
         // Conversion and product each round by at most half an epsilon.
@@ -255,13 +255,13 @@ pub enum LimitError {
         /// The speed.
         tissue_speed: f32,
     },
-    /// A control loop of 0 ticks a second.
+    /// A control loop with 0 ticks per second.
     Rate,
-    /// No limit on the reach follows from a tree without its rest shape.
+    /// The tree has no rest shape from which a limit on the reach could follow.
     NoReach,
     /// Recovery with 0 new frames.
     Recovery {
-        /// The frames asked for.
+        /// The requested frames.
         frames: u16,
     },
 }

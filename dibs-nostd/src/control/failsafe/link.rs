@@ -9,13 +9,13 @@ use crate::surface::Millis;
 pub struct Link {
     /// Time since the last good packet; [`Millis::MAX`] before the first.
     pub silence: Millis,
-    /// Time since the sender was last known to live, by its heartbeats; [`Millis::MAX`] before the first.
+    /// Time since the sender was last known to be alive, by its heartbeats; [`Millis::MAX`] before the first.
     pub heartbeat: Millis,
     /// Frames that failed since the last publication: [`BusHealth::rejections`](crate::BusHealth::rejections).
     pub rejections: u32,
     /// Forged packets, less 10 for each second: [`BusHealth::forgeries`](crate::BusHealth::forgeries).
     pub forgeries: u32,
-    /// Transit of the published frame, at most; [`Millis::MAX`] where it is unknown.
+    /// Upper bound on the transit time of the published frame; [`Millis::MAX`] if unknown.
     pub transit: Millis,
     /// Age of the published frame when it was sent; [`Millis::MAX`] before the first.
     pub source_age: Millis,

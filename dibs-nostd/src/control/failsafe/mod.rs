@@ -1,7 +1,7 @@
 //! A state machine that decides whether the surface may be trusted, from age, silence, lost heartbeats and rejections.
 //!
-//! The control tick steps a [`FailSafe`] once. It owns no clock and a few words of memory; each step is a handful of
-//! integer comparisons.
+//! The control tick calls [`FailSafe::step`] once. The machine needs no clock of its own and a few words of memory;
+//! each step takes a handful of integer comparisons.
 //!
 //! # States
 //!
@@ -11,16 +11,16 @@
 //! | [`State::Degraded`] | the same, and the margin grows with the age | an input is beyond its first limit, or was: tell the operator |
 //! | [`State::Safe`] | [`Unavailable`]: the constraint's hold | an input is beyond its second limit, or was: the surface is not acted on |
 //!
-//! The answer is widened in the nominal state too, so that the force does not jump where the state
-//! changes: the margin is one continuous function of the age. It covers the transit of the frame, too,
-//! which only [`Limits::without_transit`] leaves out.
+//! The answer is widened in the nominal state too, so that the force does not jump when the state changes: the margin
+//! is one continuous function of the age. It also covers the transit of the frame, unless [`Limits::without_transit`]
+//! leaves it out.
 //!
 //! # Transitions
 //!
-//! Each input has two limits, a [`Watch`]. *Clear* is a step at which every input is within its first
-//! limit, a surface is there, the query gave an answer and the tree is sound. The *run* counts the frames that were
-//! published since the last step that was not clear; two frames between two steps count as one. The *calm* counts the
-//! steps since, and is *long enough* once more than [`Limits::dwell`]'s steps were clear.
+//! Each input has two limits, a [`Watch`]. A step is *clear* if every input is within its first limit, there is a
+//! surface, the query gave an answer and the tree is sound. The *run* counts the frames published since the last step
+//! that was not clear; two frames between two steps count as one. The *calm* counts the steps since then, and is *long
+//! enough* once more than [`Limits::dwell`]'s steps were clear.
 //!
 //! | from | to | when |
 //! |---|---|---|
@@ -30,18 +30,19 @@
 //! | degraded | nominal | the run reaches [`Limits::recovery`]'s frames, and the calm is long enough |
 //! | safe | nominal | the same, and [`FailSafe::acknowledge`] was accepted since; or alone, with [`Limits::automatic`] |
 //!
-//! From safe there is no way to degraded, and no fault recovers without new frames, so a surface that only looks fresh,
-//! because a clock wrapped, does not help. An acknowledgement is accepted only once the run is complete, and void as
-//! soon as a step is not clear, so nobody can acknowledge in advance. Recovery is manual by default, as in the da Vinci
-//! Research Kit. The calm bounds how often the state changes, whoever steers an input across its limit.
+//! Safe never changes to degraded, and no fault recovers without new frames, so a surface that only looks fresh,
+//! because a clock wrapped, does not help. An acknowledgement is accepted only once the run is complete, and becomes
+//! void at the first step that is not clear, so nobody can acknowledge in advance. Recovery is manual by default, as in
+//! the da Vinci Research Kit. The calm bounds how often the state changes, even if an attacker moves an input across
+//! its limit.
 //!
 //! # Time
 //!
-//! Times are [`Millis`] on the receiver's clock, which wraps; a count of control [`Ticks`](crate::Ticks) becomes one by
-//! its rate. With a surface received at `r` and nothing after it, the first safe step is one at `r + safe + 1` or
-//! later, where `safe` is the second limit on age: never later, and exactly then unless another input comes first. Ages
-//! of surface, packets and heartbeats follow one rule, that of [`FrameAge`]: a stamp up to 16 ms ahead of the clock is
-//! new, one farther ahead is old, and what was found old stays old when the clock comes around.
+//! Times are [`Millis`] on the receiver's clock, which wraps; a count of control [`Ticks`](crate::Ticks) is converted
+//! by its rate. If a surface is received at `r` and nothing after it, the first safe step is the first one at
+//! `r + safe + 1` or later, where `safe` is the second limit on age, unless another input requires it earlier. Ages of
+//! surface, packets and heartbeats follow one rule, that of [`FrameAge`]: a stamp up to 16 ms ahead of the clock is
+//! new, one farther ahead is old, and a stamp once found old stays old when the clock wraps.
 
 // Requirement: C-01
 
@@ -70,15 +71,14 @@ pub use status::LinkStatus;
 pub struct Observation {
     /// The published frame and its age: [`LatestSurface::frame`](crate::LatestSurface::frame); `None` before the first.
     pub frame: Option<FrameAge>,
-    /// The time by which the surface that was searched is behind the present, as far as its own error does not cover
-    /// it: [`SurfaceBlend::lag`](crate::SurfaceBlend::lag). `None` for the frame as it was published, whose lag is its
-    /// age.
+    /// How far the searched surface is behind the present, beyond what its own error covers:
+    /// [`SurfaceBlend::lag`](crate::SurfaceBlend::lag). `None` for the frame as published, whose lag is its age.
     pub lag: Option<Millis>,
     /// The bus's health.
     pub link: Link,
-    /// Why that frame gave no answer, if it gave none: the query's error, or a tool without a pose.
+    /// Why that frame gave no answer, if so: the query's error, or a tool without a pose.
     pub no_answer: Option<Unavailable>,
-    /// Whether the tree's bytes were found changed: [`Scrub`](crate::Scrub). Leave it set for the rest of the run,
+    /// Whether the tree's bytes were found changed: [`Scrub`](crate::Scrub). Keep it set until the program restarts,
     /// unless the memory's defect is known and repaired.
     pub is_tree_corrupt: bool,
 }
@@ -90,9 +90,9 @@ pub struct Observation {
 pub enum State {
     /// Every input is within its limits.
     Nominal,
-    /// The surface is acted on, with a growing margin.
+    /// The surface is used, with a growing margin.
     Degraded,
-    /// The surface is not acted on.
+    /// The surface is not used.
     Safe,
 }
 
@@ -103,8 +103,8 @@ pub enum State {
 pub struct Verdict {
     /// The state after the step.
     pub state: State,
-    /// Why it is not nominal: the first input that requires the state, in the order missing surface, answer, tree, age,
-    /// link. If none requires it any more, the last cause remains.
+    /// Why the state is not nominal: the first input that requires it, in the order missing surface, answer, tree, age,
+    /// link. If no input requires it any more, the last cause remains.
     pub cause: Option<Unavailable>,
     /// Most that the tissue may have moved from the surface that was searched, in mm: its lag and transit, times the
     /// speed.
@@ -114,7 +114,7 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// The answer that the constraint may act on, widened by the margin, or why there is none.
+    /// The answer for the constraint, widened by the margin, or why there is none.
     ///
     /// # Errors
     /// The cause in the safe state.
@@ -243,7 +243,7 @@ impl FailSafe {
         }
     }
 
-    /// The margin (mm) of a verdict on this frame, so far behind.
+    /// The margin (mm) of a verdict on a frame with this lag.
     pub(crate) fn margin(&self, frame: FrameAge, lag: Option<Millis>, link: &Link) -> f32 {
         let lag = lag.unwrap_or(frame.age);
         self.limits.margin(lag.plus(self.limits.freshness.transit(link)))

@@ -6,9 +6,9 @@ use super::Link;
 use crate::receive::BusHealth;
 use crate::surface::{Ageing, Millis};
 
-/// The bus interrupt's notes for the control tick. Meant for a `static`.
+/// Passes the bus's health from the bus interrupt to the control tick. Meant for a `static`.
 ///
-/// Neither waits for the other. Each number is exact, but two of them may be of different moments.
+/// Neither side waits for the other. Each number is exact, but two of them may be of different moments.
 ///
 /// ```
 /// use dibs_nostd::wire::{FrameId, NoMac, encode_heartbeat};
@@ -39,13 +39,13 @@ pub struct LinkStatus {
     source_age: AtomicU32,
 }
 
-/// The time of the last packet or heartbeat, and the greatest age that it was found to have.
+/// The time of the last packet or heartbeat, and the greatest age found for it.
 #[derive(Debug)]
 struct Stamp {
-    /// 1 once one came.
+    /// 1 once a packet or heartbeat arrived.
     came: AtomicU32,
     at: AtomicU32,
-    /// The reader's state: the stamp that it last read, and that stamp's age.
+    /// The reader's state: the last stamp read, and its age.
     aged: AtomicU32,
     oldest: AtomicU32,
 }
@@ -67,7 +67,7 @@ impl Stamp {
         }
     }
 
-    /// Time since the last; [`Millis::MAX`] before the first.
+    /// Time since the last one; [`Millis::MAX`] before the first.
     fn age(&self, now: Millis) -> Millis {
         if self.came.load(Ordering::Acquire) == 0 {
             return Millis::MAX;
@@ -107,8 +107,8 @@ impl LinkStatus {
         self.source_age.store(health.source_age.0, Ordering::Relaxed);
     }
 
-    /// The health of the bus at `now`. One reader, which calls it at least once in 2^31 ms: then a lost
-    /// link stays lost when the clock wraps.
+    /// The health of the bus at `now`. There is one reader, which calls it at least once in 2^31 ms: then a lost link
+    /// stays lost when the clock wraps.
     #[must_use]
     pub fn read(&self, now: Millis) -> Link {
         Link {

@@ -1,6 +1,6 @@
-//! Compares the machine with its table, and with a second one that remembers all steps.
+//! Compares the machine with its table, and with a second implementation that stores all steps.
 //!
-//! One file, because table, second machine and comparison need each other.
+//! One file, because table, second implementation and comparison need each other.
 
 // Requirement: C-01
 
@@ -71,7 +71,6 @@ fn seen(now: u32, epoch: u32, age: u32) -> Observation {
     }
 }
 
-/// A machine in a state, after frame 100.
 fn machine(state: State, limits: Limits) -> FailSafe {
     let mut machine = FailSafe::new(limits);
     for epoch in 0..=100 {
@@ -206,7 +205,7 @@ fn recovery_takes_its_frames_in_a_row_and_from_safe_an_acknowledgement() {
     }
 }
 
-/// An input crosses its limit as often as it can: the state gets worse at once, and better no sooner than it may.
+/// An input crosses its limit as often as it can: the state gets worse at once, and better no sooner than allowed.
 #[test]
 fn the_state_improves_no_more_often_than_the_dwell_allows() {
     let rejected =
@@ -259,7 +258,7 @@ fn safe_comes_exactly_one_tick_after_the_limit_whatever_the_clock_shows() {
         assert_eq!(first(State::Degraded), Some(AGE.degraded().0 as usize + 1));
         assert_eq!(first(State::Safe), Some(AGE.safe().0 as usize + 1));
         assert!(states[AGE.safe().0 as usize + 1..].iter().all(|&s| s == State::Safe));
-        // A surface that looks fresh again recovers nothing.
+        // A surface that looks fresh again does not recover the machine.
         assert_eq!(machine.step(&seen(start, 1, 0)).state, State::Safe);
     }
 }
@@ -282,8 +281,8 @@ fn the_margin_is_age_times_speed_in_every_state_that_acts() {
     }
 }
 
-/// The margin covers the time on the way as it covers the age, and an unknown way is beyond every limit. Only a written
-/// choice leaves it out.
+/// The margin covers the transit time as it covers the age, and an unknown transit time is beyond every limit. Only an
+/// explicit choice leaves it out.
 #[test]
 fn the_margin_covers_the_way_unless_that_is_left_out() {
     let limits = Limits::new(AGE, SPEED).unwrap().dwell(0).automatic();
@@ -298,7 +297,7 @@ fn the_margin_covers_the_way_unless_that_is_left_out() {
     };
     let margin = |millis| limits.margin(Millis(millis));
     assert_eq!(step(limits, with(20, None)), (State::Nominal, margin(50)));
-    // An extrapolated surface covers its age itself, but not the way.
+    // An extrapolated surface covers its age itself, but not the transit time.
     assert_eq!(step(limits, with(20, Some(Millis(0)))), (State::Nominal, margin(20)));
     assert_eq!(step(limits, with(20, Some(Millis(7)))), (State::Nominal, margin(27)));
     // By default the limits are those on age.
@@ -482,7 +481,7 @@ proptest! {
     }
 }
 
-/// Heartbeats were lost while good frames go on: over more than the clock's whole range the machine stays safe, and a
+/// Heartbeats are lost while good frames continue: for more than the clock's whole range the machine stays safe, and a
 /// single flipped bit of a stamp does not recover it.
 #[test]
 fn lost_heartbeats_stay_lost_over_the_whole_range_of_the_clock() {
@@ -498,7 +497,7 @@ fn lost_heartbeats_stay_lost_over_the_whole_range_of_the_clock() {
             link.set(&health(now, start));
             let verdict = machine.step(&observe(now, epoch, link.read(Millis(now))));
             assert_eq!(verdict.state, State::Safe, "{start}: {epoch} steps of {step}");
-            // Includes the ticks in which the clock comes around to the last heartbeat.
+            // Includes the ticks at which the clock wraps around to the last heartbeat.
             let again = link.read(Millis(start.wrapping_add(epoch % 40).wrapping_sub(20)));
             if u64::from(epoch) * u64::from(step) > 1 << 32 {
                 assert_eq!(again.heartbeat, Millis::MAX, "{start}: {epoch} steps of {step}");

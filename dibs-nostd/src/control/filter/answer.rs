@@ -13,13 +13,14 @@ use crate::unavailable::{QueryError, Unavailable};
 pub struct Admitted {
     /// The motion to execute.
     pub motion: Motion,
-    /// No separation (mm) of any tool is less at any instant of the period, wherever the tissue is within its uncertainty.
+    /// Lower bound (mm) on the separation of every tool during the whole period, for any tissue position within its
+    /// uncertainty.
     pub least_separation: f32,
-    /// Why it is this motion.
+    /// Why this motion was chosen.
     pub reason: Reason,
-    /// Queries made.
+    /// Number of queries made.
     pub queries: u32,
-    /// Instructions that the queries took, by the filter's [`Cost`](crate::Cost).
+    /// Instructions of the queries, by the filter's [`Cost`](crate::Cost).
     pub instructions: u32,
 }
 
@@ -29,15 +30,15 @@ pub struct Admitted {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Reason {
-    /// It is the command.
+    /// The motion is the command.
     Commanded,
-    /// The nearest motion that walls, the caller's rows and the robot's speed allow.
+    /// The motion nearest to the command that walls, the caller's rows and the robot's speed allow.
     Nearest,
-    /// A half of that, or less: no more could be verified.
+    /// Half of that or less: no more could be verified.
     Shortened,
-    /// Nothing but rest could be verified.
+    /// Only rest could be verified.
     Stopped,
-    /// The surface comes closer: the least motion that keeps the stand-off.
+    /// The surface approaches: the smallest motion that keeps the stand-off.
     Retreating,
     /// No motion was found that certainly keeps the stand-off. The motion is the best one known: rest, or one that ends
     /// farther from the tissue.
@@ -45,7 +46,7 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// Its words, as `dibs filter` prints them.
+    /// The name that `dibs filter` prints.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -65,7 +66,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// Why a filter admits nothing: the tool must stay at rest.
+/// Why a filter admits no motion: the tool must stay at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -84,23 +85,23 @@ pub enum FilterError {
         /// The row's index.
         row: usize,
     },
-    /// More rows than there are places for a caller's.
+    /// The caller gave more rows than there are slots.
     Rows {
         /// Rows given.
         found: usize,
-        /// Places.
+        /// Slots.
         most: usize,
     },
-    /// No pair of tool and surface, or more than there are places.
+    /// No pair of tool and surface, or more than there are slots.
     Pairs {
         /// Pairs given.
         found: usize,
-        /// Places.
+        /// Slots.
         most: usize,
     },
     /// A query gave no answer.
     Query(QueryError),
-    /// There is no surface that is trusted: a [guard](crate::guard::Guard::admit) is in its safe state.
+    /// No surface is trusted: a [guard](crate::guard::Guard::admit) is in its safe state.
     Untrusted(Unavailable),
 }
 

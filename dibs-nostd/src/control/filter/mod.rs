@@ -1,8 +1,8 @@
 //! A filter of commands: the motion nearest to a commanded one that keeps an instrument out of the tissue, verified for
 //! every instant until the next tick.
 //!
-//! For robots that are commanded by position or velocity. A force pushes back after the fact; a filter does not let a
-//! command through.
+//! For robots that are commanded by position or velocity. A force reacts after the tool has moved; a filter changes the
+//! command before it is executed.
 //!
 //! ```
 //! use dibs_build::{Builder, generate};
@@ -36,29 +36,31 @@
 //! # Promise
 //!
 //! Unless the reason is [`Reason::NoSafeMotion`], no separation is below the stand-off less 0.01 mm at any instant of
-//! the period, and none is below [`Admitted::least_separation`]; to the accuracy of a query. This holds where
+//! the period, and none is below [`Admitted::least_separation`]; to the accuracy of a query. This requires that
 //!
-//! - the robot executes the admitted motion: its points go straight, or turn about the reference point;
-//! - at the start the tissue is within the surface's position error and the [`Uncertainty`] of the surface that is
-//!   searched, and no point of it moves faster than the stated speed in the period;
-//! - the surface keeps to its stretch limit, as for every query.
+//! - the robot executes the admitted motion: its points move in straight lines, or turn about the reference point;
+//! - at the start the tissue is within the surface's position error and the [`Uncertainty`] of the searched surface,
+//!   and no point of it moves faster than the stated speed in the period;
+//! - the surface stays within its stretch limit, as for every query.
 //!
-//! A surface that is *held* keeps the second point by its age and its speed limit, which a receiver checks: then a new
-//! frame never takes back what was certain, and a tool at rest on its stand-off stays admitted. One that is
-//! *extrapolated* needs less distance; its [residual](crate::SurfaceBlend::residual) is an estimate, so a new frame may be
-//! nearer than the last ones promised, and the reason then says so while the tool leaves.
+//! A surface that is *held* satisfies the second point by its age and its speed limit, which a receiver checks: then a
+//! new frame never invalidates an earlier bound, and a tool at rest at its stand-off stays admitted. An *extrapolated*
+//! surface needs less distance; its [residual](crate::SurfaceBlend::residual) is an estimate, so a new frame may be
+//! nearer than the last ones predicted, and the reason then says so while the tool leaves.
 //!
-//! No safe motion exists for a tool that begins nearer than its stand-off, in a gap that closes, or where the surface
-//! comes faster than the robot leaves. Then the motion is the best one known, and the reason says it, in every such tick.
+//! No safe motion exists for a tool that starts nearer than its stand-off, in a gap that closes, or where the surface
+//! approaches faster than the robot can leave. Then the motion is the best one known, and the reason is `NoSafeMotion`
+//! in every such tick.
 //!
 //! # Method
 //!
-//! A query at the start gives each tool's distance. Where the command could use that up, its closest pair is a row, and the
-//! motion nearest to the command is computed. A query at that motion's end bounds the distance on the whole path;
-//! where it is too small, its pair is a further row, so that corners, gaps and folds show themselves as the motion comes to them. After four motions the next are shortened
-//! towards the least one that the rows allow, which is rest unless the surface comes.
+//! A query at the start gives each tool's distance. If the command could use it up, the tool's closest pair becomes a
+//! row, and the motion nearest to the command is computed. A query at that motion's end bounds the distance on the
+//! whole path; if it is too small, its pair becomes a further row, so that corners, gaps and folds are found as the
+//! motion reaches them. After four motions the next are shortened towards the smallest one that the rows allow, which
+//! is rest unless the surface approaches.
 //!
-//! *Nearest* is by the sum of the squares of the translation and of the rotation times a [lever](Filter::lever).
+//! *Nearest* means the least sum of the squares of the translation and of the rotation times a [lever](Filter::lever).
 
 // Requirements: C-05, C-06
 
@@ -79,13 +81,11 @@ pub use row::MotionRow;
 use session::Session;
 pub use uncertainty::Uncertainty;
 
-/// Most pairs of tool and surface.
 const MOST_PAIRS: usize = 8;
 
 /// By how much (mm) a verified separation may be below the stand-off.
 const EPSILON: f32 = 0.01;
 
-/// Least lever (mm).
 const LEAST_LEVER: f32 = 1.0;
 
 /// Instructions of a tick's queries by default.
@@ -97,7 +97,7 @@ pub struct Filter {
     stand_off: f32,
     /// mm/s.
     speed: f32,
-    /// mm; `None` for the tools' size.
+    /// mm; `None` for the size of the tools.
     lever: Option<f32>,
     /// s.
     approach: f32,
@@ -107,9 +107,9 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// A filter that keeps every tool `stand_off` (mm, at least 0) from the tissue, for a robot that moves its reference
-    /// point with at most `speed` (mm/s, above 0) and turns no faster than moves the end of the [lever](Self::lever) with
-    /// that speed. Commands beyond are shortened.
+    /// A filter that keeps every tool `stand_off` (mm, at least 0) from the tissue, for a robot whose reference point
+    /// moves at most at `speed` (mm/s, above 0), and whose rotation moves the end of the [lever](Self::lever) at most
+    /// at that speed. Faster commands are shortened.
     ///
     /// # Errors
     /// [`FilterError::Parameter`] names the number that is out of range.
@@ -134,11 +134,12 @@ impl Filter {
         Ok(Self { lever: Some(checked("lever", lever, lever >= LEAST_LEVER)?), ..self })
     }
 
-    /// The same with a time constant (s, at least 0) of the approach: a tool comes nearer to its stand-off at no more than
-    /// its distance from there divided by this, so that it does not jump where a new frame gives way a little. By default it
-    /// is 0: a period may use up the whole distance. Motions along the wall and away from it keep their speed; a wall that
-    /// recedes is followed from its speed times this. It eases the approach to a tool's closest pair only, and is no promise.
-    /// (The discrete control barrier function of Agrawal & Sreenath 2017, their gamma: the period divided by this.)
+    /// The same with a time constant (s, at least 0) of the approach: a tool approaches its stand-off at most at its
+    /// remaining distance divided by this time, so that it does not jump when a new frame recedes a little. The default
+    /// is 0: a period may use up the whole distance. Motions along the wall and away from it keep their speed; a
+    /// receding wall is followed from its speed times this time. It slows the approach to a tool's closest pair only,
+    /// and is no promise. (The discrete control barrier function of Agrawal & Sreenath 2017; their gamma is the period
+    /// divided by this.)
     ///
     /// # Errors
     /// [`FilterError::Parameter`] if it is negative or not finite.
@@ -146,8 +147,9 @@ impl Filter {
         Ok(Self { approach: checked("approach", time, time >= 0.0)?, ..self })
     }
 
-    /// The same with a budget: the instructions of all queries of a tick, by a [`Cost`]; 200,000 of a Cortex-M7 by default. Where it
-    /// ends, what is not verified is not admitted. The next tick's searches go on where they stopped.
+    /// The same with a budget: the instructions of all queries of a tick, by a [`Cost`]; 200,000 of a Cortex-M7 by
+    /// default. If it runs out, motions that are not verified are not admitted. The next tick's searches continue where
+    /// they stopped.
     #[must_use]
     pub const fn budget(self, instructions: u32, cost: Cost) -> Self {
         Self { instructions, cost, ..self }
@@ -161,11 +163,11 @@ impl Filter {
 
     /// The motion nearest to `command` that keeps all tools out, for the next `period` (s).
     ///
-    /// The pairs are the parts of one rigid instrument as they are now, each with a surface and a tracker of its own: a
-    /// chain of two tools in a scene of two surfaces has four. `rows` are up to 8 limits that hold besides.
+    /// The pairs are the current parts of one rigid instrument, each with its own surface and tracker: a chain of two
+    /// tools in a scene of two surfaces has four pairs. `rows` are up to 8 additional limits.
     ///
-    /// Cost: the budget at most, and for each motion that is tried a solution of up to 16 rows: 1,000 instructions as a rule,
-    /// 40,000 at most.
+    /// Cost: the budget at most, and for each tried motion a solution of up to 16 rows: usually 1,000 instructions, at
+    /// most 40,000.
     ///
     /// # Errors
     /// [`FilterError`]: an argument that is not finite or out of range, or a query without an answer. The tool must
@@ -214,7 +216,7 @@ impl Filter {
         })
     }
 
-    /// Most that a motion moves the reference point in a period (mm), and that it turns.
+    /// Upper bounds on the motion of the reference point (mm) and on the rotation (rad) in a period.
     #[cfg(feature = "bus")]
     pub(crate) fn most<T: Tool>(&self, tool: &T, motion: &Motion, period: f32) -> (f32, f32) {
         let most = self.speed * period;

@@ -5,8 +5,8 @@ use glam::Vec3;
 use super::nearest::Vector;
 use crate::math::sqrt::sqrt;
 
-/// A motion of a rigid instrument in one period: its reference point goes straight, by `translation`, while the
-/// instrument turns about it, by `rotation`, both evenly.
+/// A motion of a rigid instrument in one period: its reference point moves in a straight line by `translation`, while
+/// the instrument turns about it by `rotation`, both at constant speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -26,8 +26,8 @@ pub struct Motion {
 pub(super) const MOST_TURN: f32 = 0.5;
 
 impl Motion {
-    /// A translation. Its reference point is the origin, about which a filter may turn the instrument:
-    /// [`new`](Self::new) takes one of the instrument's own.
+    /// A translation. Its reference point is the origin, about which a filter may turn the instrument: use
+    /// [`new`](Self::new) for a point of the instrument.
     #[must_use]
     pub const fn translation(translation: Vec3) -> Self {
         Self { about: Vec3::ZERO, translation, rotation: Vec3::ZERO }
@@ -54,8 +54,8 @@ impl Motion {
         point + moved
     }
 
-    /// Most (mm) by which a point of the instrument, `arm` mm from the reference point, leaves its straight path:
-    /// an arc's height.
+    /// Upper bound (mm) on the deviation of a point of the instrument, `arm` mm from the reference point, from its
+    /// straight path: the height of an arc.
     pub(super) fn arc(&self, arm: f32) -> f32 {
         arm * self.rotation.length_squared() * (1.0 / 8.0 + 1e-3)
     }
@@ -70,7 +70,6 @@ impl Motion {
         [t.x, t.y, t.z, r.x, r.y, r.z]
     }
 
-    /// The inverse of [`to_vector`](Self::to_vector).
     pub(super) fn from_vector(about: Vec3, vector: &Vector, lever: f32) -> Self {
         let [x, y, z, a, b, c] = *vector;
         Self {
@@ -81,7 +80,7 @@ impl Motion {
     }
 }
 
-/// The vector, made no longer than `most` up to rounding.
+/// The vector, shortened to at most `most` up to rounding.
 pub(super) fn shortened(vector: Vec3, most: f32) -> Vec3 {
     let length = sqrt(vector.length_squared());
     if length > most * (1.0 + 8.0 * f32::EPSILON) { vector * (most / length) } else { vector }

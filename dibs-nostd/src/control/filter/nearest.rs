@@ -1,9 +1,9 @@
 //! The point nearest to another one within half-spaces: the projection onto a polyhedron.
 //!
-//! The dual active set method of Goldfarb & Idnani (1983) for a quadratic whose matrix is the identity. It starts at the
-//! wanted point, with no row active, and makes the most violated row active, step by step; a row whose multiplier would
-//! become negative on the path is dropped. Each active row keeps its dual vector, which is 1 with its own factors and 0 with
-//! those of other active rows. So a row enters or leaves by a few products, and no system is solved.
+//! The dual active set method of Goldfarb & Idnani (1983) for a quadratic whose matrix is the identity. It starts at
+//! the wanted point with no active row, and makes the most violated row active, step by step; a row whose multiplier
+//! would become negative on the way is dropped. Each active row keeps its dual vector, whose product is 1 with its own
+//! factors and 0 with those of other active rows. So a row enters or leaves by a few products, and no system is solved.
 
 use heapless::Vec;
 
@@ -13,13 +13,13 @@ pub(super) const UNKNOWNS: usize = 6;
 /// A point or a direction.
 pub(super) type Vector = [f32; UNKNOWNS];
 
-/// Most steps: of either kind, a row in or a row out.
+/// Most steps, each of which adds or drops a row.
 const STEPS: u32 = 64;
 
-/// Violation (mm) that counts as none.
+/// Violation (mm) that is ignored.
 const TOLERANCE: f32 = 1e-5;
 
-/// Rows depend on each other below this square of the sine between one and the others.
+/// Rows count as dependent below this square of the sine between one and the others.
 const DEPENDENT: f32 = 1e-7;
 
 /// The half-space `factors . x >= least`.
@@ -31,17 +31,16 @@ pub(super) struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// By how much a point is outside; negative inside.
+    /// The distance by which a point is outside; negative inside.
     pub fn lacks(&self, point: &Vector) -> f32 {
         self.least - dot(&self.factors, point)
     }
 }
 
-/// The nearest point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nearest {
     pub point: Vector,
-    /// Whether it is in every half-space. If not, there is none that is.
+    /// Whether it is in every half-space. If not, no point is.
     pub is_inside: bool,
 }
 
@@ -65,7 +64,7 @@ pub(super) fn nearest(
             if steps.next().is_none() {
                 return Nearest { point, is_inside: false };
             }
-            // The part of the row's factors that no active row has.
+            // The component of the row's factors that is orthogonal to all active rows.
             let mut free = row.factors;
             for one in &active {
                 add(&mut free, &one.row.factors, -dot(&one.dual, &row.factors));
@@ -108,7 +107,7 @@ pub(super) fn nearest(
     Nearest { point, is_inside: true }
 }
 
-/// The row that a point violates most; `None` where it violates none, or is not a number.
+/// The row that a point violates most; `None` if it violates none, or is NaN.
 fn most_violated(rows: impl Iterator<Item = HalfSpace>, point: &Vector) -> Option<HalfSpace> {
     let (mut worst, mut found) = (TOLERANCE, None);
     for row in rows {
@@ -120,7 +119,7 @@ fn most_violated(rows: impl Iterator<Item = HalfSpace>, point: &Vector) -> Optio
     found
 }
 
-/// Takes an active row out, and its part out of the others' duals.
+/// Drops an active row, and removes its component from the others' duals.
 fn drop_row(active: &mut Vec<Active, UNKNOWNS>, at: usize) {
     let mut gone = None;
     let mut kept: Vec<Active, UNKNOWNS> = Vec::new();
@@ -141,7 +140,6 @@ fn drop_row(active: &mut Vec<Active, UNKNOWNS>, at: usize) {
     *active = kept;
 }
 
-/// The scalar product.
 pub(super) fn dot(a: &Vector, b: &Vector) -> f32 {
     let mut sum = 0.0;
     for (a, b) in a.iter().zip(b) {
@@ -150,7 +148,6 @@ pub(super) fn dot(a: &Vector, b: &Vector) -> f32 {
     sum
 }
 
-/// Adds a multiple of `b`.
 pub(super) fn add(a: &mut Vector, b: &Vector, factor: f32) {
     for (a, b) in a.iter_mut().zip(b) {
         *a += b * factor;
@@ -201,8 +198,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// The point is in every half-space, and no nearer one is: a projection's residual makes no sharp angle with any
-        /// step to another point inside.
+        /// The point is in every half-space, and none is nearer: the residual of a projection is at an angle of at
+        /// least 90 degrees to any step to another point inside.
         #[test]
         fn it_is_the_projection(
             factors in prop::collection::vec(prop::array::uniform6(-1.0_f32..1.0), 1..16),

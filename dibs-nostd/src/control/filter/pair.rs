@@ -1,4 +1,4 @@
-//! A pair of tool and surface, as a filter asks for it.
+//! A filter's interface to a pair of tool and surface.
 
 use glam::Vec3;
 
@@ -9,12 +9,12 @@ use crate::{Index, MovingSurface, Options, Tool, Tracker};
 
 /// A pair of tool and surface.
 pub(super) trait Pair {
-    /// The ends of the tool's axis now.
+    /// The current ends of the tool's axis.
     fn ends(&self) -> [Vec3; 2];
 
     fn radius(&self) -> f32;
 
-    /// The closest pair of the tool with its axis elsewhere.
+    /// The closest pair of the tool with its axis at other ends.
     fn closest(&mut self, ends: [Vec3; 2], options: &Options) -> Result<Proximity, QueryError>;
 }
 
@@ -38,12 +38,12 @@ where
     }
 }
 
-/// A lower bound on the axis' distance; negative inside, and negative infinity where nothing is certain. A tool that
-/// `is_outside` at the start of its path needs no side later: it would have to touch the surface before.
+/// A lower bound on the axis' distance; negative inside, and negative infinity if nothing is certain. A tool that
+/// `is_outside` at the start of its path needs no side later: it would have to touch the surface first.
 pub(super) fn distance(found: &Proximity, radius: f32, is_outside: bool) -> f32 {
     let lower = match found.side {
         Side::Outside | Side::Inside | Side::Crossing => found.lower,
-        // Without a solid there is no inside to be in.
+        // Without a solid there is no inside.
         Side::Undefined(
             NoSide::OpenBoundary | NoSide::NonManifold | NoSide::NoAdjacency | NoSide::NotAsked,
         ) => found.lower,

@@ -5,27 +5,27 @@ use crate::math::sqrt::sqrt;
 /// Rounding of the sums below, relative to the distances.
 const ROUNDING: f32 = 16.0 / 16_777_216.0;
 
-/// A lower bound on the distance of an axis from a surface that stands still, less `grow * s`, at any fraction `s` of its path.
+/// A lower bound on the distance of an axis from a surface at rest, less `grow * s`, at any fraction `s` of its path.
 ///
-/// The axis is `start` from the surface at the start and `end` at the end; both are lower bounds, and negative for a signed
-/// distance inside. No point of it moves farther than `moved`, and each goes straight and evenly.
+/// The axis is `start` from the surface at the start and `end` at the end; both are lower bounds, and negative for a
+/// signed distance inside. Each of its points moves in a straight line at constant speed, by at most `moved`.
 ///
-/// Of a surface's point `q` and a point of the axis on its path from `a` to `b`, Stewart's theorem says
+/// For a surface point `q` and a point `p` of the axis on its path from `a` to `b`, Stewart's theorem says
 ///
 /// `|q - p(s)|^2 = (1 - s) |q - a|^2 + s |q - b|^2 - s (1 - s) |a - b|^2`,
 ///
-/// so the distance at `s` is at least the root of `(1 - s) start^2 + s end^2 - s (1 - s) moved^2`. Along a wall that
+/// so the distance at `s` is at least the root of `(1 - s) start^2 + s end^2 - s (1 - s) moved^2`. Along a wall this
 /// loses `moved^2 / (8 start)`, where a bound by the motion alone loses half the motion.
 pub(super) fn least(start: f32, end: f32, moved: f32, grow: f32) -> f32 {
     let last = end - grow;
-    // Written so that NaN stays.
+    // Written so that NaN is kept.
     let ends = if last > start { start } else { last };
     let slack = ROUNDING * (start.abs() + end.abs() + moved);
     let by_motion = (start + end - moved) * 0.5 - grow;
     if !(start > 0.0 && end > 0.0) {
         return (if by_motion < ends { by_motion } else { ends }) - slack;
     }
-    // Nothing falls faster than the surface comes.
+    // The bound falls no faster than the surface approaches.
     if !(moved > grow) {
         return ends - slack;
     }
@@ -52,12 +52,12 @@ mod tests {
 
     use super::least;
 
-    /// Along a wall a straight path loses the square of its length.
+    /// Along a wall a straight path loses an amount proportional to the square of its length.
     #[test]
     fn a_path_along_a_wall_loses_little() {
         let lost = 3.0 - least(3.0, 3.0, 0.2, 0.0);
         assert!((lost - 0.04 / 24.0).abs() < 2e-5, "{lost}");
-        // A surface that comes is nearest at the end.
+        // An approaching surface is nearest at the end.
         assert!((least(3.0, 3.0, 0.2, 0.3) - 2.7).abs() < 2e-5);
         assert!(least(f32::NAN, 3.0, 0.2, 0.0).is_nan() && least(3.0, f32::NAN, 0.2, 0.0).is_nan());
     }
@@ -65,7 +65,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Of two balls that hold no point of a surface, any path between their centres keeps the bound from any point
+        /// For two balls that contain no surface point, the bound holds on any path between their centres for any point
         /// outside of both.
         #[test]
         fn no_point_outside_of_both_balls_is_nearer(

@@ -12,16 +12,15 @@ use crate::math::sqrt::sqrt;
 /// Most rows of one solution.
 const MOST: usize = 16;
 
-/// Most of a caller's.
 pub(super) const MOST_OWN: usize = 8;
 
-/// Shortfall (mm) of a caller's row that counts as none.
+/// Shortfall (mm) of a caller's row that is ignored.
 const SHORTFALL: f32 = 1e-4;
 
 /// One inequality on the motion of a period: `linear . translation + angular . rotation >= least`.
 ///
-/// For limits that only the caller knows: joints, a remote centre (two rows each for directions across the shaft), a
-/// guide. They hold before the walls do.
+/// For limits that only the caller knows: joints, a remote centre (two rows for each direction across the shaft), a
+/// guide. They take precedence over the walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotionRow {
@@ -29,7 +28,7 @@ pub struct MotionRow {
     pub linear: [f32; 3],
     /// Factors of the rotation (mm).
     pub angular: [f32; 3],
-    /// The least sum allowed (mm).
+    /// The smallest allowed sum (mm).
     pub least: f32,
 }
 
@@ -40,7 +39,7 @@ impl MotionRow {
         Self { linear: direction.to_array(), angular: [0.0; 3], least }
     }
 
-    /// A row on velocities, for a period of so many seconds. Its origin is the motion's reference point.
+    /// A row on velocities, for a period of this length (s). Its origin is the motion's reference point.
     #[must_use]
     pub fn of_velocity(row: &VelocityRow, period: f32) -> Self {
         Self { linear: row.linear, angular: row.angular, least: row.least * period }
@@ -51,7 +50,8 @@ impl MotionRow {
         factors.chain([&self.least]).all(|x| x.is_finite())
     }
 
-    /// The half-space, with rotations as lengths at the end of a lever, and the factors' length before.
+    /// The half-space, with rotations as lengths at the end of a lever, and the length of the factors before
+    /// normalisation.
     fn scaled(&self, lever: f32) -> (HalfSpace, f32) {
         let ([a, b, c], [d, e, f]) = (self.linear, self.angular);
         let mut factors = [a, b, c, d / lever, e / lever, f / lever];
@@ -64,19 +64,16 @@ impl MotionRow {
     }
 }
 
-/// The wall that a pair at one pose is for poses near it.
+/// The wall of a pair, found at one pose and used for poses near it.
 #[derive(Clone, Copy)]
 struct Wall {
-    /// The pair's index.
     pair: usize,
-    /// Unit factors.
     factors: Vector,
-    /// The least sum that keeps the pair at a distance of 0, and the factors' length before.
+    /// The smallest sum that keeps the pair at distance 0, and the length of the factors before normalisation.
     zero: f32,
     length: f32,
 }
 
-/// The rows of a period.
 pub(super) struct Rows {
     own: Vec<HalfSpace, MOST_OWN>,
     walls: Vec<Wall, MOST>,
@@ -98,7 +95,7 @@ impl Rows {
     }
 
     /// Adds the wall of a pair whose point `on_axis` was `distance` from the surface, along `normal`, after the motion
-    /// `at`. Where there is no place, that of the wall farthest from `at` is taken.
+    /// `at`. Without a free slot it replaces the wall farthest from `at`.
     pub fn add_wall(
         &mut self,
         pair: usize,
@@ -113,7 +110,7 @@ impl Rows {
         let least = sum - distance;
         let row = MotionRow { linear: normal.to_array(), angular: angular.to_array(), least };
         let (HalfSpace { factors, least: zero }, length) = row.scaled(self.lever);
-        // A normal of zero, or that is not a number, leads nowhere.
+        // A normal of zero or NaN has no direction.
         if !(length > 0.0 && zero.is_finite()) {
             return;
         }

@@ -15,27 +15,26 @@ use crate::Budget;
 use crate::math::sqrt::sqrt;
 use crate::query::Proximity;
 
-/// Motions that are tried in whole, and shortened ones after that.
+/// Number of motions tried in full, and of shortened ones after that.
 const WHOLE: u32 = 4;
 const SHORTENED: u32 = 4;
 
-/// Rounding of a tool's pose and of a distance's parts, relative to the coordinates' size.
+/// Rounding of a tool's pose and of a distance's terms, relative to the coordinates' size.
 const ROUNDING: f32 = 16.0 / 16_777_216.0;
 
-/// Node tests below which a query is not worth its base cost.
+/// With fewer node tests a query is not worth its base cost.
 const LEAST_TESTS: u32 = 32;
 
 /// A pair's distance at a pose.
 #[derive(Clone, Copy)]
 struct Known {
-    /// Ends of the axis.
     ends: [Vec3; 2],
-    /// No point of the axis is nearer to the surface; negative inside.
+    /// Lower bound on the axis' distance from the surface; negative inside.
     distance: f32,
 }
 
 impl Known {
-    /// Most by which the axis moves to other ends, rounded up.
+    /// Upper bound on the motion of the axis to other ends, rounded up.
     fn moved(&self, ends: &[Vec3; 2]) -> f32 {
         let mut most = 0.0;
         for (from, to) in self.ends.iter().zip(ends) {
@@ -56,22 +55,22 @@ impl Known {
 /// A pair in this tick.
 struct State {
     start: Known,
-    /// The last pose that was searched after the start.
+    /// The last pose searched after the start.
     end: Option<Known>,
-    /// The distance less this is the separation from the tissue as it may be at the start.
+    /// The distance minus this is a lower bound on the separation at the start.
     reach: f32,
     /// The least distance allowed during the motion.
     least: f32,
 }
 
-/// A motion, and how near it leads.
+/// A motion, and its distances from the tissue.
 #[derive(Clone, Copy)]
 struct Candidate {
     motion: Motion,
     /// Least separation during the motion, and at its end.
     least: f32,
     last: f32,
-    /// Most (mm) that a point of an axis moves.
+    /// Upper bound (mm) on the motion of a point of an axis.
     moved: f32,
     /// Whether it keeps every pair's least distance.
     is_admissible: bool,
@@ -86,14 +85,14 @@ pub(super) struct Session<'f> {
     lever: f32,
     rows: Rows,
     states: Vec<State, MOST_PAIRS>,
-    /// Each pair's distance that rows ask for at the end.
+    /// Each pair's distance at the end that its rows require.
     wanted: Vec<f32, MOST_PAIRS>,
-    /// Most (mm) that the reference point moves, and the lever's end by a rotation.
+    /// Limit (mm) on the motion of the reference point, and on that of the lever's end by rotation.
     most: f32,
-    /// How far (mm) the tissue may be from the surface at the start, and how much farther at the end.
+    /// The uncertainty (mm) of the tissue's position at the start, and its growth until the end.
     margin: f32,
     grow: f32,
-    /// The share of a distance beyond the least that rows let a motion use up.
+    /// The fraction of the distance beyond the least one that a motion may use up.
     share: f32,
     queries: u32,
     instructions: u32,
@@ -164,7 +163,8 @@ impl<'f> Session<'f> {
                 };
                 return Ok(self.admitted(&found, reason));
             }
-            // Farther at the end than any, and during the motion no nearer than rest, unless it leads straight out.
+            // Farther at the end than any other, and during the motion no nearer than at rest, unless it leads straight
+            // out.
             let gained = found.last - stand_still.last;
             let is_retreat = found.least >= stand_still.least || gained >= 0.5 * found.moved;
             if is_retreat && found.last > best.last {
@@ -176,7 +176,7 @@ impl<'f> Session<'f> {
     }
 
     fn admitted(&self, found: &Candidate, reason: Reason) -> Admitted {
-        // A tool that begins nearer than the stand-off may leave, and has not kept it.
+        // A tool that starts nearer than the stand-off may leave, but has not kept it.
         let is_kept = found.least >= self.filter.stand_off - EPSILON;
         Admitted {
             motion: found.motion,
@@ -187,7 +187,7 @@ impl<'f> Session<'f> {
         }
     }
 
-    /// Searches a pair where it is.
+    /// Searches a pair at its current pose.
     fn start<P: Pair>(&mut self, pair: &mut P, rest: &Motion) -> Result<(), FilterError> {
         let (ends, radius) = (pair.ends(), pair.radius());
         let mut size = radius;
@@ -213,7 +213,7 @@ impl<'f> Session<'f> {
         {
             self.add_wall(number, &found, (ends, distance), rest);
         }
-        // There are as many places as pairs.
+        // `wanted` has as many slots as there are pairs.
         let _ = self.wanted.push(wanted);
         let start = Known { ends, distance };
         let _ = self.states.push(State { start, end: None, reach, least });
@@ -231,8 +231,8 @@ impl<'f> Session<'f> {
         self.rows.add_wall(number, on_axis, found.direction, distance, at);
     }
 
-    /// The motion at a fraction of the path from the least motion that the rows allow to the nearest; and whether it is the
-    /// command.
+    /// The motion at a fraction of the path from the smallest motion that the rows allow to the nearest one; and
+    /// whether it is the command.
     fn propose(&self, fraction: f32) -> (Vector, bool) {
         let least = self.rows.nearest(&[0.0; 6], &self.wanted).point;
         let least = self.within_speed(&least);
@@ -258,7 +258,7 @@ impl<'f> Session<'f> {
         (point, false)
     }
 
-    /// The motion, no faster than the robot is.
+    /// The motion, limited to the robot's speed.
     fn within_speed(&self, point: &Vector) -> Vector {
         let motion = Motion::from_vector(self.about, point, self.lever);
         let (translation, rotation) = (motion.translation, motion.rotation);
@@ -270,7 +270,8 @@ impl<'f> Session<'f> {
         if within == motion { *point } else { within.to_vector(self.lever) }
     }
 
-    /// How near a motion leads. Searches where the known distances do not suffice; a pair that comes too near gives a row.
+    /// The distances of a motion. Searches if the known distances do not suffice; a pair that comes too near adds a
+    /// row.
     fn verify<P: Pair>(
         &mut self,
         pairs: &mut [P],
@@ -305,7 +306,7 @@ impl<'f> Session<'f> {
             let on_path = |last| path::least(start.distance, last, moved, grow) - arc;
             let is_enough = |nearest: f32| nearest >= least - EPSILON;
             let mut nearest = on_path(last);
-            // At rest the start is all.
+            // At rest the start's search suffices.
             if !is_enough(nearest)
                 && moved > 0.0
                 && let Some(found) = self.search(pair, ends)?
@@ -320,7 +321,7 @@ impl<'f> Session<'f> {
                 if !is_enough(nearest)
                     && let Some(wanted) = self.wanted.get_mut(number)
                 {
-                    // The end is far enough, and the middle is not.
+                    // The end is far enough, but the middle is not.
                     let lacks = least - nearest;
                     if last >= *wanted - EPSILON && lacks < moved {
                         *wanted += 2.0 * lacks;
@@ -335,7 +336,7 @@ impl<'f> Session<'f> {
         Ok(found)
     }
 
-    /// The closest pair with the axis at these ends, by what is left of the budget; `None` where that is too little.
+    /// The closest pair with the axis at these ends, within the remaining budget; `None` if that is too small.
     fn search<P: Pair>(
         &mut self,
         pair: &mut P,
@@ -349,7 +350,7 @@ impl<'f> Session<'f> {
         }
         let found = pair.closest(ends, &options.signed().budget(budget))?;
         let Proximity { node_tests, triangle_tests, .. } = found;
-        // The root's test is in the base.
+        // The root's test is included in the base cost.
         let spent = cost.instructions(node_tests.saturating_sub(1), triangle_tests);
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);
         self.instructions = self.instructions.saturating_add(spent);
@@ -358,7 +359,7 @@ impl<'f> Session<'f> {
     }
 }
 
-/// Most angle (rad) of a period.
+/// Largest angle (rad) of a period.
 pub(super) fn most_turn(most: f32, lever: f32) -> f32 {
     smaller(most / lever, MOST_TURN)
 }

@@ -1,10 +1,10 @@
-//! How far the tissue may be from the surface that is searched.
+//! How far the tissue may be from the searched surface.
 
 use crate::Millis;
 use crate::math::round::sum_up;
 
-/// How far the tissue may be from the surface that is searched, besides that surface's own
-/// [position error](crate::VertexTable::position_error): at the start of a period, and how fast that grows.
+/// How far the tissue may be from the searched surface, besides that surface's own [position
+/// error](crate::VertexTable::position_error): at the start of a period, and its growth rate.
 ///
 /// ```
 /// use dibs_nostd::Millis;
@@ -24,17 +24,17 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// A surface that does not move, and is where it is said to be.
+    /// A surface at rest with exact positions.
     pub const NONE: Self = Self { now: 0.0, speed: 0.0 };
 
-    /// The surface is that of the present; no point of it will be faster than `speed` (mm/s, at least 0).
+    /// For a current surface, no point of which will move faster than `speed` (mm/s, at least 0).
     #[must_use]
     pub const fn new(speed: f32) -> Self {
         Self { now: 0.0, speed }
     }
 
-    /// The same for a surface so much older: its speed times that. Age and transit both count, and of a surface that
-    /// is extrapolated its [lag](crate::SurfaceBlend::lag) and the transit.
+    /// The same for a surface of this age: adds its speed times the age. Age and transit both count; for an
+    /// extrapolated surface its [lag](crate::SurfaceBlend::lag) and the transit.
     #[must_use]
     pub fn after(self, time: Millis) -> Self {
         let moved = time.0 as f32 * (self.speed * (1.0 / 1_000.0)) * (1.0 + 4.0 * f32::EPSILON);
@@ -48,9 +48,9 @@ impl Uncertainty {
         Self { now: sum_up(self.now, error), ..self }
     }
 
-    /// The distance (mm) between tool and searched surface at which a period of so many seconds begins without a risk of
-    /// contact: the uncertainty at its end. A filter keeps its stand-off beyond that. Where the searched surface is
-    /// extrapolated its position error comes on top.
+    /// The distance (mm) between tool and searched surface at which a period of this length (s) starts without a risk
+    /// of contact: the uncertainty at its end. A filter keeps its stand-off in addition. For an extrapolated surface
+    /// add its position error.
     #[must_use]
     pub fn stand_off(&self, period: f32) -> f32 {
         sum_up(self.now, self.grown(period))

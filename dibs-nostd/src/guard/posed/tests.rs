@@ -1,4 +1,4 @@
-//! A tool and its motion, led to the mesh, against f64: the stated errors, searched for what breaks them.
+//! A tool and its motion in mesh coordinates against f64, with a search for counterexamples to the stated errors.
 
 // Requirement: F-08
 
@@ -35,7 +35,7 @@ struct Case {
     translation: Vec3,
     rotation: Vec3,
     lever: f32,
-    /// The step to this pose, and the part of it beyond.
+    /// The step to this pose, and the fraction of it beyond the last frame.
     spin: Vec3,
     flow: Vec3,
     part: f32,
@@ -87,7 +87,6 @@ impl Case {
     }
 }
 
-/// The exact inverse of a pose.
 fn inverse(pose: &RigidPose, point: DVec3) -> DVec3 {
     let rotation = pose.rotation().as_dquat().normalize();
     rotation.inverse() * (point - pose.shift().as_dvec3())
@@ -98,12 +97,12 @@ fn ends(tool: &impl Tool) -> [DVec3; 2] {
     [start, start + tool.axis_span().as_dvec3()]
 }
 
-/// An error as a part of its bound.
+/// An error as a fraction of its bound.
 fn part(off: f64, bound: f32) -> f64 {
     if off == 0.0 { 0.0 } else { off / f64::from(bound) }
 }
 
-/// The largest value of many climbs.
+/// The largest value found by hill climbing from many starts.
 fn climbed(seed: u64, starts: usize, steps: usize, value: impl Fn(&Case) -> Option<f64>) -> f64 {
     let mut rng = Rng::with_seed(seed);
     let mut most = 0.0_f64;
@@ -124,7 +123,7 @@ fn climbed(seed: u64, starts: usize, steps: usize, value: impl Fn(&Case) -> Opti
     most
 }
 
-/// Both ends of a moved tool are within the stated error, however far it is from the world's origin, and however long.
+/// Both ends of a moved tool are within the stated error, at any distance from the world's origin and any length.
 #[test]
 fn a_moved_tool_is_off_by_no_more_than_its_error() {
     let most = climbed(1, 4_000, 100, |case| {
@@ -139,13 +138,13 @@ fn a_moved_tool_is_off_by_no_more_than_its_error() {
     assert!(most > 0.02, "{most}");
 }
 
-/// What a filter checks on the mesh is what the robot executes in the world, to the stated error: of the command that it
-/// admits, and of any other motion.
+/// A motion that a filter checks in mesh coordinates equals the one that the robot executes in the world, within the
+/// stated error: for an admitted command, and for any other motion.
 #[test]
 fn a_motion_on_the_mesh_is_that_in_the_world() {
     let filter = Filter::new(0.0, 400.0).expect("in range");
     let most = climbed(2, 4_000, 100, |case| {
-        // The pose itself is exact here: how far it is off counts with the tool.
+        // The pose is exact here: its error counts with the tool's.
         let placed = Placed { step: None, ..Case { part: 0.0, ..*case }.placed() };
         let tool = case.tool(&placed)?;
         let filter = filter.lever(case.lever).expect("in range");

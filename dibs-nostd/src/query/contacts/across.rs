@@ -1,14 +1,14 @@
-//! The rate of a deepest point's depth.
+//! The rate of change of the depth at a deepest point.
 //!
-//! Along an axis the depth is the least of the distances to the triangles, and each of these is convex. So it is largest
-//! inside the axis where two triangles are equally far: on the way along the axis one comes nearer, the other recedes. As
-//! tool and surface move, the largest depth changes at the mean rate of the two distances whose weights cancel the motion
+//! Along an axis the depth is the least of the distances to the triangles, each of which is convex. So it is largest
+//! inside the axis where two triangles are equally far: along the axis one approaches and the other recedes. As tool
+//! and surface move, the largest depth changes at the mean rate of the two distances whose weights cancel the motion
 //! along the axis.
 //!
-//! The closest triangle is known. A few points of the axis in the direction in which it recedes are searched for the other
-//! one: first a point beyond the largest depth that the answer leaves possible, then the points where both would be equally
-//! far, until the depth there is no less than expected. All are nearer to the deepest point than the surface is, so they
-//! are inside, too.
+//! The closest triangle is known. The other one is found by searches at a few points of the axis in the direction in
+//! which the closest recedes: first at a point beyond the largest depth that the answer allows, then at the points
+//! where both would be equally far, until the depth there is at least the expected one. All these points are nearer to
+//! the deepest point than the surface is, so they are inside, too.
 
 use glam::Vec3;
 
@@ -27,17 +27,17 @@ use crate::{Budget, Index, Tool, Tree, VertexTable};
 /// Most points of the axis searched.
 const LOOKS: u32 = 5;
 
-/// Node tests that take as long as the work for a point besides its search.
+/// The work for a point outside of its search, in node tests.
 const LOOK_COST: u32 = 16;
 
-/// Largest step along the axis, as a part of the depth.
+/// Largest step along the axis, as a fraction of the depth.
 const STEP: f32 = 0.75;
 
-/// The other triangle of a deepest point inside the axis.
+/// The second triangle at a deepest point inside the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(crate) struct Across {
-    /// Its weight in the rate of the depth; 0 if there is none. The closest triangle has the rest.
+    /// Its weight in the rate of the depth; 0 if there is none. The closest triangle has the remaining weight.
     pub weight: f32,
     /// Unit vector that leads out through it.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
@@ -64,18 +64,18 @@ impl Across {
     };
 }
 
-/// A point of the axis.
 #[derive(Clone, Copy)]
 struct Place {
-    /// Its distance (mm) from the deepest point, in the direction in which that point's triangle recedes.
+    /// Its distance (mm) from the deepest point, in the direction in which the deepest point's triangle recedes.
     along: f32,
     depth: f32,
-    /// Growth of its triangle's distance with that way.
+    /// Rate at which its triangle's distance grows along the axis.
     slope: f32,
 }
 
 impl Place {
-    /// Where the distances to the triangles of two places are equal, if they grow evenly; and that distance.
+    /// The position at which the distances to the triangles of two points are equal, if they grow linearly; and that
+    /// distance.
     fn meeting(&self, far: &Self) -> (f32, f32) {
         let between = far.along - self.along;
         let step = (far.depth - self.depth - far.slope * between) / (self.slope - far.slope);
@@ -95,7 +95,7 @@ struct Look<'a, 't, I, V: ?Sized> {
 }
 
 impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
-    /// The closest triangle; `None` where the budget ends.
+    /// The closest triangle; `None` if the budget ends.
     #[cold]
     #[inline(never)]
     fn at(&mut self, stack: &mut [Waiting], point: Vec3) -> Result<Option<Proximity>, QueryError> {
@@ -113,8 +113,8 @@ impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
-    /// The other triangle at the deepest point of a tool that is inside or crosses, whose contact is `own`; and the tests
-    /// that it took. There is none if the point is an end of the axis, or where the budget ends.
+    /// The second triangle at the deepest point of a tool that is inside or crosses, whose contact is `own`; and the
+    /// tests made. There is none if the point is an end of the axis, or if the budget ends.
     #[cold]
     #[inline(never)]
     pub(super) fn across(
@@ -131,7 +131,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
             options: options.warm_start(Some(own.triangle)),
             spent: Tests::NONE,
         };
-        // The searches take the positions as exact.
+        // The searches treat the positions as exact.
         let accuracy = closest.accuracy - vertices.position_error();
         let length = tool.axis_length();
         let direction = tool.axis_span() / length;
@@ -146,7 +146,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         if !has_way {
             return Ok((Across::NONE, look.spent));
         }
-        // No point of the axis is deeper.
+        // Upper bound on the depth of any point of the axis.
         let most = -closest.lower - tool.radius() + accuracy;
         let (mut near, mut far) = (first, None);
         for _ in 0..LOOKS {
@@ -183,7 +183,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
                     break;
                 }
             } else {
-                // The depth falls and rises again in between.
+                // The depth falls and rises again between them.
                 end = (near.along + along) * 0.5;
                 far = None;
             }

@@ -1,13 +1,13 @@
-//! A contact's activation, which keeps it from beginning or ending at once with its whole force.
+//! A contact's activation, so that its force neither starts nor ends with a step.
 //!
-//! A contact begins beside a lower one, where the path down to that one leads over no ridge. There its activation is 0.
+//! A contact starts next to a lower one, while the path down to that one crosses no ridge. There its activation is 0.
 //! It grows with the ridge, and is 1 once the ridge is a 64th of the contact's distance: some 10 degrees, seen from the
-//! axis. The closest contact has activation 1. So has one that is equally near, whatever the ridge, so that nothing
-//! changes where two contacts change their order; with a difference in height the activation falls.
+//! axis. The closest contact has activation 1. So has one at the same distance, whatever the ridge, so that nothing
+//! jumps when two contacts change their order; the activation falls with the difference in height.
 //!
 //! A change of all heights by `e` changes a ridge by at most `2 e` (persistence: Cohen-Steiner, Edelsbrunner & Harer
-//! 2007). So an activation changes by at most `256 / distance` of the motion. Between flat walls it is at most 45 /
-//! distance, since a ridge there grows by the sine of the 10 degrees.
+//! 2007). So an activation changes by at most `256 / distance` of the motion. Between flat walls it is at most
+//! `45 / distance`, since a ridge there grows by the sine of the 10 degrees.
 
 use super::add::Pair;
 use super::basins::{Basins, Near};
@@ -15,13 +15,13 @@ use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
-/// Up to a ridge of this part of its distance a contact has activation 0, and 1 from twice that on.
+/// A contact has activation 0 up to a ridge of this fraction of its distance, and 1 from twice that on.
 const RIDGE: f32 = 1.0 / 128.0;
 
-/// Most paths at a time that lead out of the triangles passed.
+/// Most paths at a time that lead out of the visited triangles.
 const PATHS: usize = 48;
 
-/// Most triangles passed.
+/// Most triangles visited.
 const STEPS: usize = 128;
 
 /// The ridge (mm) up to which a contact at this distance has activation 0.
@@ -30,18 +30,16 @@ pub(super) fn least_ridge(distance: f32, (most, error): (f32, f32)) -> f32 {
     (if ridge < most { ridge } else { most }) + error
 }
 
-/// A path to a triangle.
 #[derive(Clone, Copy)]
 struct Path {
-    /// The largest height on it.
     height: f32,
     entry: u16,
 }
 
-/// Tests triangles while tests are left.
+/// Tests triangles as long as the budget lasts.
 pub(super) struct Looking<'p, 'a, I, V: ?Sized, T> {
     pub pair: &'p Pair<'a, I, V, T>,
-    /// No height beyond this counts.
+    /// Heights beyond this do not matter.
     pub limit: f32,
     pub accuracy: f32,
     /// Tests left.
@@ -54,13 +52,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Looking<'_, '_, I, V, T> {
         Some(())
     }
 
-    /// A triangle; `None` without budget.
+    /// A triangle; `None` if the budget ran out.
     pub fn triangle(&mut self, row: u32) -> Result<Option<Near>, QueryError> {
         let Some(()) = self.pay() else { return Ok(None) };
         self.pair.near(row, self.limit, self.accuracy).map(Some)
     }
 
-    /// The distance of an edge; `None` without budget.
+    /// The distance of an edge; `None` if the budget ran out.
     pub fn edge(&mut self, row: u32, edge: u32) -> Result<Option<f32>, QueryError> {
         let Some(()) = self.pay() else { return Ok(None) };
         self.pair.edge_distance(row, edge, self.limit).map(Some)
@@ -68,10 +66,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Looking<'_, '_, I, V, T> {
 }
 
 impl<const N: usize> Basins<N> {
-    /// The activation of the contact at a triangle, from 0 to 1. Without room or budget it is 1.
+    /// The activation of the contact at a triangle, from 0 to 1. It is 1 if memory or budget ran out.
     ///
-    /// Follows the paths out of its valley, the lowest first. `most` limits the ridge below which it is 0, for an axis
-    /// far away; `error` is that of two heights. Triangles that `is_left_out` are not passed.
+    /// Follows the paths out of its valley, the lowest first. `most` limits the ridge below which the activation is 0,
+    /// for a distant axis; `error` is that of two heights. Triangles that `is_left_out` are not crossed.
     pub fn activation<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
@@ -102,7 +100,7 @@ impl<const N: usize> Basins<N> {
             }
             self.mark(entry);
             let (Some(near), Some(())) = (self.at(entry), look.pay()) else { return Ok(1.0) };
-            // Beside a point that is hardly lower, the ridge does not count.
+            // Next to a point that is hardly lower, the ridge does not matter.
             let tied = full - (own - sqrt(near.square));
             let parted = if tied > ridge { tied } else { ridge };
             if parted < least {
@@ -136,7 +134,7 @@ impl<const N: usize> Basins<N> {
     }
 }
 
-/// Takes out the lowest of the first `count` paths.
+/// Removes the lowest of the first `count` paths.
 fn take_lowest(paths: &mut [Path; PATHS], count: &mut usize) -> Option<Path> {
     let last = count.checked_sub(1)?;
     let (&lowest, _) = paths.split_first()?;

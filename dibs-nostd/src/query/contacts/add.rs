@@ -16,20 +16,20 @@ use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Budget, Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 
-/// Ridges up to this part of the margin above a contact are looked at: the largest for an activation of 1.
+/// Ridges above a contact are examined up to this fraction of the margin: the largest for an activation of 1.
 const RIDGE: f32 = 1.0 / 64.0;
 
-/// Accuracies within which two points are too close to give a direction.
+/// Within this many accuracies two points are too close to give a direction.
 pub(super) const NO_DIRECTION: f32 = 16.0;
 
-/// A tool and a surface, with their numbers in a scene.
+/// A tool and a surface, with their indices in a scene.
 pub(in crate::query) struct Pair<'a, I, V: ?Sized, T> {
     pub tree: &'a Tree<'a, I>,
     pub vertices: &'a V,
     pub tool: &'a T,
     pub closest: &'a Proximity,
     pub surface: usize,
-    /// The tool's number.
+    /// The tool's index.
     pub number: usize,
 }
 
@@ -61,7 +61,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.lower_bound(bound);
     }
 
-    /// The result, with an empty list if it is an error.
+    /// The result; the list is emptied if it is an error.
     pub(in crate::query) fn unless_failed<R>(
         &mut self,
         result: Result<R, QueryError>,
@@ -72,7 +72,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         result
     }
 
-    /// Adds the contacts of a pair, from the low triangles that `find` enters. Returns the tests made.
+    /// Adds the contacts of a pair, from the low triangles that `find` collects. Returns the tests made.
     #[inline(always)]
     pub(super) fn add_from<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
@@ -93,7 +93,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if closest.accuracy > found.accuracy {
             found.accuracy = closest.accuracy;
         }
-        // The search below takes the positions as exact; the answer's accuracy has their error already.
+        // The search below treats the positions as exact; the answer's accuracy includes their error already.
         let accuracy = closest.accuracy - vertices.position_error();
         let is_side_searched = closest.side != Side::Undefined(NoSide::CutShort);
         found.has_no_side |= may_be_inside(closest);
@@ -130,12 +130,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let missing = basins.each_valley(tree, ridges, is_left_out, &mut look, |near| {
             let is_on = sqrt(near.square) <= accuracy;
             meets += u32::from(is_on);
-            // The crossing pair, inserted above, stands for these triangles.
+            // The crossing pair, inserted above, represents these triangles.
             if has_crossing && is_on {
                 return Ok(());
             }
             let mut other = pair_at(tree, vertices, tool, near, accuracy)?;
-            // Of a part, what counts is the distance: at its border the surface goes on.
+            // For a label's part only the distance matters: the surface continues at its border.
             let is_outside = closest.side == Side::Outside || closest.is_at_surface();
             if options.part.is_none() || !is_outside {
                 other.add_side(tree, vertices, tool)?;
@@ -164,7 +164,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         made.triangle_tests = made.triangle_tests.saturating_add(left - look.left);
         let is_met = is_crossing || closest.is_at_surface();
         let is_known = is_side_searched && (is_met || !closest.is_cut_short());
-        // The closest pair is certain then, whatever became of the search.
+        // The closest pair is certain then, even if the search was cut short.
         if is_known
             && !is_crossing
             && let Some(contact) = own
@@ -172,21 +172,21 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         {
             found.insert(contact);
         }
-        // Of a part that the closest pair is not on, the search has seen the deepest contact if it came to its end.
+        // For a part without the closest pair, the search has seen the deepest contact if it was completed.
         found.is_open |= !is_known || !(is_crossing || own.is_some() || beyond >= limit);
         let mut from = if beyond < complete { beyond } else { complete };
         if let Some(missing) = missing.map(sqrt).filter(|&missing| missing < from) {
             from = missing;
         }
-        // Where the axis meets the surface in several places, another part of it may be inside, less deep.
+        // If the axis meets the surface at several places, another part of the axis may be inside, less deep.
         if is_crossing && meets > 1 {
             found.lower_bound(closest.lower);
         }
-        // The budget ended before the side: the tool may be inside, deeper than every pair seen.
+        // The budget ended before the side was known: the tool may be inside, deeper than every pair seen.
         if !is_side_searched {
             found.lower_bound(f32::NEG_INFINITY);
         } else if from < limit {
-            // A valley's lowest triangle is less than a ridge below the low one that was visited.
+            // A valley's lowest triangle is less than a ridge below the visited low triangle.
             found.lower_bound(from - ridge - tool.radius());
         }
         Ok(made.and(spent))
@@ -228,11 +228,11 @@ impl<I, V: ?Sized, T> Pair<'_, I, V, T> {
     }
 }
 
-/// The contact at two points, if a direction leads out.
+/// The contact of two points, if they have a direction that leads out.
 pub(super) fn contact(at: &Proximity) -> Option<Contact> {
     let is_unit = (at.direction.length_squared() - 1.0).abs() < 1e-3;
     let triangle = at.triangle.filter(|_| is_unit)?;
-    // At the surface the axis may be as far inside as it seems outside.
+    // At the surface the axis may be as far inside as its distance outside.
     let separation = if at.is_at_surface() { at.lower - 2.0 * at.axis_distance } else { at.lower };
     Some(Contact {
         separation,
@@ -247,8 +247,8 @@ pub(super) fn contact(at: &Proximity) -> Option<Contact> {
     })
 }
 
-/// Whether the tool may be inside where no contact says so: the pair has no side, though one was asked for, or no direction
-/// out. The list's bound says so itself where the budget ended.
+/// Whether the tool may be inside without a contact that tells so: the pair has no side, though one was asked for, or
+/// no direction out. If the budget ended, the list's bound tells it already.
 fn may_be_inside(closest: &Proximity) -> bool {
     match closest.side {
         Side::Undefined(NoSide::NotAsked | NoSide::NoAdjacency | NoSide::CutShort)
@@ -258,7 +258,7 @@ fn may_be_inside(closest: &Proximity) -> bool {
     }
 }
 
-/// A triangle at this pair. Within some accuracies its direction is none.
+/// A triangle at this pair. Within some accuracies it has no direction.
 pub(super) fn near(row: u32, pair: &AxisPair, accuracy: f32) -> Near {
     let place = Place::of(pair, NO_DIRECTION * accuracy);
     Near { square: pair.distance_squared, row, place }

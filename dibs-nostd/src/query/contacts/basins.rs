@@ -1,16 +1,17 @@
 //! Selects the triangles near a tool that are closer than their surroundings.
 //!
 //! The distance from the tool is a height over the surface, and each valley of it is a contact. A flood from each low
-//! triangle, the lowest first, goes down to a triangle with nothing lower next to it. Then it rises over triangles in
-//! much the same direction by a ridge. That ridge is the one up to which a contact has activation 0, so no contact ends
-//! while it acts. If it runs into the flood of a lower one in much the same direction, both are one valley: a flat wall along a
-//! capsule is one, however many triangles are equally far, and two walls are two, however low the ridge between.
+//! triangle, the lowest first, descends to a triangle with no lower neighbour. Then it rises over triangles in nearly
+//! the same direction by a ridge. This is the ridge up to which a contact has activation 0, so no contact ends while it
+//! acts. If it meets the flood of a lower triangle in nearly the same direction, both are one valley: a flat wall along
+//! a capsule is one valley, however many triangles are equally far; two walls are two, however low the ridge between
+//! them.
 //!
-//! Over a triangle the height is convex. So the path from its lowest point to a neighbour leads over no ridge exactly if
-//! that point is on the edge between.
+//! Over a triangle the height is convex. So the path from its lowest point to a neighbour crosses no ridge exactly if
+//! that point is on their common edge.
 //!
-//! Without room or budget a flood does not rise. Then one valley may be two, but none is lost, unless it cannot be seen
-//! whether anything lower is next to it.
+//! If memory or budget runs out, a flood does not rise. Then one valley may be reported as two, but none is lost,
+//! unless the neighbours of a triangle could not be tested.
 //!
 //! One file, because floods and triangles keep their fields private.
 
@@ -32,23 +33,22 @@ pub(super) struct Near {
     pub place: Place,
 }
 
-/// The closest point of a triangle: the direction to the tool, in 9 bits an axis, and the edges that it is on, a bit
-/// each.
+/// The closest point of a triangle: the direction to the tool, in 9 bits per axis, and the edges that contain it, one
+/// bit each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Place(u32);
 
 impl Place {
     /// No direction, and no edge.
     pub const NONE: Self = Self(0);
-    /// Bits of the directions.
     const DIRECTION: u32 = (1 << 27) - 1;
-    /// Largest distance of two unit vectors in much the same direction: 7 degrees.
+    /// Largest distance of two unit vectors in nearly the same direction: 7 degrees.
     const ALIKE: f32 = 0.125;
     const SCALE: f32 = 255.0;
     /// Weight of the corner beyond an edge, for a point on the edge.
     const ON_EDGE: f32 = 1e-4;
 
-    /// The place of a pair. It has no direction if the points are no farther apart than `least`.
+    /// The closest point of a pair. It has no direction if the points are at most `least` apart.
     #[inline(always)]
     pub fn of(pair: &AxisPair, least: f32) -> Self {
         let [a, b, c] = pair.barycentric.map(|weight| u32::from(!(weight > Self::ON_EDGE)));
@@ -66,7 +66,7 @@ impl Place {
         self.0 >> (27 + edge) & 1 == 1
     }
 
-    /// Whether both directions are much the same, or one is none.
+    /// Whether both directions are nearly the same, or one is missing.
     fn is_like(self, other: Self) -> bool {
         let axis = |bits: u32, at: u32| ((bits << (23 - at)) as i32 >> 23) as f32;
         let vector = |Self(bits)| Vec3::new(axis(bits, 0), axis(bits, 9), axis(bits, 18));
@@ -77,7 +77,7 @@ impl Place {
     }
 }
 
-/// The same as numbers that sort by the distance, then by the row: bits of floats above zero sort as integers.
+/// A `Near` as integers that sort by distance, then by row: bits of positive floats sort as integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Key {
     square: u32,
@@ -101,33 +101,32 @@ impl Key {
     }
 }
 
-/// No entry.
 const NONE: u16 = u16::MAX;
 
-/// The nearest low triangles, at most half of `N`; then those that floods have met.
+/// The nearest low triangles, at most half of `N`; then the triangles that floods have reached.
 #[derive(Clone, Debug)]
 pub(super) struct Basins<const N: usize> {
     near: [Key; N],
-    /// Whether the low triangles are a heap, the farthest first.
+    /// Whether the low triangles are a heap with the farthest on top.
     is_heap: bool,
-    /// Hash table of the entries: the first for each remainder of rows by `N`, and the next with the same one.
+    /// Hash table of the entries: the first entry for each remainder of a row by `N`, and the next entry with the same
+    /// remainder.
     heads: [u16; N],
     next: [u16; N],
-    /// The low triangle whose flood has reached each entry.
+    /// For each entry, the low triangle whose flood reached it.
     reached_by: [u16; N],
-    /// Entries that the flood has reached, in order.
+    /// Entries that the current flood has reached, in order.
     reached: [u16; N],
     count: usize,
 }
 
-/// The end of a flood.
 enum Flood {
-    /// It has reached all that is below its level; the lowest. If a ridge led to that, and it is in another direction,
-    /// the lowest before the ridge, too.
+    /// It has reached everything below its level; the lowest triangle. If that is beyond a ridge and in another
+    /// direction, also the lowest before the ridge.
     Ended(Near, Option<Near>),
-    /// It has met the flood of a lower triangle in much the same direction.
+    /// It has met the flood of a lower triangle in nearly the same direction.
     Joined,
-    /// Without room or budget, something lower may be next to it.
+    /// Memory or budget ran out; a neighbour may be lower.
     CutShort,
 }
 
@@ -167,12 +166,12 @@ impl<const N: usize> Basins<N> {
         low.first().map(|farthest| farthest.square())
     }
 
-    /// Finds the valleys: between those in much the same direction, ridges that leave the higher one without activation
-    /// do not count (`ridges`: see [`activation::least_ridge`]). Calls back with the lowest triangle of each, nearest
-    /// first. Points that differ by the ridges' error may be equally far. Triangles that `is_left_out` are not looked
-    /// at.
+    /// Finds the valleys. Between valleys in nearly the same direction, ridges that leave the higher one without
+    /// activation are ignored (`ridges`: see [`activation::least_ridge`]). Calls back with the lowest triangle of each,
+    /// nearest first. Points that differ by at most the ridges' error count as equally far. Triangles that
+    /// `is_left_out` are skipped.
     ///
-    /// Returns the square of the distance from which on valleys may be missing, if any.
+    /// Returns the square of the distance beyond which valleys may be missing, if any.
     pub fn each_valley<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
@@ -206,7 +205,7 @@ impl<const N: usize> Basins<N> {
         Ok(missing)
     }
 
-    /// Floods the surroundings of a low triangle up to the height of a ridge above the lowest place.
+    /// Floods the surroundings of a low triangle up to a ridge above the lowest point.
     fn flood<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
@@ -220,16 +219,16 @@ impl<const N: usize> Basins<N> {
         };
         let mut height = sqrt(lowest.square());
         let (ridge, error) = (activation::least_ridge(height, ridges), ridges.1);
-        // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge; the lowest met there of
-        // another flood.
+        // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge; the lowest triangle
+        // there that another flood has reached.
         let (mut own, mut at_lowest, mut has_crossed, mut other_lowest) =
             (lowest, low, false, None);
         let mut count = 0;
         if !self.reach(low, low, &mut count) {
             return Ok(Flood::Joined);
         }
-        // Entries whose way down has been taken, and over whose edges the flood has risen. It rises only where none is left
-        // that leads down, or it takes a place on the way for a valley.
+        // Numbers of entries whose lower neighbours have been visited, and whose other edges have been crossed. The
+        // flood rises only if no way down is left; otherwise it would take a slope for a valley.
         let (mut descended, mut risen) = (0, 0);
         for _ in 0..2 * N {
             let rises = descended == count;
@@ -262,7 +261,7 @@ impl<const N: usize> Basins<N> {
                 if by == low || !is_within || !(is_level || key.place.is_like(own.place)) {
                     continue;
                 }
-                // Both may be low with a high edge between them. Without budget the flood does not rise.
+                // Both may be low with a high edge between them. If the budget runs out, the flood does not rise.
                 if !is_over && !look.edge(from.row, edge)?.is_some_and(|over| over <= top) {
                     continue;
                 }
@@ -287,7 +286,7 @@ impl<const N: usize> Basins<N> {
                 }
             }
         }
-        // The flood's direction is that of its lowest.
+        // The flood's direction is that of its lowest triangle.
         for entry in self.reached.iter().take(count) {
             if let Some(by) = self.reached_by.get_mut(usize::from(*entry)) {
                 *by = at_lowest;
@@ -304,7 +303,7 @@ impl<const N: usize> Basins<N> {
         })
     }
 
-    /// Adds an entry to the flood of `low`, of `count` entries. Returns whether it is the first to reach it.
+    /// Adds an entry to the flood of `low`, of `count` entries. Returns whether it was in no flood before.
     fn reach(&mut self, entry: u16, low: u16, count: &mut usize) -> bool {
         let by = self.reached_by.get_mut(usize::from(entry));
         let (Some(by), Some(place)) = (by, self.reached.get_mut(*count)) else { return false };
@@ -316,7 +315,7 @@ impl<const N: usize> Basins<N> {
         true
     }
 
-    /// The entry of a triangle, made if there is none. `None` without room or budget.
+    /// The entry of a triangle, created if missing. `None` if memory or budget ran out.
     pub(super) fn entry(
         &mut self,
         row: u32,
@@ -334,17 +333,15 @@ impl<const N: usize> Basins<N> {
         Ok(Some((self.count - 1) as u16))
     }
 
-    /// An entry's triangle.
     pub(super) fn at(&self, entry: u16) -> Option<Near> {
         self.near.get(usize::from(entry)).map(|key| key.near())
     }
 
-    /// An entry's distance.
     pub(super) fn height(&self, entry: u16) -> Option<f32> {
         self.at(entry).map(|near| sqrt(near.square))
     }
 
-    /// Clears the marks of all entries, also those of floods.
+    /// Clears the marks of all entries, including those of floods.
     pub(super) fn forget(&mut self) {
         self.reached_by.get_mut(..self.count).unwrap_or_default().fill(NONE);
     }
@@ -385,7 +382,7 @@ impl<const N: usize> Basins<N> {
     }
 }
 
-/// Sorts the nearest to the front, through a heap.
+/// Sorts the nearest to the front, by a heap.
 fn sort(keys: &mut [Key], is_heap: bool) {
     if !is_heap {
         heap(keys);
@@ -401,7 +398,7 @@ fn sort(keys: &mut [Key], is_heap: bool) {
     }
 }
 
-/// Makes a heap of keys, the farthest first.
+/// Makes a heap of keys with the farthest on top.
 fn heap(keys: &mut [Key]) {
     for at in (0..keys.len() / 2).rev() {
         if let Some(&key) = keys.get(at) {
@@ -410,7 +407,7 @@ fn heap(keys: &mut [Key]) {
     }
 }
 
-/// Puts a key in the place of another, above or among what is below that.
+/// Replaces the key at `at` and moves the new key down to its place in the heap.
 fn sink(heap: &mut [Key], mut at: usize, key: Key) {
     while let Some(&left) = heap.get(2 * at + 1) {
         let right = heap.get(2 * at + 2).copied().filter(|&right| right > left);

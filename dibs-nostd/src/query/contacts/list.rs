@@ -1,4 +1,4 @@
-//! The contacts found so far, deepest first, and a bound on the others.
+//! The contacts found so far, deepest first, and a bound on the missing ones.
 
 // Requirement: S-05
 
@@ -6,14 +6,13 @@ use heapless::Vec;
 
 use super::Contact;
 
-/// Up to `N` contacts.
 #[derive(Clone, Debug)]
 pub(super) struct List<const N: usize> {
     pub list: Vec<Contact, N>,
     pub bound: f32,
     pub accuracy: f32,
     pub is_full: bool,
-    /// The margin that was asked for.
+    /// The requested margin.
     pub margin: f32,
     /// The deepest contact is not known.
     pub is_open: bool,
@@ -34,7 +33,7 @@ impl<const N: usize> List<N> {
         }
     }
 
-    /// Empties the list, of which nothing is known then.
+    /// Empties the list, as if no query had filled it.
     pub fn clear(&mut self) {
         self.list.clear();
         self.bound = f32::NEG_INFINITY;

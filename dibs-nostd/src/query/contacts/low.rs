@@ -1,4 +1,4 @@
-//! The low triangles of a pair: found anew, or from the front of the last search on.
+//! The low triangles of a pair: from a new search, or from the front of the last one.
 
 use super::Contacts;
 use super::add::{Pair, near};
@@ -13,11 +13,11 @@ use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, VertexTable};
 
-/// The end of a search for low triangles. All that are closer than both distances were entered.
+/// The result of a search for low triangles. All that are closer than both distances were collected.
 pub(super) struct Found {
-    /// There was no room for triangles that are farther.
+    /// From here on there was no room for more triangles.
     pub complete: f32,
-    /// Triangles that are farther were not visited.
+    /// From here on triangles were not visited.
     pub beyond: f32,
     pub tests: Tests,
 }
@@ -39,7 +39,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         })
     }
 
-    /// The same for a surface that carries its motion. Parts that the last search showed to be far are not looked at.
+    /// The same for a surface that carries its motion. Parts that the last search proved to be far are skipped.
     pub(in crate::query) fn add_tracked<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         pair: &Pair<'_, I, V, T>,
@@ -73,7 +73,7 @@ fn over_range<'s, I: Index, V: VertexTable + ?Sized, T: Tool>(
 /// The low triangles, as they are found.
 struct Low<'b, const NEAR: usize> {
     basins: &'b mut Basins<NEAR>,
-    /// All that are closer are entered.
+    /// All closer triangles are collected.
     complete: f32,
     accuracy: f32,
 }
@@ -88,7 +88,7 @@ impl<'b, const NEAR: usize> Low<'b, NEAR> {
         Self { basins, complete: limit, accuracy: pair.closest.accuracy }
     }
 
-    /// Enters a triangle. Returns the distance from which on others would have no room.
+    /// Collects a triangle. Returns the distance beyond which there is no room for more.
     #[inline(always)]
     fn add(&mut self, row: u32, at: &AxisPair) -> f32 {
         if let Some(farthest) = self.basins.push(near(row, at, self.accuracy)) {

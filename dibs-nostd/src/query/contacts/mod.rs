@@ -21,23 +21,24 @@ pub(super) use add::Pair;
 use basins::Basins;
 use list::List;
 
-/// A pair of points of tool and surface that is closer than any next to it.
+/// A pair of points of tool and surface that is a local minimum of the distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Contact {
-    /// Signed separation (mm): the lower end of the pair's interval, as [`Proximity::lower`]. Of a tool that crosses or is inside
-    /// it may be too low by the depth's tolerance, or by more where the budget ended. Where the axis is at the surface and its
-    /// side below the accuracy, it is that of an axis as far inside: too low by some four accuracies at most.
+    /// Signed separation (mm): the lower end of the pair's interval, as [`Proximity::lower`]. If the tool crosses or is
+    /// inside, it may be too low by the depth's tolerance, or by more if the budget ended. If the axis is at the
+    /// surface with its side below the accuracy, it is that of an axis equally far inside: too low by at most some four
+    /// accuracies.
     pub separation: f32,
     /// Unit vector that leads out of the surface; never zero.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub normal: Vec3,
-    /// The surface's point of the pair.
+    /// The pair's point on the surface.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub point_on_surface: Vec3,
-    /// The tool's point of the pair, on the tool's own surface.
+    /// The pair's point on the tool's surface.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub point_on_tool: Vec3,
     /// Parameter of the pair along the tool's axis: 0 at its start, 1 at its end.
@@ -52,13 +53,13 @@ pub struct Contact {
     pub corners: [u32; 3],
     /// Weights of the corners at `point_on_surface`.
     pub barycentric: [f32; 3],
-    /// Velocity of the surface there (mm/s): zero until [`Contacts::move_with`] sets it.
+    /// Velocity of the surface at that point (mm/s): zero until [`Contacts::move_with`] sets it.
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub velocity: Vec3,
-    /// The other triangle that bounds the depth, where the tool crosses or is inside.
+    /// The second triangle that bounds the depth, if the tool crosses or is inside.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) across: Across,
-    /// 0 where it begins beside a nearer one, 1 beyond a ridge (see `activation`).
+    /// 0 where it starts next to a nearer one, 1 beyond a ridge (see `activation`).
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) activation: f32,
 }
@@ -81,12 +82,12 @@ impl Contact {
     };
 }
 
-/// Up to `N` contacts, deepest first, and a bound on the others. A query compares up to `NEAR` triangles: those near a
-/// contact, and some with no lower vertex next to theirs, at most half of `NEAR`.
+/// Up to `N` contacts, deepest first, and a bound on the missing ones. A query compares up to `NEAR` triangles: those
+/// near a contact, and local minima, at most half of `NEAR`.
 ///
-/// RAM on a 32-bit processor: 152 bytes for each of the `N`, 20 for each of the `NEAR`, and 28.
+/// RAM on a 32-bit processor: 152 bytes for each of `N`, 20 for each of `NEAR`, plus 28.
 ///
-/// Make it once, in a `static` or at start-up, and use it at every tick.
+/// Create it once, in a `static` or at start-up, and use it at every tick.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -113,7 +114,7 @@ pub struct Contacts<const N: usize, const NEAR: usize = 512> {
     basins: Basins<NEAR>,
 }
 
-/// The contacts of a list that a constraint acts on, deepest first: see [`Contacts::within`].
+/// The contacts on which a constraint acts, deepest first: see [`Contacts::within`].
 #[derive(Clone, Debug)]
 pub struct ContactIter<'c> {
     contacts: core::slice::Iter<'c, Contact>,
@@ -122,15 +123,15 @@ pub struct ContactIter<'c> {
 }
 
 impl ContactIter<'_> {
-    /// Whether all contacts within the margin are among them, of a guard's list also those that the error and the age of the
-    /// surface may bring within it. If not, the list or its places were too few, or the budget
-    /// ended: walls may be missing beyond [`bound`](Self::bound).
+    /// Whether these are all contacts within the margin; for a guard's list also those that error and age of the
+    /// surface may bring within it. If not, `N` or `NEAR` was too small or the budget ended: walls may be missing
+    /// beyond [`bound`](Self::bound).
     #[must_use]
     pub const fn is_complete(&self) -> bool {
         self.is_complete
     }
 
-    /// Every contact whose separation is below this (mm) is among them: [`Contacts::bound`].
+    /// All contacts with a separation below this (mm) are included: [`Contacts::bound`].
     #[must_use]
     pub const fn bound(&self) -> f32 {
         self.bound
@@ -179,14 +180,14 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.list.is_empty()
     }
 
-    /// The contacts, deepest first, for a constraint that acts within `margin` (mm). The deepest is among them for
-    /// certain; others may be missing where [`ContactIter::is_complete`] says so. Those beyond `margin`, of a query with a
-    /// larger one, are among them too.
+    /// The contacts, deepest first, for a constraint that acts within `margin` (mm). The deepest is certainly included;
+    /// others may be missing, see [`ContactIter::is_complete`]. Contacts beyond `margin`, from a query with a larger
+    /// one, are included too.
     ///
     /// # Errors
     /// [`Unavailable::CutShort`] if the budget ended before the deepest contact was known, or no query filled the list;
-    /// [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin; [`QueryError::Margin`] if the
-    /// query's margin was less.
+    /// [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin; [`QueryError::Margin`] if
+    /// the query's margin was smaller.
     pub fn within(&self, margin: f32) -> Result<ContactIter<'_>, Unavailable> {
         let List { bound, is_open, has_no_side, accuracy, .. } = self.found;
         let is_complete = bound >= margin;
@@ -204,9 +205,9 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         Ok(ContactIter { contacts, bound, is_complete })
     }
 
-    /// Resolves a list whose tool may be inside, because its closest pair has no side, by `closest`, whose side a tracker's
-    /// last tick makes certain. That pair becomes a contact, and the only one unless the tool is outside. Other lists stay as
-    /// they are, and so does one whose `closest` has no direction.
+    /// Completes a list whose tool may be inside because its closest pair has no side. `closest` has the side that the
+    /// last tick makes certain. It becomes a contact, and the only one unless the tool is outside. Other lists are not
+    /// changed, nor is one whose `closest` has no direction.
     pub(super) fn resolve_side(&mut self, closest: &Proximity) {
         if !self.found.has_no_side || matches!(closest.side, Side::Undefined(_)) {
             return;
@@ -224,14 +225,14 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
     }
 
-    /// Every contact whose separation is below this (mm) is in the list. It is the margin or a little more, unless the list or
-    /// `NEAR` was too short or the budget ran out; negative infinity if it ran out before the side was known.
+    /// All contacts with a separation below this (mm) are in the list. It is the margin or a little more, unless the
+    /// list or `NEAR` was too small or the budget ran out; negative infinity if it ran out before the side was known.
     #[must_use]
     pub const fn bound(&self) -> f32 {
         self.found.bound
     }
 
-    /// No separation is too high by more than this (mm).
+    /// Error bound (mm): no separation is too high by more than this.
     #[must_use]
     pub const fn accuracy(&self) -> f32 {
         self.found.accuracy
@@ -243,7 +244,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.is_full
     }
 
-    /// Sets each contact's velocity to that of the surface there, from a table of the vertices' velocities (mm/s).
+    /// Sets each contact's velocity to the surface's velocity at its point, from a table of the vertices' velocities
+    /// (mm/s).
     ///
     /// # Errors
     /// [`QueryError::VertexCount`] if a contact's corner has no row in the table.
@@ -261,7 +263,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.set_velocities(velocity)
     }
 
-    /// Sets each contact's velocity to that of a triangle's point.
+    /// Sets each contact's velocity to that of a point of a triangle.
     pub(crate) fn set_velocities(
         &mut self,
         velocity: impl Fn([u32; 3], [f32; 3]) -> Result<Vec3, QueryError>,
@@ -276,13 +278,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         Ok(())
     }
 
-    /// Empties the list, of which nothing is known then.
+    /// Empties the list, as if no query had filled it.
     #[cfg(all(feature = "bus", feature = "control"))]
     pub(crate) fn clear(&mut self) {
         self.found.clear();
     }
 
-    /// Leads each contact to another frame, by what becomes of a point and of a vector.
+    /// Transforms each contact to another frame, by functions for points and vectors.
     #[cfg(all(feature = "bus", feature = "control"))]
     pub(crate) fn place(&mut self, point: impl Fn(Vec3) -> Vec3, vector: impl Fn(Vec3) -> Vec3) {
         for contact in &mut self.found.list {
@@ -295,8 +297,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
     }
 
-    /// Widens the accuracy by a further error (mm) of the surface, and lowers the bound by all that the surface may be off from the
-    /// one that was searched.
+    /// Widens the accuracy by a further error (mm) of the surface, and lowers the bound by the total difference between
+    /// the true surface and the searched one.
     #[cfg(all(feature = "bus", feature = "control"))]
     pub(crate) fn widen(&mut self, error: f32, off: f32) {
         self.found.accuracy = sum_up(self.found.accuracy, error);
@@ -306,29 +308,31 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
 
 impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// Finds all locally closest pairs of the tool and the outer side of the surface whose separation is at most
-    /// `margin` (mm). For a tool that is inside the only contact is its deepest pair; for one that crosses the surface
-    /// that pair is the first. An axis that meets the surface in several places may be inside in several parts: only the
-    /// deepest is a contact, and its separation is the list's [bound](Contacts::bound).
+    /// `margin` (mm). For a tool that is inside, the only contact is its deepest pair; for one that crosses the
+    /// surface, that pair is the first. An axis that meets the surface in several places may have several parts inside:
+    /// only the deepest is a contact, and its separation is the list's [bound](Contacts::bound).
     ///
-    /// Two valleys of the distance in nearly the same direction, within 7 degrees, are one contact unless a ridge parts
-    /// them that is higher than a 128th of the axis' distance there, or of the margin if that is less. So a flat wall along
-    /// a capsule is one; so may be two within 15 degrees. In other directions each is a contact of its own if the ridge is
-    /// higher than a 512th of that distance and a 128th of the margin; others may be. Pairs with the inner side of a
-    /// sheet, say the far side of an organ, are not contacts. Where the side is undefined the tool is taken to be outside.
-    /// If that is because the budget ended, contacts may be missing at any distance: see [`Contacts::within`].
+    /// Two valleys of the distance in nearly the same direction, within 7 degrees, are one contact unless the ridge
+    /// between them is higher than a 128th of the axis' distance there, or of the margin if that is less. So a flat
+    /// wall along a capsule is one contact; two walls within 15 degrees may be one. In other directions each valley is
+    /// a contact of its own if the ridge is higher than a 512th of that distance and a 128th of the margin; with a
+    /// lower ridge it may be. Pairs with the inner side of a sheet, such as the far side of an organ, are not contacts.
+    /// If the side is undefined, the tool is taken to be outside. If that is because the budget ended, contacts may be
+    /// missing at any distance: see [`Contacts::within`].
     ///
-    /// Where the list has too few places, or the budget ends, the closest pair is in it all the same, and its
-    /// [bound](Contacts::bound) says how far it is complete. One wall may then be several contacts.
+    /// If the list is too small, or the budget ends, the closest pair is still in it, and its [bound](Contacts::bound)
+    /// tells how far it is complete. One wall may then be several contacts.
     ///
-    /// Where the tool crosses or is inside, up to five more searches of a point, as a rule one, find the second triangle at its
-    /// deepest point, for [`VelocityRow`](crate::constraint::VelocityRow). Without budget for them there is none.
+    /// If the tool crosses or is inside, up to five more searches of a point, usually one, find the second triangle at
+    /// its deepest point, for [`VelocityRow`](crate::constraint::VelocityRow). If the budget does not cover them, there
+    /// is none.
     ///
     /// Cost: that of [`closest`](Self::closest), a range search that compares the corners of each triangle within the
-    /// margin, and exact tests of about an eighth of these and of those around a contact: a second time for each that is
-    /// not the closest, to see whether a ridge parts it from nearer ones, with what is left of the budget.
+    /// margin, and exact tests of about an eighth of these and of those around a contact: a second time for each
+    /// contact but the closest, to find the ridge towards nearer ones, with the remaining budget.
     ///
     /// # Errors
-    /// [`QueryError`]: those of [`closest`](Self::closest); [`QueryError::NoAdjacency`] for a tree without;
+    /// [`QueryError`] as for [`closest`](Self::closest); [`QueryError::NoAdjacency`] for a tree without it;
     /// [`QueryError::Contacts`] for a list without room; [`QueryError::Margin`] for a margin that is not a number of at
     /// least 0. The list is then empty.
     pub fn contacts<V: VertexTable + ?Sized, T: Tool, const N: usize, const NEAR: usize>(

@@ -1,7 +1,7 @@
 //! The search of one point of the axis.
 //!
-//! A tracker remembers the leaves around the deepest point, so that the next ticks need only these. Where a budget ends the
-//! search of a point, the next tick goes on with it: subtrees and leaves keep their bounds, less the motion.
+//! A tracker remembers the leaves around the deepest point, so that the next ticks search only these. If a budget ends
+//! the search of a point, the next tick continues it: subtrees and leaves keep their bounds, less the motion.
 
 use super::part::{Fit, Parts, Sample, smaller};
 use super::{Depth, EXACT};
@@ -13,15 +13,15 @@ use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
-/// Node tests that take as long as the work for a point of the axis besides its search. Without them a budget would not
-/// bound a tracker's tick, which may look at many points and triangles without a search.
+/// The work for a point of the axis outside of its search, in node tests. Without it a budget would not bound a
+/// tracker's tick, which may visit many points and triangles without a search.
 const LOOK_COST: u32 = 16;
 
-/// With this many node tests left, a search is expected to come to its end within a tick.
+/// With this many node tests left, a search is expected to finish within a tick.
 const ONE_TICK: u32 = 768;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
-    /// Searches the last tick's deepest point to the end; the leaves around it are remembered.
+    /// Completes the search of the last tick's deepest point; the leaves around it are remembered.
     pub(super) fn look_again(
         &mut self,
         parts: &mut Parts,
@@ -42,7 +42,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         Ok(())
     }
 
-    /// Goes on with the point whose search the last tick's budget ended.
+    /// Continues the search of the point that the last tick's budget ended.
     #[cold]
     #[inline(never)]
     pub(super) fn go_on(&mut self, parts: &mut Parts) -> Result<(), QueryError> {
@@ -57,7 +57,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         Ok(())
     }
 
-    /// No search goes on in the next tick.
+    /// Drops the search to be continued in the next tick.
     #[cold]
     fn end_search(&mut self) {
         if let Some(Remembered { leaves: [_, other], waiting, .. }) = &mut self.remembered {
@@ -65,8 +65,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         }
     }
 
-    /// The closest pair of a sample's point, or what was found of it until the budget ended; `None` where another search is
-    /// to go on first.
+    /// The closest pair of a sample's point, or the part found before the budget ended; `None` if another search must
+    /// be continued first.
     fn search(
         &mut self,
         sample: &Sample,
@@ -113,7 +113,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 }
                 return search.gather(gathered, waiting).map(Some);
             }
-            // A bound that is just low enough would not be so at the next tick.
+            // No early end: a bound that barely suffices now would not at the next tick.
             limit = EXACT;
         }
         let found = search.run::<UNTIL>(limit)?;
@@ -125,14 +125,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         Ok(Some(found))
     }
 
-    /// Searches a point of the axis. Out of budget, returns the sample as it is. Only a tracker searches a point to the
-    /// end that is no deeper than `enough`.
+    /// Searches a point of the axis. Out of budget, returns the sample unchanged. Only a tracker completes the search
+    /// of a point no deeper than `enough`.
     #[inline(never)] // Small code, see `side::of_point`.
     pub(super) fn look(&mut self, sample: Sample, enough: f32) -> Result<Sample, QueryError> {
         self.looks += 1;
         self.spend(LOOK_COST);
         let Sample { parameter, on_axis, .. } = sample;
-        // The root's test is one of them.
+        // The budget must cover the root's test.
         if self.is_spent() {
             return Ok(sample);
         }
@@ -140,7 +140,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let point = AxisPoint(on_axis);
         let Some(mut found) = self.search(&sample, &options, enough)? else { return Ok(sample) };
         if found.is_cut_short() && self.has_leaves(parameter) {
-            // They were gathered in several ticks.
+            // The leaves were collected over several ticks.
             let (first, rest) = (found.tests(), options.after(found.tests()));
             if let Some(again) = self.search(&sample, &rest, enough)? {
                 found = again;
@@ -193,18 +193,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         if accuracy > answer.accuracy {
             answer.accuracy = accuracy;
         }
-        // Without its side it is searched again, among its leaves.
+        // If its side is unknown, the point is searched again among its leaves.
         if at.is_some_and(|at| at.side != Side::Undefined(NoSide::CutShort)) {
             self.end_search_of(parameter, is_deepest);
         }
-        // Without a triangle of its own, its corners are a pin.
+        // Without a triangle, its corners repeat a pin.
         let triangle = found.triangle.or(sample.triangle);
         let sample = self.sample(parameter, depth, triangle, found.corners)?;
         let fit = if at.is_some() { Fit::Searched } else { sample.fit };
         Ok(Sample { fit, ..sample })
     }
 
-    /// Whether the leaves around a point are gathered.
+    /// Whether the leaves around a point are collected.
     fn has_leaves(&self, parameter: f32) -> bool {
         let leaves = self.remembered.as_ref().map(|known| known.leaves.iter());
         leaves.is_some_and(|mut leaves| {
@@ -212,7 +212,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         })
     }
 
-    /// A point was searched to the end. If it is the deepest, its leaves are kept.
+    /// Ends the completed search of a point. If it is the deepest, its leaves are kept.
     fn end_search_of(&mut self, parameter: f32, is_deepest: bool) {
         let Some(Remembered { leaves: [best, other], .. }) = &mut self.remembered else { return };
         if other.are_around(parameter) {

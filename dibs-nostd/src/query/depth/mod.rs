@@ -1,18 +1,18 @@
-//! The depth of a capsule's axis that crosses the surface or is inside: the largest of any of its points.
+//! The depth of a capsule's axis that crosses the surface or is inside: the largest depth of any of its points.
 //!
 //! The depth along the axis, positive inside and negative outside, changes by at most the length moved, and is at most
 //! the distance to any one triangle of the surface. That distance is convex along the axis, so the triangles closest to
 //! two points bound the depth between them. The search divides the part of the axis with the highest bound (Piyavskii
 //! and Shubert, with this second bound added) until no part can be deeper than the deepest point found by more than the
-//! tolerance. The axis stays on one side between two places where it meets the surface, and parts outside are not searched.
-//! Steps from the triangles of the two points beside it often find one that shows a point to be no deeper. Such a point is
-//! not searched.
+//! tolerance. Between two intersections with the surface the axis stays on one side; parts outside are not searched. A
+//! few steps from the triangles of the neighbouring points often find a triangle that proves a point to be no deeper.
+//! Such a point is not searched.
 //!
-//! The work is bounded: it takes as long as 1.5 node tests for each of the tree's nodes at most, or as 4,608 if that is more,
-//! and then ends with the interval so far.
+//! The work is bounded by 1.5 node tests for each of the tree's nodes, or 4,608 if that is more; then the search ends
+//! with the interval so far.
 //!
-//! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick looks only at
-//! the parts whose bounds have come above the deepest point by more than the tolerance.
+//! A tracker keeps the bounds. Tool and surface change a depth by at most their motion, so the next tick searches only
+//! parts whose bounds now exceed the deepest point by more than the tolerance.
 //!
 //! One file, because the search and its steps share one state.
 
@@ -38,10 +38,10 @@ use crate::{Index, Tree, TriangleRow, VertexTable};
 use part::{Bound, Fit, Part, Parts, Sample, larger, smaller};
 use touches::Touches;
 
-/// A limit that no search reaches before its end.
+/// A limit that never ends a search early.
 const EXACT: f32 = f32::NEG_INFINITY;
 
-/// The default tolerance, as a part of the axis' length.
+/// The default tolerance, as a fraction of the axis' length.
 const TOLERANCE: f32 = 1.0 / 512.0;
 
 /// The least default tolerance, in units of the accuracy: about a hundredth of a millimetre on a heart.
@@ -62,32 +62,29 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     stack: &'s mut [Waiting],
     vertices: &'s V,
     tool: &'s T,
-    /// With the rest of the query's budget.
+    /// With the remaining budget of the query.
     options: Options,
-    /// The closest pair, in which a crossing axis meets the surface.
+    /// The closest pair; if the axis crosses, it is on the surface.
     closest: &'s Proximity,
-    /// The whole axis is inside.
     is_inside: bool,
-    /// The places where the axis meets the surface.
+    /// The intersections of the axis with the surface.
     touches: Touches,
     /// The deepest point so far.
     answer: Proximity,
     deepest: f32,
-    /// Its parameter; not a number if no point is inside.
+    /// Its parameter; NaN if no point is inside.
     deepest_at: f32,
-    /// Points searched.
     looks: u32,
-    /// A tracker's memory.
     remembered: Option<Remembered<'s>>,
     /// Roots of the shells that decide.
     roots: RootSet,
-    /// The triangles that the axis may meet; then those that may be the closest to the point searched last.
+    /// The triangles that the axis may touch; then those that may be the closest to the last searched point.
     ties: &'s mut Ties,
 }
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> {
-    /// A search for a tool whose axis meets the surface in the pair `closest`, or is inside by that pair's side, below
-    /// some roots.
+    /// A search below some roots, for a tool whose axis meets the surface in the pair `closest`, or is inside by that
+    /// pair's side.
     #[allow(clippy::too_many_arguments)]
     pub fn new(
         tree: &'s Tree<'t, I>,
@@ -149,13 +146,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             self.begin(&mut parts, reach, tolerance)?;
         }
         let bound = self.divide(&mut parts, tolerance, last)?;
-        // Where no point was searched to the end, the last tick's deepest one is looked at first again.
+        // If no search of a point was completed, the next tick searches the last tick's deepest point first.
         let deepest = if self.deepest_at.is_nan() { last } else { Some(self.deepest_at) };
         self.keep(&mut parts, deepest.unwrap_or(f32::NAN));
         self.finish(bound)
     }
 
-    /// Remembers the parts.
     fn keep(&mut self, parts: &mut Parts, deepest: f32) {
         let Some(searched) = self.searched() else { return };
         while parts.count() > Points::MOST && parts.join([deepest, searched], f32::INFINITY) {}
@@ -168,13 +164,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         }
     }
 
-    /// The point that a tracker is about to search; not a number if there is none.
+    /// The point that a tracker will search next; NaN if there is none.
     fn searched(&self) -> Option<f32> {
         let Remembered { leaves: [_, other], .. } = self.remembered.as_ref()?;
         Some(other.parameter())
     }
 
-    /// The most that any point of the axis can be deep, by its distance from the closest point.
+    /// Upper bound on the depth of any point of the axis, by its distance from the closest point.
     fn reach(&self) -> f32 {
         let (length, closest) = (self.tool.axis_length(), self.closest);
         let along = closest.axis_parameter * length;
@@ -182,7 +178,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.remembered.as_ref().map_or(reach, |known| smaller(reach, known.between[1]))
     }
 
-    /// Looks at the last tick's deepest point, then divides the part with the highest bound until none is above the
+    /// Searches the last tick's deepest point, then divides the part with the highest bound until none exceeds the
     /// deepest point by more than the tolerance. Returns the highest bound.
     fn divide(
         &mut self,
@@ -245,7 +241,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         }
     }
 
-    /// A part whose bound is no higher is not looked at.
+    /// A part whose bound is at most this is not searched.
     fn enough(&self, tolerance: f32) -> f32 {
         let least = self.remembered.as_ref().map_or(0.0, |known| known.between[0]);
         larger(self.deepest, least) + tolerance
@@ -258,13 +254,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         bound
     }
 
-    /// Bounds a remembered part anew.
+    /// Bounds a remembered part again.
     fn renew(&mut self, parts: &mut Parts, row: usize, enough: f32) {
         let distances = parts.renew(row, enough, &self.touches);
         self.spend(distances * DISTANCE_COST);
     }
 
-    /// Counts work that is no test as so many node tests.
+    /// Counts work outside of tests as node tests.
     fn spend(&mut self, node_tests: u32) {
         let rest = self.options.budget;
         let spent = rest.tests().min(node_tests);
@@ -276,7 +272,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         self.options.budget.tests() == 0
     }
 
-    /// The row of another part, if one may be divided.
+    /// The row for another part, if one may be divided.
     fn room(&self, parts: &mut Parts, enough: f32) -> Option<usize> {
         if self.looks >= LOOKS || self.is_spent() {
             return None;
@@ -287,7 +283,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         parts.free()
     }
 
-    /// The sample of the axis' point at a parameter, which is no deeper than `depth`, with the triangle of another one.
+    /// The sample of the axis' point at a parameter, at most `depth` deep, with the triangle of another sample.
     fn at(&self, parameter: f32, depth: f32, near: &Sample) -> Sample {
         let (along, on_axis) =
             (parameter * self.tool.axis_length(), self.tool.axis_point(parameter));
@@ -308,13 +304,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         Ok(Sample { parameter, along, on_axis, depth, triangle, corners, fit: Fit::Closest })
     }
 
-    /// A function of its own: four places call it, and a tightly coupled memory is small.
+    /// A function of its own: it has four callers, and tightly coupled memory is small.
     #[inline(never)]
     fn corners(&self, rows: [u32; 3]) -> Result<[Vec3; 3], QueryError> {
         positions(self.vertices, rows)
     }
 
-    /// The answer, where no point of the axis is deeper than `bound`.
+    /// The answer, if no point of the axis is deeper than `bound`.
     fn finish(&self, bound: f32) -> Result<Proximity, QueryError> {
         let Self { mut answer, closest, is_inside, .. } = *self;
         let is_open = closest.side == Side::Undefined(NoSide::CutShort);
@@ -330,12 +326,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             answer.side = match (crosses, is_near) {
                 (false, _) => Side::Undefined(NoSide::BelowAccuracy),
                 (true, false) => Side::Crossing,
-                // It does not meet the surface, and a point of it is inside.
+                // The axis does not meet the surface, and a point of it is inside.
                 (true, true) => Side::Inside,
             };
         }
         let most = if bound > self.deepest { bound } else { self.deepest };
-        // If no point is inside, it is still that of the closest pair, which may be farther than the accuracy.
+        // If no point is inside, `answer` is still the closest pair, which may be farther than the accuracy.
         if self.deepest > 0.0 {
             answer.separation = -self.tool.radius() - self.deepest;
         }

@@ -10,13 +10,13 @@ use crate::tool::{AxisPoint, Tool};
 /// Most points of the axis in a list, including its ends and the point where it meets the surface.
 pub(super) const POINTS: usize = 28;
 
-/// Least distance of a split from an end of its part, as a share of the part's length.
+/// Least distance of a split from an end of its part, as a fraction of the part's length.
 const NEAREST_SPLIT: f32 = 0.125;
 
-/// Most steps towards the point at which two triangles are equally far.
+/// Most steps towards the point at equal distance from two triangles.
 const ROUNDS: u32 = 2;
 
-/// A point of the axis and the triangle found closest to it; where the budget ended, one pin as all three corners.
+/// A point of the axis and the triangle found closest to it; if the budget ended, one pin as all three corners.
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
     /// Its parameter: 0 at the axis' start, 1 at its end.
@@ -31,16 +31,16 @@ pub(super) struct Sample {
     pub fit: Fit,
 }
 
-/// A sample's triangle.
+/// How the sample's triangle was found.
 #[derive(Clone, Copy, PartialEq, PartialOrd)]
 pub(super) enum Fit {
-    /// An earlier tick's; its corners were not read.
+    /// At an earlier tick; its corners have not been read.
     Remembered,
-    /// An earlier tick's.
+    /// At an earlier tick.
     Near,
-    /// The closest one found at this tick.
+    /// As the closest found at this tick.
     Closest,
-    /// The closest one: the point was searched to the end at this tick.
+    /// As the closest, by a search completed at this tick.
     Searched,
 }
 
@@ -60,7 +60,7 @@ impl Sample {
         square(point, &self.corners)
     }
 
-    /// A bound on the depth from here to the end of a way that is outside, if it is no higher than `enough`.
+    /// A bound on the depth from here to the end of a free length that is outside, if it is at most `enough`.
     fn passes(&self, way: &Free, point: impl Fn(f32) -> Vec3, enough: f32) -> Option<f32> {
         if !way.is_outside {
             return None;
@@ -74,28 +74,28 @@ impl Sample {
     }
 }
 
-/// A sample, and the part of the axis from there to another one.
+/// A sample, and the part of the axis from it to the next sample.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
     pub from: Sample,
-    /// Row of the part that the other one begins; 0 at the axis' end.
+    /// Row of the part that starts at the next sample; 0 at the axis' end.
     pub next: usize,
-    /// No point of the part is deeper.
+    /// Upper bound on the depth in the part.
     pub bound: f32,
-    /// Length along the axis at which it is divided next; `None` if the bound is an earlier tick's.
+    /// Length along the axis of its next division; `None` if the bound is from an earlier tick.
     pub split: Option<f32>,
 }
 
 /// A bound on the depth between two samples.
 #[derive(Clone, Copy)]
 pub(super) struct Bound {
-    /// The first sample is no deeper.
+    /// Upper bound on the first sample's depth.
     pub depth: f32,
-    /// No point between them is deeper.
+    /// Upper bound on the depth between the samples.
     pub bound: f32,
     /// Length along the axis at which to divide.
     pub split: f32,
-    /// Distances to triangles that it took.
+    /// Number of distances to triangles computed.
     pub distances: u32,
 }
 
@@ -107,7 +107,7 @@ impl Part {
         Self { from, next, bound, split: None }
     }
 
-    /// The part with a bound of its own, within one that is no deeper than `most`.
+    /// The part with its own bound, limited by the bound `most` of a part that contains it.
     pub fn new(mut from: Sample, next: usize, own: &Bound, most: f32) -> Self {
         from.depth = own.depth;
         Self { from, next, bound: smaller(own.bound, most), split: Some(own.split) }
@@ -115,7 +115,7 @@ impl Part {
 }
 
 impl Bound {
-    /// The bound between two samples. One that is no higher than `enough` is not lowered further.
+    /// The bound between two samples. Once it is at most `enough`, it is not lowered further.
     pub fn between(from: &Sample, to: &Sample, enough: f32, touches: &Touches) -> Self {
         let length = to.along - from.along;
         // A depth changes by at most the length moved.
@@ -124,7 +124,7 @@ impl Bound {
         let part = |bound, split, distances| Self { depth, bound, split, distances };
         let span = to.on_axis - from.on_axis;
         let point = |along: f32| from.on_axis + span * ((along - from.along) / length);
-        // Points nearer to an outside sample than its distance are outside too.
+        // Points nearer to an outside sample than its distance to the surface are outside too.
         let (mut first, mut last) =
             (from.along + above_zero(-depth), to.along - above_zero(-to_depth));
         let (mut beside, mut distances) = (0.0, 0);
@@ -151,7 +151,8 @@ impl Bound {
         }
         let squares = |along: f32| [from.square(point(along)), to.square(point(along))];
         let (at_first, at_last) = (squares(first), squares(last));
-        // The first triangle's lead over the second: linear along the axis where both are points.
+        // The difference of the second and first triangle's distances: linear along the axis if both triangles are
+        // points.
         let lead = |[one, other]: [f32; 2]| other - one;
         let (mut low, mut high) = ((first, lead(at_first)), (last, lead(at_last)));
         let (mut least, mut peak) = (f32::INFINITY, middle);
@@ -191,7 +192,7 @@ impl Bound {
 
 /// The parts of the axis in a list from its start, in row 0, to its end.
 pub(super) struct Parts {
-    /// No vector: parts name each other by their rows.
+    /// No vector: parts refer to each other by row.
     rows: [Part; POINTS],
     /// Rows from here on are unused.
     end: usize,
@@ -231,8 +232,8 @@ impl Parts {
         }
     }
 
-    /// Joins the two neighbouring parts that are shortest together, of those that are no deeper than `enough`, but not at
-    /// one of the parameters `kept`. Returns whether there are any.
+    /// Joins the two neighbouring parts with the least total length, of those at most `enough` deep, but not at a
+    /// parameter in `kept`. Returns whether there were any.
     pub fn join(&mut self, kept: [f32; 2], enough: f32) -> bool {
         let (mut least, mut joined) = (f32::INFINITY, None);
         let mut row = 0;
@@ -279,7 +280,7 @@ impl Parts {
         highest
     }
 
-    /// The row of the next part, this one's bound, and the length along the axis at which it is divided next.
+    /// The row of the next part, this part's bound, and the length along the axis of its next division.
     pub fn state(&self, row: usize) -> (usize, f32, Option<f32>) {
         self.rows.get(row).map_or((0, 0.0, None), |part| (part.next, part.bound, part.split))
     }
@@ -289,7 +290,7 @@ impl Parts {
         self.rows.iter().take(self.end).position(|part| part.from.parameter == parameter)
     }
 
-    /// The sample that a part begins with.
+    /// The sample at a part's start.
     pub fn sample(&self, row: usize) -> Sample {
         self.part(row).from
     }
@@ -300,7 +301,7 @@ impl Parts {
         }
     }
 
-    /// Bounds a remembered part anew. Returns the distances to triangles that it took.
+    /// Bounds a remembered part again. Returns the number of distances to triangles computed.
     pub fn renew(&mut self, row: usize, enough: f32, touches: &Touches) -> u32 {
         let Some((from, next)) = self.rows.get(row).map(|part| (&part.from, part.next)) else {
             return 0;
@@ -326,13 +327,12 @@ impl Parts {
     }
 }
 
-/// Square of the distance from a point to a triangle.
 pub(super) fn square(point: Vec3, corners: &[Vec3; 3]) -> f32 {
     let pair = AxisPoint(point).closest_on_triangle(corners, f32::INFINITY);
     pair.map_or(f32::INFINITY, |pair| pair.distance_squared)
 }
 
-/// Upper bound, between two places, on the smaller of two convex functions, from their values there.
+/// Upper bound on the smaller of two convex functions between two points, from their values there.
 fn convex([one, other]: [f32; 2], [one_next, other_next]: [f32; 2]) -> f32 {
     let (most, other_most) = (larger(one, one_next), larger(other, other_next));
     smaller(most, other_most)

@@ -1,4 +1,4 @@
-//! The parts of the axis that a search begins with: between the places where it meets the surface, or the last tick's.
+//! The initial parts of the axis: between its intersections with the surface, or the last tick's parts.
 
 use super::part::{Part, Parts, Sample, smaller};
 use super::touches::Touches;
@@ -10,7 +10,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
-    /// Finds the places where the axis meets the triangles that a search found to touch it.
+    /// Finds where the axis meets the triangles that a search found to touch it.
     pub(super) fn find_touches(&mut self) -> Result<(), QueryError> {
         if self.is_inside {
             self.touches = Touches::NONE;
@@ -27,7 +27,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                     next = place + 1;
                     row
                 }
-                // A tracker's accuracy is larger than a search's, for which the closest triangle may be no touched one.
+                // A tracker's accuracy is larger than a search's, so the closest triangle may not be among the touched
+                // ones.
                 (None, Some(TriangleRow(row))) if next == 0 => {
                     next = usize::MAX;
                     row
@@ -49,7 +50,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         }
     }
 
-    /// The parts between the axis' ends and the places where it meets the surface. A tracker begins once.
+    /// The parts between the axis' ends and its intersections with the surface. A tracker does this once.
     #[cold]
     #[inline(never)]
     pub(super) fn begin(
@@ -80,12 +81,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         Ok(())
     }
 
-    /// The point is that of the closest pair of an axis inside, which as a rule is one of its ends.
+    /// Whether the point is that of the closest pair of an axis inside, usually one of its ends.
     fn is_searched(&self, parameter: f32) -> bool {
         self.is_inside && self.closest.axis_parameter == parameter
     }
 
-    /// The sample of an end of the axis; not searched if it is known, or outside for certain.
+    /// The sample of an end of the axis; not searched if it is known or certainly outside.
     fn end(&mut self, parameter: f32, near: &Sample, tolerance: f32) -> Result<Sample, QueryError> {
         if self.is_searched(parameter) {
             return Ok(*near);
@@ -100,7 +101,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         self.look(self.at(parameter, most, near), self.enough(tolerance))
     }
 
-    /// The parts of the last tick, none deeper than `reach`. Returns the parameter of its deepest point, if there are any.
+    /// The last tick's parts, each at most `reach` deep. Returns the parameter of the deepest point, if there are any.
     pub(super) fn resume(&mut self, parts: &mut Parts, reach: f32) -> Option<f32> {
         let (points, deepest) = self.remembered.as_ref()?.points.known()?;
         for point in points {

@@ -1,4 +1,4 @@
-//! Where an axis meets the surface. Between two such places it stays on one side of a closed surface.
+//! Where an axis meets the surface. Between two such intervals it stays on one side of a closed surface.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -8,31 +8,30 @@ use crate::TriangleRow;
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, AxisPoint, SLIVER, Tool};
 
-/// Most places told apart.
+/// Most intervals kept apart.
 const PLACES: usize = 8;
 
-/// Square of the sine of an axis' angle to a triangle's plane: 1/16. With less, the triangle is touched over a length
-/// that is found by halving.
+/// Square of the sine of the angle between axis and triangle plane, 1/16. Below it, the length that touches the
+/// triangle is found by bisection.
 const INCLINED: f32 = 1.0 / 256.0;
 
-/// Times that a length is halved.
 const HALVINGS: u32 = 8;
 
-/// The places where an axis may meet the surface. No two overlap.
+/// The disjoint intervals in which an axis may meet the surface.
 #[derive(Clone, Debug)]
 pub(super) struct Touches {
     places: Vec<Place, PLACES>,
 }
 
-/// A place where the axis may meet the surface, in lengths from its start.
+/// An interval of the axis that may meet the surface, in lengths from its start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     first: f32,
     last: f32,
-    /// Whether the axis is outside before the place, and after it; `None` if not known.
+    /// Whether the axis is outside before and after the interval; `None` if unknown.
     before: Option<bool>,
     after: Option<bool>,
-    /// Parameter of a point of the axis in it.
+    /// Parameter of a point of the axis in the interval.
     pub parameter: f32,
     /// A triangle that this point touches.
     pub triangle: TriangleRow,
@@ -44,7 +43,7 @@ impl Place {
         Self { first: 0.0, last, before, after, parameter: 0.0, triangle }
     }
 
-    /// The place from the first end of both to the last.
+    /// The smallest interval that contains both.
     fn joined(&self, other: &Self) -> Self {
         let before = if self.before == other.before { self.before } else { None };
         let after = if self.after == other.after { self.after } else { None };
@@ -54,7 +53,7 @@ impl Place {
 }
 
 impl Touches {
-    /// No place.
+    /// No interval.
     pub const NONE: Self = Self { places: Vec::new() };
 
     /// The whole axis.
@@ -64,11 +63,12 @@ impl Touches {
         touches
     }
 
-    /// Adds a triangle whose distance from the axis is within the accuracy. Returns the distances to it that this took.
+    /// Adds a triangle whose distance from the axis is within the accuracy. Returns the number of distances to it
+    /// computed.
     ///
-    /// An axis that is clearly inclined to a triangle and pierces it passes the surface on the way that the triangle
-    /// faces. If it pierces a neighbour instead, because of rounding, that one is within the accuracy, too, and both
-    /// have one place.
+    /// An axis that is clearly inclined to a triangle and pierces it crosses the surface in the direction that the
+    /// triangle faces. If by rounding it pierces a neighbour instead, that triangle is within the accuracy too, and
+    /// both share one interval.
     pub fn add(
         &mut self,
         tool: &impl Tool,
@@ -87,7 +87,7 @@ impl Touches {
         let parameter = pair.axis_parameter;
         let middle = parameter * length;
         if is_clear && slope * slope > INCLINED * square {
-            // The axis meets the plane within two accuracies, divided by the sine. The rest is for rounding.
+            // The axis meets the plane within two accuracies divided by the sine; the larger factor covers rounding.
             let within = 8.0 * accuracy * sqrt(square / (slope * slope));
             let is_outward = (pair.distance_squared <= 0.0).then_some(slope > 0.0);
             let (first, last) = (middle - within, middle + within);
@@ -117,7 +117,7 @@ impl Touches {
         2 * HALVINGS
     }
 
-    /// Adds a place, joined with those that it overlaps.
+    /// Adds an interval, joined with all that it overlaps.
     fn insert(&mut self, mut place: Place) {
         self.places.retain(|other| {
             let is_apart = other.last < place.first || other.first > place.last;
@@ -134,7 +134,7 @@ impl Touches {
         self.push(place);
     }
 
-    /// Adds a place behind the others; if there is no room, to the last one.
+    /// Appends an interval; if there is no room, joins it to the last one.
     fn push(&mut self, place: Place) {
         if let Err(place) = self.places.push(place)
             && let Some(last) = self.places.last_mut()
@@ -143,12 +143,12 @@ impl Touches {
         }
     }
 
-    /// The places, unless they are unknown.
+    /// The intervals, unless they are unknown.
     pub fn places(&self) -> impl Iterator<Item = &Place> {
         self.places.iter().filter(|place| place.last < f32::INFINITY)
     }
 
-    /// The axis is outside at this length.
+    /// Notes that the axis is outside at this length.
     pub fn add_outside(&mut self, along: f32) {
         let mut previous: Option<&mut Place> = None;
         for place in &mut self.places {
@@ -166,7 +166,7 @@ impl Touches {
         }
     }
 
-    /// The way forward from a length along the axis.
+    /// The free length forward from a length along the axis.
     #[inline(never)] // Small code, see `side::of_point`.
     pub fn ahead(&self, along: f32) -> Free {
         let mut free = Free { from: along, to: f32::INFINITY, is_outside: false };
@@ -183,7 +183,7 @@ impl Touches {
         free.between(previous, None)
     }
 
-    /// The way back.
+    /// The free length backward.
     #[inline(never)]
     pub fn behind(&self, along: f32) -> Free {
         let mut free = Free { from: along, to: f32::NEG_INFINITY, is_outside: false };
@@ -203,15 +203,15 @@ impl Touches {
 
 /// A length of the axis that does not meet the surface.
 pub(super) struct Free {
-    /// Its end that is closer to the point it was asked for.
+    /// Its end nearer to the point of the request.
     pub from: f32,
     pub to: f32,
-    /// It is certain to be outside.
+    /// It is certainly outside.
     pub is_outside: bool,
 }
 
 impl Free {
-    /// Outside if one end is known to be, and neither is known to be inside.
+    /// Outside if one end is, and neither is inside.
     fn between(self, one: Option<bool>, other: Option<bool>) -> Self {
         let is_outside = one.or(other) == Some(true) && other.or(one) == Some(true);
         Self { is_outside, ..self }
@@ -248,7 +248,7 @@ mod tests {
                 expected = apart;
                 expected.push(one);
                 expected.sort_by(|a, b| a.0.total_cmp(&b.0));
-                // The last two are one where there is no room.
+                // Without room the last two are joined.
                 if expected.len() > PLACES
                     && let Some((_, last)) = expected.pop()
                 {

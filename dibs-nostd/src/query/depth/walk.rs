@@ -1,5 +1,5 @@
-//! Steps from a triangle to closer neighbours. Any triangle is an upper bound on a point's depth, so a close one may make a
-//! search needless.
+//! Steps from a triangle to closer neighbours. The distance to any triangle is an upper bound on a point's depth, so a
+//! close triangle may save a search.
 
 use super::part::{self, Fit, Parts, Sample, smaller};
 use super::{DISTANCE_COST, Depth};
@@ -8,7 +8,6 @@ use crate::tool::Tool;
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
 
-/// Most steps.
 const STEPS: u32 = 4;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
@@ -64,8 +63,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         Ok(())
     }
 
-    /// A point of the axis between two samples, with a triangle found by steps from theirs. Its depth is no more than
-    /// that triangle's distance. It is good enough if it is no deeper than `enough`.
+    /// A point of the axis between two samples, with a triangle found by steps from theirs, whose distance bounds the
+    /// point's depth. The steps end once the depth is at most `enough`.
     pub(super) fn between(
         &mut self,
         along: f32,

@@ -6,7 +6,6 @@ use crate::Tool;
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
 
-/// An axis as it was.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Axis {
     start: Vec3,
@@ -19,8 +18,8 @@ impl Axis {
         Self { start: tool.axis_start(), span: tool.axis_span(), length: tool.axis_length() }
     }
 
-    /// Most that a point of the axis has moved, in units: the larger of the ends' steps. For another tool, the distance
-    /// between the axes' points.
+    /// Upper bound on the motion of any point of the axis, in units: the larger of the ends' steps. For another tool,
+    /// the distance between the axes' points.
     #[inline(always)]
     pub fn step(&self, tool: &impl Tool, unit: Unit) -> u32 {
         const U: f32 = 1.0 / 16_777_216.0;

@@ -1,7 +1,7 @@
-//! The proof of a depth, kept from tick to tick.
+//! The proof of a depth, carried from tick to tick.
 //!
-//! A depth changes by at most the motion of tool and surface. So every bound of the last tick still holds, plus that
-//! motion: only parts of the axis whose bounds have come above the deepest point are looked at again.
+//! A depth changes by at most the motion of tool and surface. So every bound of the last tick plus that motion still
+//! holds: only parts of the axis whose bounds now exceed the deepest point are searched again.
 
 use heapless::{Vec, VecView};
 
@@ -12,23 +12,22 @@ use super::waiting::Waiting;
 use crate::TriangleRow;
 use crate::tree::RootSet;
 
-/// Most points remembered, so that the next search has room for more.
+/// Most points remembered; the next search has room for more.
 const KEPT: usize = 20;
 
-/// A point of the axis, and the part from there to the next one.
+/// A point of the axis, and the segment from it to the next point.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Point {
     /// 0 at the axis' start, 1 at its end.
     pub parameter: f32,
     /// Upper bound on its depth.
     pub depth: f32,
-    /// No point of the part is deeper.
+    /// Upper bound on the depth in the segment.
     pub bound: f32,
     /// A triangle near it.
     pub triangle: TriangleRow,
 }
 
-/// The last depth.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct KnownDepth<const STACK: usize> {
     state: State,
@@ -39,11 +38,11 @@ pub(in crate::query) struct KnownDepth<const STACK: usize> {
 #[derive(Clone, Debug)]
 struct State {
     points: Points,
-    /// Those around the deepest point, and around one that may be deeper.
+    /// The leaves around the deepest point, and around one that may be deeper.
     leaves: [Leaves; 2],
-    /// The key of the shells that decided.
+    /// Identifies the shells that decided.
     shells: u32,
-    /// The reading as of which the bounds hold.
+    /// The reading at which the bounds hold.
     at: Reading,
 }
 
@@ -55,22 +54,21 @@ pub(in crate::query) struct KnownDepthMut<'m> {
     past: Option<Certain>,
 }
 
-/// What is remembered of a depth, as of now.
+/// The memory of a depth, updated to now.
 pub(in crate::query) struct Remembered<'m> {
     pub points: &'m mut Points,
-    /// Those around the deepest point, and around one that may be deeper.
+    /// The leaves around the deepest point, and around one that may be deeper.
     pub leaves: &'m mut [Leaves; 2],
-    /// Subtrees still to be searched for the leaves around one of the two.
+    /// Subtrees still to be searched for the leaves around one of the two points.
     pub waiting: &'m mut VecView<Waiting>,
-    /// The deepest point is at least as deep as the first of these, and no deeper than the second.
+    /// Lower and upper bound on the depth of the deepest point.
     pub between: [f32; 2],
 }
 
-/// The points of the last depth.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Points {
     points: Vec<Point, KEPT>,
-    /// The deepest point's parameter; not a number if no point was inside.
+    /// The deepest point's parameter; NaN if no point was inside.
     deepest: f32,
 }
 
@@ -88,7 +86,7 @@ impl<const STACK: usize> KnownDepth<STACK> {
         self.waiting.clear();
     }
 
-    /// The same at a reading, with what is certain of the separation then.
+    /// The last depth at a reading, with the certain separation at that time.
     pub fn at(&mut self, clock: MotionClock, past: Option<Certain>) -> KnownDepthMut<'_> {
         KnownDepthMut { state: &mut self.state, waiting: &mut self.waiting, clock, past }
     }
@@ -107,12 +105,12 @@ impl<'m> KnownDepthMut<'m> {
         self.waiting.clear();
     }
 
-    /// The axis may be inside, by what was certain of it.
+    /// Whether the axis may be inside, by the last certain separation.
     pub fn may_be_inside(&self) -> bool {
         self.past.is_some_and(|past| past.lower < 0.0)
     }
 
-    /// What holds now, if the same shells decide.
+    /// The memory updated to now, if the same shells decide.
     pub fn now(self, roots: RootSet) -> Remembered<'m> {
         let Self { state, waiting, clock, past } = self;
         if state.shells != roots.key() {
@@ -135,7 +133,7 @@ impl<'m> KnownDepthMut<'m> {
             leaves.iter_mut().for_each(|leaves| leaves.add_motion(moved));
         }
         *at = clock.now();
-        // Of several solids another one may be the deepest.
+        // Of several solids another one may be deepest.
         let least = past.filter(|_| roots == RootSet::ALL).map_or(0.0, |past| -past.upper);
         let between = [least, past.map_or(f32::INFINITY, |past| -past.lower)];
         Remembered { points, leaves, waiting, between }
@@ -147,16 +145,16 @@ impl Points {
         self.points.clear();
     }
 
-    /// The points from the axis' start to its end, and the deepest one's parameter, if there are any.
+    /// The points from the axis' start to its end, and the deepest one's parameter, if any.
     pub fn known(&self) -> Option<(&[Point], f32)> {
         (self.points.len() > 1).then_some((&self.points, self.deepest))
     }
 
-    /// Most points that it keeps.
+    /// Most points kept.
     pub const MOST: usize = KEPT;
 
-    /// Remembers the points of a search in order, and the parameter of the deepest one. A point without a triangle near it
-    /// leaves nothing to remember.
+    /// Remembers a search's points in order, and the parameter of the deepest one. If a point has no triangle near it,
+    /// nothing is remembered.
     pub fn keep(&mut self, points: impl Iterator<Item = Option<Point>>, deepest: f32) {
         self.forget();
         self.deepest = deepest;
@@ -167,7 +165,7 @@ impl Points {
     }
 }
 
-/// A bound after a motion, rounded up.
+/// A bound raised by a motion, rounded up.
 fn raised(bound: f32, moved: f32) -> f32 {
     let sum = bound + moved;
     sum + sum.abs() * f32::EPSILON

@@ -1,30 +1,30 @@
-//! The front: the top of the tree as far as it has been opened, and when each bound runs out.
+//! The front: the opened top of the tree, and the deadline of each bound.
 
 use core::ops::Range;
 
 use super::clock::{Deadline, MotionClock};
 use crate::tree::format::{Link, MAX_CHILDREN};
 
-/// A node whose children (or, of a leaf, whose triangles) have separate bounds.
+/// A node whose children (or, for a leaf, whose triangles) have separate bounds.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Opened {
-    /// The node's children or triangles, as a link; [`UNUSED`] where this place is free.
+    /// The node's children or triangles, as a link; [`UNUSED`] in a free slot.
     pub link: u32,
-    /// Place of the node above; of a free place, the next free one, counted from 1.
+    /// Slot of the parent node; in a free slot, the next free one, counted from 1.
     pub parent: u16,
     /// Index among the parent's children.
     pub slot: u8,
-    /// The children without a bound, one bit each: they are opened, on the search's stack, or the closest triangle.
+    /// The children without a bound, one bit each: opened, on the search's stack, or the closest triangle.
     pub apart: u8,
-    /// Of each child's bound; not read of one without.
+    /// Deadline of each child's bound; unused for a child without one.
     pub deadlines: [Deadline; MAX_CHILDREN as usize],
 }
 
-/// A link that no node has: eight children in rows beyond every tree.
+/// A link that no node has: eight children in rows beyond any tree.
 pub(in crate::query) const UNUSED: u32 = u32::MAX >> 1;
-/// No place: one more than the largest.
+/// No slot: one more than the largest.
 pub(in crate::query) const NOWHERE: u16 = u16::MAX;
-/// No free place. Free places are counted from 1, so that this is zero.
+/// No free slot. Free slots are counted from 1, so that this is zero.
 const NO_FREE: u16 = 0;
 
 impl Opened {
@@ -63,7 +63,7 @@ pub(in crate::query) struct Place {
 }
 
 impl Place {
-    /// The place as a word for the search's stack.
+    /// The child's place as a word on the search's stack.
     #[inline(always)]
     pub fn to_word(self) -> u32 {
         u32::from(self.node) << 3 | u32::from(self.slot)
@@ -75,24 +75,24 @@ impl Place {
     }
 }
 
-/// The opened nodes, one to a place. A tick reads one deadline for each opened node, not for each child.
+/// The opened nodes, one in each slot. A tick reads one deadline for each opened node, not for each child.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Front<const OPENED: usize> {
-    /// The first of each node's deadlines. (A separate table, since each tick reads all of it.)
+    /// The earliest of each node's deadlines. (A separate table, since each tick reads all of it.)
     due: [Deadline; OPENED],
     nodes: [Opened; OPENED],
-    /// Places from here on are unused since the last clear.
+    /// Slots from here on are unused since the last clear.
     end: usize,
-    /// The first free place, counted from 1; [`NO_FREE`] where there is none.
+    /// The first free slot, counted from 1; [`NO_FREE`] if there is none.
     free: u16,
     /// The closest triangle's place.
     pub best: Option<Place>,
-    /// The place looked at last, for a node to close.
+    /// The clock hand: the slot last examined for closing.
     hand: usize,
 }
 
 impl<const OPENED: usize> Front<OPENED> {
-    /// All zeros, so that memory is cleared in its place, and no copy of it passes over the stack.
+    /// All zeros, so that memory is cleared in place, without a copy on the stack.
     pub const EMPTY: Self = {
         assert!(OPENED > 0 && OPENED < NOWHERE as usize);
         Self {
@@ -126,7 +126,7 @@ impl<const OPENED: usize> Front<OPENED> {
 }
 
 impl<const OPENED: usize> Front<OPENED> {
-    /// Rows of the nodes that have a bound, or whose triangles have.
+    /// Rows of the nodes that have a bound, or whose triangles have bounds.
     pub fn rows(&self) -> impl Iterator<Item = u32> {
         let opened = self.nodes.iter().take(self.end).filter(|opened| opened.link != UNUSED);
         opened.flat_map(|opened| {
@@ -149,7 +149,7 @@ impl<const OPENED: usize> Front<OPENED> {
 }
 
 impl FrontMut<'_> {
-    /// Frees all places.
+    /// Frees all slots.
     pub fn clear(&mut self) {
         (*self.end, *self.free, *self.best, *self.hand) = (0, NO_FREE, None, 0);
     }
@@ -158,7 +158,7 @@ impl FrontMut<'_> {
         *self.end == 0
     }
 
-    /// Number of places used since the last [`clear`](Self::clear).
+    /// Number of slots used since the last [`clear`](Self::clear).
     pub fn used(&self) -> usize {
         *self.end
     }
@@ -168,12 +168,12 @@ impl FrontMut<'_> {
         self.nodes.get_mut(usize::from(at))
     }
 
-    /// The first place in a range whose node is due.
+    /// The first slot in a range whose node is due.
     #[inline(always)]
     pub fn next_due(&self, places: Range<usize>, threshold: Deadline) -> Option<usize> {
         let from = places.start;
         let due = self.due.get(places)?;
-        // Eight at a time: as a rule none of them is due.
+        // Eight at a time: usually none of them is due.
         let (eights, _) = due.as_chunks::<8>();
         let waits = |eight: &&[Deadline; 8]| {
             let before = eight.map(|due| threshold.units_after(due));
@@ -190,13 +190,13 @@ impl FrontMut<'_> {
         due.iter().filter(|&&due| !threshold.is_before(due)).count()
     }
 
-    /// The first deadline of all.
+    /// The earliest deadline.
     pub fn first(&self, clock: &MotionClock) -> Deadline {
         let due = self.due.get(..*self.end).unwrap_or_default();
         due.iter().fold(clock.never(), |first, &due| if due.is_before(first) { due } else { first })
     }
 
-    /// Opens a node in a free place, with one bound for all below; `None` if there is no place.
+    /// Opens a node in a free slot, with one bound for everything below; `None` if there is no free slot.
     #[inline(always)]
     pub fn open(&mut self, link: u32, parent: Place, deadline: Deadline) -> Option<u16> {
         let at = self.free.checked_sub(1).map_or(*self.end, usize::from);
@@ -212,7 +212,7 @@ impl FrontMut<'_> {
         Some(at as u16)
     }
 
-    /// Frees a place, and gives its parent a bound for it.
+    /// Frees a slot, and gives the node's parent a bound for it.
     pub fn close(&mut self, at: u16, deadline: Deadline, clock: &MotionClock) -> Option<()> {
         let free = *self.free;
         let node = self.node(at)?;
@@ -224,7 +224,7 @@ impl FrontMut<'_> {
         self.put_back(place)
     }
 
-    /// Returns a child to its node's bounds.
+    /// Gives a child a bound of its node again.
     #[inline(always)]
     pub fn put_back(&mut self, Place { node, slot }: Place) -> Option<()> {
         let due = self.due.get_mut(usize::from(node))?;
@@ -237,7 +237,7 @@ impl FrontMut<'_> {
         Some(())
     }
 
-    /// Notes the first of a node's deadlines.
+    /// Updates the earliest of a node's deadlines.
     #[inline(always)]
     pub fn schedule(&mut self, at: usize, count: u32, clock: &MotionClock) -> Option<()> {
         let node = self.nodes.get(at)?;
@@ -253,8 +253,8 @@ impl FrontMut<'_> {
         Some(())
     }
 
-    /// Moves the clock hand on by one slot. The node there and its first deadline, if it may be closed: opened, below a root,
-    /// all children with bounds.
+    /// Advances the clock hand by one slot. Returns the node there and its earliest deadline, if it may be closed:
+    /// opened, below a root, all children with bounds.
     pub fn next_closable(&mut self) -> Option<(u16, Deadline)> {
         *self.hand = if *self.hand + 1 < *self.end { *self.hand + 1 } else { 0 };
         let node = self.nodes.get(*self.hand)?;

@@ -1,39 +1,35 @@
 //! The leaves around a point of the axis, each with a bound.
 //!
-//! Until tool and surface have moved too far, the closest triangle to the point is in one of them.
+//! Until tool and surface have moved too far, one of them contains the closest triangle to the point.
 
 use heapless::{Vec, VecView};
 
 use super::waiting::Waiting;
 
-/// Most leaves.
 pub(in crate::query) const MOST: usize = 48;
 
-/// The leaves around a point.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Leaves {
     leaves: Vec<Leaf, MOST>,
-    /// There were more.
+    /// There were more leaves than fit.
     is_over: bool,
-    /// Motion (mm) of tool and surface, and of the point along its axis, since they were gathered.
+    /// Motion (mm) of tool and surface, and of the point along its axis, since the leaves were collected.
     moved: f32,
-    /// All other leaves were at least as far (mm) as this; 0 if that is not known.
+    /// All other leaves were at least this far (mm) away; 0 if unknown.
     beyond: f32,
-    /// The same of those that were passed over while the leaves are gathered.
+    /// The same for the leaves skipped so far during collection.
     passed: f32,
-    /// A search for them goes on.
     is_gathering: bool,
-    /// Where the point is on its axis: 0 at the start, 1 at the end.
+    /// The point's parameter on its axis: 0 at the start, 1 at the end.
     parameter: f32,
     /// The motion (mm) of the last tick.
     step: f32,
 }
 
-/// A leaf.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Leaf {
     pub link: u32,
-    /// It was at least as far (mm) as this when the leaves were gathered.
+    /// Its least distance (mm) when the leaves were collected.
     pub bound: f32,
 }
 
@@ -58,24 +54,24 @@ impl Leaves {
         self.is_gathering = false;
     }
 
-    /// Forgets them, and begins to gather them anew.
+    /// Clears the leaves, and starts a new collection.
     pub fn begin(&mut self) {
         self.forget();
         self.is_gathering = true;
     }
 
-    /// Whether a search for them goes on.
+    /// Whether a collection is in progress.
     pub const fn is_gathering(&self) -> bool {
         self.is_gathering
     }
 
-    /// Forgets them for the leaves around another point of the axis.
+    /// Clears the leaves for another point of the axis.
     pub fn forget_for(&mut self, parameter: f32) {
         self.forget();
         self.parameter = parameter;
     }
 
-    /// Forgets them and their point, and the subtrees that wait for them.
+    /// Clears the leaves, their point, and the subtrees that wait for them.
     pub fn end(&mut self, waiting: &mut VecView<Waiting>) {
         if self.is_gathering {
             waiting.clear();
@@ -83,28 +79,28 @@ impl Leaves {
         self.forget_for(f32::NAN);
     }
 
-    /// Whether they are those around this point of the axis.
+    /// Whether the leaves are around this point of the axis.
     pub fn are_around(&self, parameter: f32) -> bool {
         self.parameter == parameter
     }
 
-    /// The point that they are around.
+    /// The parameter of the leaves' point.
     pub const fn parameter(&self) -> f32 {
         self.parameter
     }
 
-    /// Tool and surface have moved.
+    /// Adds a motion of tool and surface.
     pub fn add_motion(&mut self, moved: f32) {
         self.moved = sum(self.moved, moved);
         self.step = moved;
     }
 
-    /// The way from the point to another one of its axis, which is as long as `length`.
+    /// The distance (mm) from the point to another one of its axis of this `length`.
     pub fn way_to(&self, parameter: f32, length: f32) -> f32 {
         (parameter - self.parameter).abs() * length * (1.0 + 4.0 * f32::EPSILON)
     }
 
-    /// The point is another one of its axis.
+    /// Moves the point to another one of its axis.
     pub fn move_to(&mut self, parameter: f32, length: f32) {
         self.moved = sum(self.moved, self.way_to(parameter, length));
         self.parameter = parameter;
@@ -115,22 +111,22 @@ impl Leaves {
         self.step
     }
 
-    /// The motion since the leaves were gathered, to a point farther by `way`.
+    /// The motion since the leaves were collected, for a point `way` (mm) farther on.
     pub fn moved(&self, way: f32) -> f32 {
         sum(self.moved, way)
     }
 
-    /// The leaves, and the motion since they were gathered.
+    /// The leaves, and the motion since they were collected.
     pub fn each(&mut self) -> (&mut [Leaf], f32) {
         (&mut self.leaves, self.moved)
     }
 
-    /// Whether they were gathered, and hold for some motion.
+    /// Whether the leaves were collected, and hold for some motion.
     pub fn are_complete(&self) -> bool {
         self.beyond > 0.0
     }
 
-    /// Whether all leaves within `distance` of a point that has moved by so much are among these.
+    /// Whether these include all leaves within `distance` of the point after this motion.
     pub fn has_all(&self, distance: f32, moved: f32) -> bool {
         distance + moved <= self.beyond
     }
@@ -139,7 +135,7 @@ impl Leaves {
         self.leaves.is_full()
     }
 
-    /// Leaves that are now farther than this are passed over.
+    /// Notes that leaves farther than this are skipped.
     pub fn pass(&mut self, distance: f32) {
         let passed = self.then(distance);
         if passed < self.passed {
@@ -147,7 +143,8 @@ impl Leaves {
         }
     }
 
-    /// All leaves are gathered that were not passed over, unless there was no room for one. `slack` is the rounding.
+    /// Ends the collection: all leaves but the skipped ones are included, unless one did not fit. `slack` covers the
+    /// rounding.
     pub fn close(&mut self, slack: f32) {
         self.is_gathering = false;
         if !self.is_over {
@@ -155,7 +152,7 @@ impl Leaves {
         }
     }
 
-    /// The bound at the start of the gathering that is this one now.
+    /// Converts a current bound to one at the start of the collection.
     pub fn then(&self, bound: f32) -> f32 {
         let sum = bound + self.moved;
         sum - sum.abs() * f32::EPSILON
@@ -165,7 +162,7 @@ impl Leaves {
         self.is_over |= self.leaves.push(leaf).is_err();
     }
 
-    /// Keeps the leaves that may be within `distance`.
+    /// Keeps only leaves that may be within `distance`.
     pub fn keep_within(&mut self, distance: f32) {
         self.leaves.retain(|leaf| !(leaf.bound > distance));
     }

@@ -1,4 +1,4 @@
-//! What a tracker remembers from tick to tick: bounds that motion uses up.
+//! A tracker's memory from tick to tick: bounds that motion uses up.
 //!
 //! | part | bounds on |
 //! |---|---|
@@ -9,7 +9,7 @@
 //! | [`depth`] | the depth of an axis' parts |
 //! | [`separation`] | the signed separation |
 //!
-//! One clock counts the motion for all.
+//! One clock counts the motion for all of them.
 
 // Requirement: T-01
 
@@ -31,17 +31,17 @@ use front::Front;
 use range::RangeFront;
 use separation::KnownSeparation;
 
-/// Most units between two tests of a bound. With [`FAR`], the longest bound, it stays below half a turn of a deadline.
+/// Most units between two tests of a bound. Together with [`FAR`], the longest bound, it is less than half a deadline's
+/// range.
 const LONGEST_WAIT: u32 = 1 << 29;
 const _: () = assert!(LONGEST_WAIT < (1 << 31) - FAR as u32 - 1);
 
-/// A tracker's memory.
 #[derive(Clone, Debug)]
 pub(super) struct Memory<const STACK: usize, const OPENED: usize, const RANGE: usize> {
     pub clock: MotionClock,
-    /// Tool and surface at the last tick; none if its motion was not measured, or it ended in an error.
+    /// Tool and surface at the last tick; none if the surface's motion was not measured, or the tick ended in an error.
     last: Option<(Axis, MotionReading)>,
-    /// When all due bounds of the front had last been tested.
+    /// When all due bounds of the front were last tested.
     complete: Reading,
     pub front: Front<OPENED>,
     pub range: RangeFront<RANGE>,
@@ -49,14 +49,14 @@ pub(super) struct Memory<const STACK: usize, const OPENED: usize, const RANGE: u
     pub separation: KnownSeparation,
 }
 
-/// Why a motion is of no use to the bounds.
+/// Why a motion cannot be applied to the bounds.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Lost {
     /// There was no last tick.
     Start,
-    /// The surface's motion was not measured all the way.
+    /// The surface's motion was not measured over the whole time.
     Surface,
-    /// It is too large.
+    /// The motion is too large.
     Jump,
 }
 
@@ -86,7 +86,7 @@ impl<const STACK: usize, const OPENED: usize, const RANGE: usize> Memory<STACK, 
         Ok(moved as u32)
     }
 
-    /// Begins a tick after a motion. Until it is [kept](Self::keep), the next one has no last tick.
+    /// Begins a tick after a motion. Unless the tick is [kept](Self::keep), the next one has no last tick.
     #[inline(always)]
     pub fn begin(&mut self, moved: Result<u32, Lost>) {
         self.last = None;
@@ -102,7 +102,7 @@ impl<const STACK: usize, const OPENED: usize, const RANGE: usize> Memory<STACK, 
         }
     }
 
-    /// Ends a tick, in which all due bounds of the front were tested if it is complete.
+    /// Ends a tick. `is_complete` if all due bounds of the front were tested.
     pub fn keep(&mut self, tool: &impl Tool, motion: Option<MotionReading>, is_complete: bool) {
         self.last = motion.map(|motion| (Axis::of(tool), motion));
         if is_complete {

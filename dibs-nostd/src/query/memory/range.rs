@@ -1,25 +1,25 @@
 //! The front of a range search: the nodes that were opened.
 //!
-//! Of their children some are opened themselves, some are leaves within the range, and the others are farther: those of a
-//! node have one deadline. Leaves within the range are looked at in every tick, all others once the deadline has come.
-//! Nodes that were opened stay so until no place is left; then the front starts anew.
+//! A child of an opened node is opened itself, or a leaf within the range, or farther: all farther children of a node
+//! share one deadline. Leaves within the range are visited in every tick, farther children once the deadline has
+//! passed. Opened nodes stay open until no slot is free; then the front restarts.
 
 use super::clock::{Deadline, MotionClock, Reading};
 use crate::tree::format::{Link, MAX_CHILDREN};
 
-/// After a motion of more units, a 16th to a 32nd of the root sphere's radius, the front starts anew.
+/// After a motion of more units than this, a 16th to a 32nd of the root sphere's radius, the front restarts.
 const JUMP: u32 = 1 << 20;
 
-/// A node whose children are apart.
+/// A node whose children are handled separately.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Opened {
     /// Its children, as a link.
     pub link: u32,
-    /// Of the least bound of those that are farther.
+    /// Deadline of the least bound of the farther children.
     pub deadline: Deadline,
-    /// Children that are opened, a bit each.
+    /// Opened children, one bit each.
     pub opened: u8,
-    /// Leaves that neither their sphere nor their plane has rejected, a bit each.
+    /// Leaves that neither their sphere nor their plane rejected, one bit each.
     pub near: u8,
 }
 
@@ -33,9 +33,9 @@ pub(in crate::query) struct RangeFront<const M: usize> {
 #[derive(Clone, Debug)]
 struct State {
     count: usize,
-    /// When every node had last been looked at, at most [`JUMP`] before the last search; none after an error.
+    /// When every node was last visited, at most [`JUMP`] before the last search; none after an error.
     searched: Option<Reading>,
-    /// The label whose leaves are near.
+    /// The label of the leaves in `near`, if only one is searched.
     part: Option<u8>,
 }
 
@@ -63,7 +63,7 @@ impl<const M: usize> RangeFront<M> {
         self.state.searched = None;
     }
 
-    /// The front at a reading, for a search of the whole surface or of a label's part.
+    /// The front at a reading, for a search of the whole surface or of one label's part.
     pub fn now(&mut self, clock: MotionClock, part: Option<u8>) -> RangeFrontMut<'_> {
         let Self { nodes, state } = self;
         let searched = state.searched.filter(|_| state.part == part);
@@ -77,8 +77,8 @@ impl<const M: usize> RangeFront<M> {
 }
 
 impl RangeFrontMut<'_> {
-    /// The search has ended. Nodes that its budget did not reach are as they were, and stay due; deadlines wrap, so the front
-    /// starts anew where that goes on for long.
+    /// Ends the search. Nodes that the budget did not reach are unchanged and stay due; as deadlines wrap, the front
+    /// restarts if that lasts too long.
     pub fn keep(&mut self, is_whole: bool) {
         self.state.searched = Some(if is_whole { self.clock.now() } else { self.searched });
     }
@@ -87,7 +87,7 @@ impl RangeFrontMut<'_> {
         self.state.count == 0
     }
 
-    /// Opens a node; `None` if there is no place.
+    /// Opens a node; `None` if there is no free slot.
     pub fn open(&mut self, link: u32, deadline: Deadline) -> Option<()> {
         let opened = Opened { link, deadline, opened: 0, near: 0 };
         *self.nodes.get_mut(self.state.count)? = opened;
@@ -95,7 +95,7 @@ impl RangeFrontMut<'_> {
         Some(())
     }
 
-    /// Opens the whole tree, if nothing is opened.
+    /// Opens the roots, if nothing is open.
     pub fn start(&mut self, roots: u32) -> Option<()> {
         let now = self.clock.deadline(0.0);
         for first in (0..roots).step_by(MAX_CHILDREN as usize) {
@@ -116,7 +116,7 @@ impl RangeFrontMut<'_> {
         self.nodes.get_mut(at)
     }
 
-    /// The opened nodes from a place on.
+    /// The opened nodes from an index on.
     pub fn rest(&self, from: usize) -> &[Opened] {
         self.nodes.get(from..self.state.count).unwrap_or_default()
     }

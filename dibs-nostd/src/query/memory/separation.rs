@@ -1,7 +1,7 @@
 //! The last tick's certain separation.
 //!
 //! The signed distance of an axis changes by no more than tool and surface move. So the last interval, widened by the
-//! motion since, holds whatever has become of a search or of the side.
+//! motion since, holds whatever the current search or side gives.
 
 use glam::Vec3;
 
@@ -9,19 +9,19 @@ use super::clock::{MotionClock, Reading};
 use crate::TriangleRow;
 use crate::query::Side;
 
-/// What was certain of the axis' signed distance (mm) from the table's positions.
+/// A certain interval of the axis' signed distance (mm) to the table's positions.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Certain {
     pub lower: f32,
     pub upper: f32,
-    /// The pair of the upper end.
+    /// The pair that gave the upper end.
     pub side: Side,
     pub axis_parameter: f32,
     pub triangle: Option<TriangleRow>,
     pub direction: Vec3,
 }
 
-/// The last one, and when it was certain.
+/// The last certain interval, and its reading.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct KnownSeparation {
     last: Option<(Certain, Reading)>,
@@ -38,13 +38,13 @@ impl KnownSeparation {
         self.last = Some((certain, clock.now()));
     }
 
-    /// What was certain then.
+    /// The interval at its reading.
     #[inline(always)]
     pub fn last(&self) -> Option<&Certain> {
         self.last.as_ref().map(|(certain, _)| certain)
     }
 
-    /// What is certain now.
+    /// The interval now, widened by the motion since.
     pub fn now(&self, clock: MotionClock) -> Option<Certain> {
         let (certain, at) = self.last?;
         let moved = clock.moved_since(at)?;

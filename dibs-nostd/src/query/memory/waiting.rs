@@ -1,6 +1,6 @@
 //! A subtree that is still to be searched: on a search's stack, or from tick to tick.
 
-/// A subtree that waits for its turn.
+/// A subtree that is still to be searched.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct Waiting {
     /// Lower bound on its distance from the tool's axis.

@@ -11,7 +11,7 @@ use crate::query::{NoSide, Proximity, Side};
 use crate::{Coverage, Index, QueryError, Tool, TriangleRow, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// The answer, where `lower` bounds the unexplored subtrees.
+    /// The answer, given the lower bound `lower` of the unexplored subtrees.
     pub(super) fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
         let NearestPin { row: pin, distance: pin_distance } = self.nearest_pin;
         let radius = self.tool.radius();
@@ -34,7 +34,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
         let separation = axis_distance - radius;
         let left = above_zero(lower) - radius;
-        // Divided by the vector's own length: next to contact the points' rounding differs from the distance's.
+        // Divided by the vector's own length: near contact the points' rounding differs from the distance's.
         let towards = pair.on_axis - pair.on_surface;
         let length = sqrt(towards.length_squared());
         let touches = axis_distance <= 0.0 || length <= 0.0;

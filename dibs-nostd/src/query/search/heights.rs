@@ -1,7 +1,7 @@
 //! Heights: the squares of vertices' distances from the axis.
 //!
-//! A vertex is a corner of several triangles, of one leaf and of the leaves around it. A small table keeps the vertices
-//! seen last, each until another takes its place.
+//! A vertex is a corner of several triangles, in one leaf and in the leaves around it. A small direct-mapped cache
+//! keeps recently seen vertices until another vertex evicts them.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -10,17 +10,17 @@ use super::Search;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 
-/// Places of the table. Neighbouring vertices have rows close together, and the last bits of a row are its place.
+/// Slots of the cache. Neighbouring vertices have rows close together; the last bits of a row select the slot.
 const PLACES: usize = 128;
 
 /// No vertex has this row.
 const NOBODY: u32 = u32::MAX;
-/// No triangle stands for the vertex yet.
+/// No triangle represents the vertex yet.
 const NONE: u32 = u32::MAX;
-/// No triangle need stand for the vertex: a lower one is next to it.
+/// The vertex needs no representative triangle: a lower vertex is next to it.
 const SETTLED: u32 = u32::MAX - 1;
 
-/// A vertex seen from the axis.
+/// A vertex as seen from the axis.
 #[derive(Clone, Copy)]
 pub(super) struct Vertex {
     pub row: u32,
@@ -29,7 +29,7 @@ pub(super) struct Vertex {
     pub position: Vec3,
     /// The shortest vector from the axis.
     pub towards: Vec3,
-    /// A triangle whose lowest corner it is, or [`NONE`], or [`SETTLED`].
+    /// The representative: a triangle whose lowest corner it is, or [`NONE`], or [`SETTLED`].
     standing: u32,
 }
 
@@ -42,19 +42,19 @@ impl Vertex {
         standing: NONE,
     };
 
-    /// The triangle that stands for the vertex, until a lower one is seen next to it.
+    /// The triangle that represents the vertex, until a lower vertex is seen next to it.
     #[inline(always)]
     pub const fn standing(&self) -> Option<u32> {
         if self.standing < SETTLED { Some(self.standing) } else { None }
     }
 }
 
-/// The place of a vertex in the table.
+/// A vertex's slot in the cache.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) struct Place(usize);
 
 impl Place {
-    /// The place that a vertex has if no other corner of its triangle has it.
+    /// The slot of a vertex, unless another corner of its triangle occupies it.
     const fn of(row: u32) -> Self {
         Self(row as usize % PLACES)
     }
@@ -63,7 +63,7 @@ impl Place {
         Self((self.0 + 1) % PLACES)
     }
 
-    /// The places of a triangle's corners, each another one.
+    /// Three different slots for a triangle's corners.
     #[inline(always)]
     fn of_corners([a, b, c]: [u32; 3]) -> [Self; 3] {
         let (first, mut second, mut third) = (Self::of(a), Self::of(b), Self::of(c));
@@ -85,12 +85,12 @@ impl Place {
     }
 }
 
-/// The vertices seen last.
+/// The cache of recently seen vertices.
 pub(super) struct Heights {
-    /// Triangles with another label are left out.
+    /// Only triangles with this label are considered.
     part: Option<u8>,
     places: [Vertex; PLACES],
-    /// Those that have lost their place while a triangle stood for them: at most one for each corner of a triangle.
+    /// Vertices evicted while a triangle represented them: at most one for each corner of a triangle.
     lost: Vec<Vertex, 3>,
 }
 
@@ -116,13 +116,13 @@ impl Heights {
         &self.places[at % PLACES]
     }
 
-    /// A lower vertex is next to the one here.
+    /// Notes that a lower vertex is next to this one.
     #[inline(always)]
     pub fn settle(&mut self, Place(at): Place) {
         self.places[at % PLACES].standing = SETTLED;
     }
 
-    /// A triangle stands for the vertex here, its lowest corner, if none does.
+    /// Makes a triangle represent this vertex, its lowest corner, if none does.
     #[inline(always)]
     pub fn stand(&mut self, Place(at): Place, triangle: u32) {
         let vertex = &mut self.places[at % PLACES];
@@ -131,18 +131,18 @@ impl Heights {
         }
     }
 
-    /// The last vertex that has lost its place.
+    /// The last evicted vertex.
     #[inline(always)]
     pub fn lost(&self) -> Option<&Vertex> {
         self.lost.last()
     }
 
-    /// The last vertex that has lost its place is done with.
+    /// Removes the last evicted vertex.
     pub fn found(&mut self) {
         self.lost.pop();
     }
 
-    /// The least square of a vertex that a triangle stands for.
+    /// The least squared distance of a vertex that a triangle represents.
     pub fn least_standing(&self) -> f32 {
         let standing =
             self.places.iter().chain(&self.lost).filter(|vertex| vertex.standing().is_some());
@@ -156,7 +156,7 @@ impl Heights {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// The places of a triangle's corners, seen now if they were not.
+    /// The slots of a triangle's corners, which are loaded if missing.
     #[inline(always)]
     pub(super) fn places(
         &self,
@@ -170,7 +170,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok([first, second, third])
     }
 
-    /// Looks at a vertex, unless it is in its place.
+    /// Loads a vertex, unless it is in its slot.
     #[inline(always)]
     fn look(&self, heights: &mut Heights, Place(at): Place, row: u32) -> Result<(), QueryError> {
         let vertex = &mut heights.places[at % PLACES];
@@ -187,7 +187,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(())
     }
 
-    /// A vertex's height.
+    /// The distance of a vertex from the axis.
     #[inline(always)]
     pub(super) fn height(&self, heights: &Heights, row: u32) -> Result<f32, QueryError> {
         let vertex = heights.at(Place::of(row));
@@ -198,7 +198,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 }
 
-/// The square of a vertex's distance. Written so that NaN is refused.
+/// The square of a vertex's distance. Written so that NaN is rejected.
 #[inline(always)]
 fn finite(vertex: u32, square: f32) -> Result<f32, QueryError> {
     if square <= f32::MAX { Ok(square) } else { Err(QueryError::Position { vertex }) }

@@ -10,12 +10,12 @@ use crate::tool::{AxisPair, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
-/// Weight of each corner in the mean that a triangle's plane faces.
+/// Weight of each corner in the mean towards which a triangle's plane is turned.
 pub(super) const THIRD: f32 = 1.0 / 3.0;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Tests a leaf that no waiting subtree is nearer than: its vertices against one plane; then each triangle, from
-    /// the first that the plane does not reject, against the same plane and a plane of its own.
+    /// Tests a leaf that is nearer than all waiting subtrees: its vertices against one plane; then each triangle, from
+    /// the first that the plane does not reject, against the same plane and its own.
     #[inline(always)]
     pub(super) fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
         if self.meter.node().is_none() {
@@ -63,7 +63,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.plane_across(normal, point, sqrt(normal.dot(normal)))
     }
 
-    /// The plane perpendicular to the shortest vector from the axis to a point, of this length.
+    /// The plane through a point perpendicular to the shortest vector from the axis to it, of this length.
     #[inline(always)]
     pub(super) fn plane_across(&self, normal: Vec3, point: Vec3, length: f32) -> Plane {
         let on_axis = point - normal;
@@ -93,8 +93,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         }
     }
 
-    /// Tests a triangle against its own plane, and exactly unless that bounds it; the caller has counted the plane. Returns
-    /// a lower bound on its distance, and whether it is the closest so far.
+    /// Tests a triangle against its own plane, and exactly unless the plane rejects it; the caller has counted the
+    /// plane test. Returns a lower bound on its distance, and whether it is the closest so far.
     #[inline(always)]
     pub(super) fn bound_triangle(
         &mut self,
@@ -121,8 +121,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok((distance, is_closest))
     }
 
-    /// A triangle's excess over the plane of its own that bounds those beyond the cutoff, and the length of the plane's
-    /// normal. Not a number where a corner is none.
+    /// A triangle's excess beyond the cutoff along its own plane's normal, and the length of that normal. NaN if a
+    /// corner is not finite.
     #[inline(always)]
     pub(super) fn excess(&self, &[a, b, c]: &[Vec3; 3]) -> (f32, f32) {
         let middle = (a + b + c) * THIRD;
@@ -132,7 +132,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         (least([a, b, c].map(|corner| plane.normal.dot(corner))) - plane.limit, length)
     }
 
-    /// A triangle is the closest so far.
+    /// Records a triangle as the closest so far.
     #[inline(always)]
     fn improve(&mut self, triangle: u32, pair: AxisPair, distance: f32) {
         self.best_squared = pair.distance_squared;
@@ -144,7 +144,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         }
     }
 
-    /// Collects a triangle if it may be the closest; `square` bounds the square of its distance.
+    /// Collects a triangle if it may be the closest; `square` is a bound on its squared distance.
     #[inline(always)]
     pub(super) fn add_tie(&mut self, triangle: u32, square: f32) {
         if square <= self.tie_squared
@@ -154,7 +154,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         }
     }
 
-    /// The corner of a triangle that is not finite; the first where all are finite.
+    /// The corner of a triangle that is not finite; the first if all are finite.
     #[cold]
     pub(super) fn not_finite(&self, triangle: u32) -> u32 {
         let rows = self.tree.triangle(triangle).unwrap_or_default();

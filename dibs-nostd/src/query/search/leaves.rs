@@ -1,10 +1,10 @@
-//! The search for the leaves around a point of the axis, and in them.
+//! The search for the leaves around a point of the axis, and the search within them.
 //!
-//! A search that goes farther than the closest triangle gathers them, each with a bound. The next ticks look only at those
-//! whose bounds have run out.
+//! A search that goes farther than the closest triangle collects these leaves, each with a bound. The next ticks test
+//! only leaves whose bounds have run out.
 //!
-//! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the slack of this
-//! one.
+//! Rounding. A bound is stored minus the slack of its own search, and compared with a cutoff that includes the slack of
+//! the current search.
 
 use heapless::VecView;
 
@@ -17,17 +17,17 @@ use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
-/// A search goes as much farther as tool and surface move in so many ticks, but not more than twice as far, and less where
+/// A search goes farther by the motion of tool and surface in so many ticks, to at most twice the distance, and less if
 /// there are too many leaves.
 const TICKS: f32 = 60.0;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Whether the leaves hold the closest triangle. The search's point is as far as `way` from theirs.
+    /// Whether the leaves contain the closest triangle. The search's point is `way` (mm) from the leaves' point.
     pub fn is_among(&self, leaves: &Leaves, way: f32) -> bool {
         leaves.has_all(self.cutoff + self.coordinate_slack, leaves.moved(way))
     }
 
-    /// Searches these leaves alone.
+    /// Searches only these leaves.
     pub fn among(mut self, leaves: &mut Leaves, way: f32) -> Result<Proximity, QueryError> {
         let moved = leaves.moved(way);
         let slack = self.slack + self.coordinate_slack;
@@ -48,9 +48,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.finish(f32::INFINITY)
     }
 
-    /// Searches the tree, and gathers the leaves around the point; where the budget ended, the subtrees left wait for the next
-    /// call. What was found in several calls is no answer, but leaves that have one.
-    #[cold] // Some sixty ticks apart.
+    /// Searches the tree and collects the leaves around the point; if the budget ends, the remaining subtrees wait for
+    /// the next call. A search that took several calls gives no answer itself, but leaves that contain it.
+    #[cold] // About once in sixty ticks.
     #[inline(never)]
     pub fn gather(
         mut self,
@@ -100,7 +100,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(found)
     }
 
-    /// Goes on with the subtrees that wait.
+    /// Continues with the waiting subtrees.
     #[cold]
     fn resume(
         &mut self,
@@ -119,7 +119,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(())
     }
 
-    /// Leaves the rest for another call.
+    /// Keeps the remaining subtrees for another call.
     #[cold]
     fn leave(
         &mut self,
@@ -131,13 +131,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         leaves.pass(self.cutoff - self.slack + wider);
         let rest = self.stack.iter().take(self.waiting).chain([&unfinished]);
         for &Waiting { lower, link } in rest {
-            // There is as much room as on the stack.
+            // It has as much room as the stack.
             let _ = waiting.push(Waiting { lower: leaves.then(lower), link });
         }
         self.finish(0.0)
     }
 
-    /// Tests a leaf; a lower bound on its distance, or `None` out of budget.
+    /// Tests a leaf. Returns a lower bound on its distance, or `None` if out of budget.
     fn leaf_bound(&mut self, first: u32, count: u32) -> Result<Option<f32>, QueryError> {
         if self.meter.node().is_none() {
             return Ok(None);

@@ -1,14 +1,14 @@
-//! A leaf's triangles that may be the lowest of their surroundings.
+//! A leaf's triangles that may be a local minimum of the distance.
 //!
-//! The square of the distance from the axis is convex in space, and twice the vector from the axis is its gradient. So
-//! over a triangle it is at least the value at the lowest corner plus the least rise towards the other two. Where that
-//! is no more than `ridge / 2` below the corner's distance, and no more than a 512th of it, and a vertex next to that
-//! corner is lower, the triangle is not the lowest: the triangles around the corner lead down, over no ridge of that
-//! height. Where the triangle's lowest point is on an edge, and the vertex beyond it is lower, neither is it. All others
-//! may be.
+//! The square of the distance from the axis is convex in space, and its gradient is twice the vector from the axis. So
+//! over a triangle it is at least the value at the lowest corner plus the least rise towards the other two. If that is
+//! at most `ridge / 2` below the corner's distance, and at most a 512th of it, and a vertex next to that corner is
+//! lower, the triangle is no local minimum: the triangles around the corner lead down, over no ridge of that height.
+//! Nor is it if its lowest point is on an edge and the opposite vertex of the edge's other triangle is lower. All other
+//! triangles may be local minima.
 //!
-//! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, `ridge / 2`
-//! above the first one at most.
+//! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, at most
+//! `ridge / 2` above the first one.
 
 use glam::Vec3;
 
@@ -18,23 +18,22 @@ use crate::tool::{AxisPair, SLIVER, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
-/// Most triangles that are turned through around a vertex.
+/// Most triangles visited around a vertex.
 pub(super) const MAX_RING: u32 = 256;
 
-/// A fall by no more than this part of the square of a distance is none: a ridge of a 512th of the distance.
+/// A fall by less than this fraction of the squared distance is ignored: a ridge of a 512th of the distance.
 const FLAT: f32 = 1.0 / 256.0;
 
-/// A triangle, seen from the axis.
+/// A triangle as seen from the axis.
 struct Seen {
-    /// The place of its lowest corner.
     lowest: Place,
     /// Lower bound on the square of its distance.
     low: f32,
-    /// Where it may be lower than its lowest corner.
+    /// Whether and where it may be lower than its lowest corner.
     dip: Dip,
 }
 
-/// Where a triangle may be lower than its lowest corner, by more than counts.
+/// Where a triangle may be lower than its lowest corner by more than the tolerance.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Dip {
     Nowhere,
@@ -44,11 +43,11 @@ enum Dip {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Visits a leaf's triangles within the cutoff that may be the lowest of their surroundings, but for ridges of
-    /// `ridge`. A visit returns the next limit. Returns the least lower bound on the square of a triangle's distance;
-    /// `None` if the budget was not enough.
+    /// Visits a leaf's triangles within the cutoff that may be local minima, ignoring ridges up to `ridge`. A visit
+    /// returns the next limit. Returns the least lower bound on a triangle's squared distance; `None` if the budget ran
+    /// out.
     ///
-    /// Triangles that stand for their lowest corners are visited later, once these lose their places in the table.
+    /// Triangles that represent their lowest corners are visited later, when the cache evicts these.
     #[inline(never)]
     pub(super) fn visit_low(
         &mut self,
@@ -97,8 +96,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Some(least))
     }
 
-    /// Visits the triangle that stands for a vertex, unless a lower one is next to that. Others around it may face the
-    /// tool, so it is visited on either side. Returns whether the budget was enough.
+    /// Visits the triangle that represents a vertex, unless a lower vertex is next to it. Its side is not checked,
+    /// since other triangles around the vertex may face the tool. Returns `false` if the budget ran out.
     pub(super) fn visit_standing(
         &mut self,
         vertex: &Vertex,
@@ -113,7 +112,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         }
     }
 
-    /// Tests a triangle exactly. Returns whether the budget was enough.
+    /// Tests a triangle exactly. Returns `false` if the budget ran out.
     #[inline(always)]
     fn visit_triangle(
         &mut self,
@@ -155,7 +154,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if least >= self.tilt_slack {
             return Ok(Seen { lowest, low: square - self.tilt_slack, dip: Dip::Nowhere });
         }
-        // The rounding of a rise is less than the tilt's slack, and so is that of the square.
+        // The slack of the tilt covers the rounding of a rise and of the square.
         let fall = (if least < 0.0 { -2.0 * least } else { 0.0 }) + 3.0 * self.tilt_slack;
         // `h - sqrt(h^2 - fall) <= ridge / 2` without roots: `fall + ridge^2 / 4 <= ridge h`.
         let quarter = 0.25 * ridge * ridge;
@@ -172,10 +171,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Seen { lowest, low: square - fall, dip })
     }
 
-    /// Whether a triangle of a closed surface is seen from outside, as far as known. `None` without budget.
+    /// Whether a triangle of a closed surface is seen from outside, as far as known. `None` if the budget ran out.
     #[inline(always)]
     fn is_outside(&mut self, triangle: u32, heights: &Heights) -> Result<Option<bool>, QueryError> {
-        // At the border of a part, the edge's other triangle is left out.
+        // At the border of a label's part, the edge's other triangle is left out.
         if !self.tree.is_closed() || heights.is_of_part() {
             return Ok(Some(true));
         }
@@ -185,11 +184,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Some(!self.is_inside(&self.corners(triangle)?)))
     }
 
-    /// Whether the axis is on the inner side of a triangle of a closed surface, wherever it is closest to the triangle. No
-    /// contact is there: if the closest point is on an edge, and the axis outside, it is above the edge's other triangle.
+    /// Whether the axis is on the inner side of a triangle of a closed surface wherever it is closest to the triangle.
+    /// Then there is no contact: if the closest point is on an edge, and the axis outside, it is above the edge's other
+    /// triangle.
     ///
-    /// Along a line in the triangle the axis' closest point moves monotonically, and so does its height over the triangle's
-    /// plane: the largest is at a corner.
+    /// Along a line in the triangle the axis' closest point moves monotonically, and so does its height over the
+    /// triangle's plane: the largest height is at a corner.
     #[inline(always)]
     fn is_inside(&self, corners: &[Vec3; 3]) -> bool {
         let &[a, b, c] = corners;
@@ -207,7 +207,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         is_clear && corners.iter().all(is_below)
     }
 
-    /// Whether no vertex next to a triangle's lowest corner is lower. `None` without budget.
+    /// Whether no vertex next to a triangle's lowest corner is lower. `None` if the budget ran out.
     fn is_lowest(
         &mut self,
         triangle: u32,
@@ -227,7 +227,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         for _ in 0..MAX_RING {
             let edge = if is_back { before(corner) } else { corner };
             let Some((next, other)) = tree.across(row, edge) else {
-                // At a border: from the first triangle the other way.
+                // At a border: from the first triangle in the other direction.
                 if is_back {
                     break;
                 }
@@ -241,7 +241,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 return Ok(None);
             }
             (row, corner) = (next, if is_back { other } else { after(other) });
-            // Its corners may be seen again with a triangle that is not left out; if not, one more triangle is low.
+            // Its corners may be seen again with a triangle of the part; if not, one more triangle counts as low.
             if heights.leaves_out(tree, row) {
                 continue;
             }
@@ -254,8 +254,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Some(true))
     }
 
-    /// Whether a triangle whose lowest point seems to be on `edge` may be the lowest. It is not if that point is on the edge
-    /// for certain and the vertex beyond is lower, nor if the axis is inside of it. `None` without budget.
+    /// Whether a triangle whose lowest point seems to be on `edge` may be a local minimum. It is not if that point is
+    /// certainly on the edge and the vertex beyond is lower, nor if the axis is on its inner side. `None` if the budget
+    /// ran out.
     fn may_be_low_at_edge(
         &mut self,
         triangle: u32,
@@ -277,9 +278,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.is_outside(triangle, heights)
     }
 
-    /// Whether a triangle's lowest point is on an edge for certain: from the whole edge it rises towards the third corner.
-    /// Half the gradient at a point is the vector to it from the axis' closest point. Along the edge both change
-    /// monotonically, so the four pairs of ends bound it.
+    /// Whether a triangle's lowest point is certainly on an edge: from the whole edge the distance rises towards the
+    /// third corner. Half the gradient at a point is the vector to it from the axis' closest point. Along the edge both
+    /// change monotonically, so the four pairs of ends bound the rise.
     #[inline(never)]
     fn is_lowest_on(&self, edge: u32, &[a, b, c]: &[Vec3; 3]) -> bool {
         let (from, to, third) = match edge {
@@ -295,7 +296,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         [(from, from), (from, to), (to, from), (to, to)].into_iter().all(rises)
     }
 
-    /// The row and the height of a triangle's corner.
+    /// The vertex row and the height of a triangle's corner.
     fn corner(
         &self,
         triangle: u32,
@@ -309,12 +310,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 }
 
-/// The corner after one, or the edge.
 const fn after(corner: u32) -> u32 {
     if corner == 2 { 0 } else { corner + 1 }
 }
 
-/// The corner before one, or the edge.
 const fn before(corner: u32) -> u32 {
     if corner == 0 { 2 } else { corner - 1 }
 }

@@ -1,11 +1,11 @@
-//! A search's budget, and what is left of it.
+//! A search's budget, and how much of it is left.
 
 // Requirement: A-05
 
 use crate::Budget;
 use crate::query::made::Tests;
 
-/// Counts the tests of a search. A count that the budget does not cover is `None`, and counts nothing.
+/// Counts the tests of a search. If the budget does not cover a test, the call returns `None` and counts nothing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meter {
     all: u32,
@@ -18,14 +18,14 @@ impl Meter {
         Self { all: budget.tests(), left: budget.tests(), triangle_tests: 0 }
     }
 
-    /// The same within another budget, before any test but that of a warm triangle.
+    /// The same with another budget, before any test but that of a warm triangle.
     pub const fn within(self, budget: Budget) -> Self {
         let warm = self.triangle_tests.wrapping_mul(Budget::TRIANGLE);
         Self { all: budget.tests().wrapping_add(warm), left: budget.tests(), ..self }
     }
 
-    /// The exact test of a warm triangle, on top of a budget that could cover it: so a larger one never leaves less for the
-    /// rest.
+    /// The exact test of a warm triangle. It is not taken off a budget that could cover it, so a larger budget never
+    /// leaves less for the rest.
     #[inline(always)]
     pub fn warm_triangle(&mut self) -> Option<()> {
         self.left.checked_sub(Budget::TRIANGLE)?;
@@ -54,14 +54,14 @@ impl Meter {
         Some(())
     }
 
-    /// A test of a triangle's plane, with an exact test to spare that may follow.
+    /// A test of a triangle's plane, if the budget also covers the exact test that may follow.
     #[inline(always)]
     pub fn triangle_plane(&mut self) -> Option<()> {
         self.left.checked_sub(1 + Budget::TRIANGLE)?;
         self.node()
     }
 
-    /// The exact test that was to spare.
+    /// The exact test after such a plane test.
     #[inline(always)]
     pub fn spare_triangle(&mut self) {
         self.left = self.left.wrapping_sub(Budget::TRIANGLE);

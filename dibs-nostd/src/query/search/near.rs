@@ -1,4 +1,4 @@
-//! All low triangles within a distance, instead of the closest.
+//! All locally lowest triangles within a distance, instead of the closest.
 
 use super::heights::{Heights, Place};
 use super::low::MAX_RING;
@@ -15,10 +15,10 @@ use crate::{Budget, Index, Options, VertexTable};
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// A search over a range, with the budget of `options`.
     ///
-    /// In a sound tree it tests each node's sphere once. It looks at each triangle once, at the vertex beyond one edge of
-    /// it, and at its side, and tests it exactly twice at most. Each triangle stands for one vertex at most, and has it
-    /// turned round once, past [`MAX_RING`] triangles at most. So this bound is never met; if corrupt bytes form a loop, it
-    /// ends the search.
+    /// In a sound tree it tests each node's sphere once. It reads each triangle once, the vertex beyond one of its
+    /// edges, and its side, and tests it exactly at most twice. Each triangle represents at most one vertex, around
+    /// which at most [`MAX_RING`] triangles are visited once. So this bound is never reached; if corrupt bytes form a
+    /// loop, it ends the search.
     pub fn over_range(mut self, options: &Options) -> Self {
         let header = self.tree.header();
         let most = 3 + MAX_RING + 2 * Budget::TRIANGLE;
@@ -27,9 +27,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self
     }
 
-    /// Visits every triangle within `limit` of the axis that may be the lowest of its surroundings, but for ridges of
-    /// `ridge`, with its pair. A visit returns the next limit. Unvisited ones are at least as far as
-    /// the distance returned; the budget is the tests made. With a label, only that `part` of the surface is visited.
+    /// Visits, with its pair, every triangle within `limit` of the axis that may be a local minimum, ignoring ridges up
+    /// to `ridge`. A visit returns the next limit. Returns a lower bound on the distance of unvisited triangles; the
+    /// tests made are in `budget`. With a label, only that `part` of the surface is visited.
     pub fn each_low(
         mut self,
         limit: f32,
@@ -49,8 +49,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok((least, self.meter.made()))
     }
 
-    /// Visits the triangles of the waiting subtrees. Returns a lower bound on the distance of the rest if the budget was not
-    /// enough.
+    /// Visits the triangles of the waiting subtrees. If the budget runs out, returns a lower bound on the distance of
+    /// the rest.
     #[inline(always)]
     pub(super) fn visit_waiting(
         &mut self,
@@ -81,7 +81,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(None)
     }
 
-    /// Visits the triangles that still stand for a vertex. Returns whether the budget was enough.
+    /// Visits the triangles that still represent a vertex. Returns `false` if the budget ran out.
     #[inline(always)]
     pub(super) fn visit_rest(
         &mut self,
@@ -103,7 +103,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 }
 
-/// Lower bound on the distances of the triangles that stand for a vertex: they dip below it by half a ridge at most.
+/// Lower bound on the distances of the triangles that represent a vertex: they reach at most half a ridge below it.
 pub(super) fn least_standing(heights: &Heights, ridge: f32) -> f32 {
     sqrt(heights.least_standing()) - 0.5 * ridge
 }

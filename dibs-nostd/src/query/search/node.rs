@@ -10,9 +10,9 @@ use crate::{Index, Tool, VertexTable};
 
 /// For the closest pair: a pin lowers the cutoff.
 pub(super) const CLOSEST: u8 = 0;
-/// For all that is within the cutoff.
+/// For everything within the cutoff.
 pub(super) const RANGE: u8 = 1;
-/// For the closest pair and the leaves that are a little farther; their planes are tested when they are popped.
+/// For the closest pair and the leaves up to a distance beyond it; their planes are tested when they are popped.
 pub(super) const AROUND: u8 = 2;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
@@ -41,18 +41,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Some(())
     }
 
-    /// The least lower bound of the waiting subtrees and of one that was not finished.
+    /// The least lower bound of the waiting subtrees and an unfinished one.
     #[inline(always)]
     pub(super) fn least_waiting(&self, lower: f32) -> f32 {
         let waiting = self.stack.iter().take(self.waiting).map(|left| left.lower);
-        // The distance of a pin that is not a number gives no bound.
+        // A pin at a distance of NaN gives no bound.
         let known = |lower: f32| if lower.is_nan() { 0.0 } else { lower };
         let least = |least, lower| if known(lower) < least { known(lower) } else { least };
         waiting.fold(known(lower), least)
     }
 
-    /// Tests the spheres of a node's children, and the planes of those that are leaves, up to `wider` (mm) beyond the
-    /// cutoff; pushes the rest. The caller has counted the spheres. Each child's bound is at least its parent's, so the
+    /// Tests the spheres of a node's children, and the planes of its leaves, up to `wider` (mm) beyond the cutoff;
+    /// pushes the rest. The caller has counted the spheres. Each child's bound is at least its parent's, so the
     /// certified bound never falls.
     #[inline(always)]
     pub(super) fn expand<const KIND: u8>(
@@ -71,7 +71,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let normal = self.tool.axis_to(position);
             let squared = normal.dot(normal);
             let far = if KIND == AROUND { self.cutoff + wider } else { self.cutoff } + radius;
-            // A NaN counts as near: the leaves below name the vertex that it comes from.
+            // NaN counts as near: the leaves below report the vertex that it comes from.
             if squared > far * far {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! The range search from the front of the last one on, for rounding see [`tick`](super::tick).
+//! The range search that continues from the front of the last one; for rounding see [`tick`](super::tick).
 
 #[cfg(test)]
 mod tests;
@@ -15,8 +15,8 @@ use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// As [`each_low`](Self::each_low), from the front of the last search on. Nodes for which there is no place are searched
-    /// without.
+    /// As [`each_low`](Self::each_low), continuing from the front of the last search. Nodes without a free slot are
+    /// searched from the stack.
     pub fn each_low_from(
         mut self,
         front: &mut RangeFrontMut<'_>,
@@ -56,8 +56,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok((f32::INFINITY, self.meter.made()))
     }
 
-    /// Tests the children that were farther. Those for which there is no place wait on the stack. Returns whether the budget
-    /// was enough.
+    /// Tests the children that were beyond the range. Those without a free slot go on the stack. Returns `false` if the
+    /// budget ran out.
     #[inline(always)]
     fn look_farther(
         &mut self,
@@ -80,7 +80,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 continue;
             }
             if self.meter.node().is_none() {
-                // The rest stays due.
+                // The remaining children stay due.
                 let deadline = node.deadline;
                 *front.node_mut(at).ok_or(corrupt)? = Opened { link, deadline, opened, near };
                 return Ok(false);
@@ -90,7 +90,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let distance = sqrt(normal.dot(normal));
             let own = distance - child.radius_code as f32 * self.radius_scale;
             let mut deadline = later(own);
-            // A NaN counts as near: the leaves below name the vertex that it comes from.
+            // NaN counts as near: the leaves below report the vertex that it comes from.
             if !(own > self.cutoff) {
                 match Link::decode(child.link) {
                     Link::Children { .. } => {
@@ -122,7 +122,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(true)
     }
 
-    /// Visits the leaves of an opened node within the range. Returns whether the budget was enough.
+    /// Visits the leaves of an opened node within the range. Returns `false` if the budget ran out.
     #[inline(always)]
     fn visit_near(
         &mut self,
@@ -162,12 +162,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(true)
     }
 
-    /// Lower bound on the distances of all that is below the opened nodes from a place on, without what was visited.
+    /// Lower bound on the distances of everything unvisited below the opened nodes from a slot on.
     #[cold]
     fn least_from(&self, front: &RangeFrontMut<'_>, from: usize) -> Result<f32, QueryError> {
         let mut least = f32::INFINITY;
         let mut add = |bound: f32| {
-            // Not a number, or below zero: no bound.
+            // NaN or below zero: no bound.
             let bound = if bound > 0.0 { bound } else { 0.0 };
             if bound < least {
                 least = bound;

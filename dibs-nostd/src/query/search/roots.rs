@@ -1,7 +1,7 @@
-//! The roots besides the first, of a tree over surfaces that share no vertex.
+//! The roots besides the first, in a tree over surfaces that share no vertex.
 //!
 //! No sphere around several such surfaces can be invariant, because nothing bounds how far they move apart. So every
-//! search begins with the spheres of all.
+//! search begins with the spheres of all roots.
 
 // Requirement: A-08
 
@@ -43,7 +43,7 @@ impl Roots {
             let distance = sqrt(tool.axis_distance_squared(pin));
             let radius = root.radius_code as f32 * radius_scale;
             let (reach, coordinate) = (distance + radius, pin.abs().max_element());
-            // A NaN is refused here, since the comparisons below would drop it.
+            // NaN is rejected here, since the comparisons below would drop it.
             if !(reach + coordinate < 1e18) {
                 return Err(QueryError::Position { vertex: root.pin });
             }

@@ -14,7 +14,7 @@ const U: f32 = 1.0 / 16_777_216.0;
 /// Error of a bound `d - R`, in units of `S`: 8 `u` of the pin's distance, 4 `u` of the radius and the difference.
 const BOUND: f32 = 12.0 * U;
 
-/// Error of a plane's comparison in units of `S`, but for [`COORDINATES`] and [`TILT`].
+/// Error of a plane's comparison in units of `S`, without [`COORDINATES`] and [`TILT`].
 const PLANE: f32 = 11.0 * U;
 
 /// Slack of the cutoff, in units of `S`.
@@ -24,12 +24,12 @@ pub(super) const SLACK: f32 = 48.0 * U;
 /// that of the pair's last operations, a root, a difference and the tool's radius.
 pub(super) const ACCURACY: f32 = 24.0 * U;
 
-/// How much farther than the closest distance found a triangle may seem to be that is as close as the closest one to the
-/// axis' point found, in units of `S`.
+/// Tolerance of a tie, in units of `S`: how much farther than the closest distance found a triangle may seem that is as
+/// close to the axis' point as the closest one.
 ///
-/// The pair found is real, so that its distance is at most 4 `u` more than computed, and 3 `u` more from the axis' point
-/// with its rounded parameter: 7 `u`. No triangle that is closest to that point is farther from the axis, nor seems so by
-/// more than [`KERNEL`]. A tracker's lower bound has an error of at most 12 `u`.
+/// The pair found is real, so its distance is at most 4 `u` more than computed, and 3 `u` more from the axis' point
+/// with its rounded parameter: 7 `u`. No triangle that is closest to that point is farther from the axis, nor seems
+/// farther by more than [`KERNEL`]. A tracker's lower bound has an error of at most 12 `u`.
 pub(super) const TIE: f32 = 40.0 * U;
 
 const _: () = {
@@ -43,20 +43,20 @@ const _: () = {
 /// length.
 const DOT: f32 = 3.0 * U;
 
-/// Error of the point on the axis that a plane goes through, in units of `C`.
+/// Error of the axis' point through which a plane goes, in units of `C`.
 const ON_AXIS: f32 = 2.0 * U;
 
-/// Slack of a plane's comparison in units of `C`, since positions enter it as they are. Half of this would do.
+/// Slack of a plane's comparison in units of `C`, since it uses positions unshifted. Half of this would suffice.
 pub(super) const COORDINATES: f32 = 16.0 * U;
 
 /// An axis' deviation from perpendicular to the shortest vector to a point, in units of `S`.
 const PERPENDICULAR: f32 = 16.0 * U;
 
-/// Slack of a plane's comparison in units of `S^2`: an axis' ends, at most `S / 2` away, are beyond the plane by
-/// half of [`PERPENDICULAR`] at most.
+/// Slack of a plane's comparison in units of `S^2`: an axis' ends, at most `S / 2` away, are beyond the plane by at
+/// most half of [`PERPENDICULAR`].
 pub(super) const TILT: f32 = 16.0 * U;
 
 const _: () = assert!(COORDINATES >= 2.0 * DOT + ON_AXIS && TILT >= 0.5 * PERPENDICULAR);
 
-/// A few times the length that the kernels count as zero: the slack and accuracy where tool and surface are one point.
+/// A few times the length that the kernels treat as zero: slack and accuracy if tool and surface are one point.
 pub(super) const FLOOR: f32 = 1e-14;

@@ -1,11 +1,11 @@
-//! A search that begins with the front of the one before, and tests only the bounds that have run out.
+//! A search that starts from the front of the previous one, and tests only the bounds that have run out.
 //!
-//! A child is due again once its bound's deadline is not beyond that of the cutoff. The latter never falls while answers
-//! are exact, since a distance shrinks by no more than the clock counts.
+//! A child is due again once its bound's deadline is not later than the cutoff's. The cutoff's deadline never moves
+//! back while answers are exact, since a distance shrinks by no more than the clock counts.
 //!
-//! Rounding. A bound is stored less the slack of its own search, and compared with the cutoff, which has the slack of
-//! this one: so both errors are covered, whatever their scales. Both slacks include 16 * 2^-24 of the coordinates,
-//! since each frame may round positions anew.
+//! Rounding. A bound is stored minus the slack of its own search, and compared with a cutoff that includes the slack of
+//! the current one: so both errors are covered at any scale. Both slacks include 16 * 2^-24 of the coordinates, since
+//! each frame may round positions anew.
 
 mod facing;
 
@@ -24,32 +24,30 @@ use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, TriangleRow, VertexTable};
 
-/// A motion of this many units, at most a 64th of the root sphere's radius, may be too much for the front.
+/// A motion of more units than this, at most a 64th of the root sphere's radius, may invalidate most of the front.
 const LARGE_STEP: u32 = 1 << 18;
 
-/// The outcome of a tick.
 pub(in crate::query) enum Outcome {
-    /// No part of the surface that was not searched is closer to the axis than `lower`. Whether every bound due was tested;
-    /// whether the front started anew.
+    /// No unsearched part of the surface is closer to the axis than `lower`. `is_complete`: every due bound was tested;
+    /// `restarted`: the front was restarted.
     Ended { lower: f32, is_complete: bool, restarted: bool },
-    /// The front has no free place; the tests made until then.
+    /// The front has no free slot; the tests made until then.
     Full { tests: Tests },
 }
 
-/// One tick.
 pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
     search: Search<'s, 't, I, V, T>,
     front: FrontMut<'f>,
     clock: MotionClock,
-    /// Taken off a bound before it is stored.
+    /// Subtracted from a bound before it is stored.
     margin: f32,
-    /// Distance from the axis beyond which nothing is searched.
+    /// Distance from the axis beyond which the search does not go.
     limit: f32,
     facing: Facing,
 }
 
 impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I, V, T> {
-    /// A tick that looks for surface within `separation` (mm) of the tool.
+    /// A tick that searches for surface within `separation` (mm) of the tool.
     #[inline(always)]
     pub fn new(
         mut search: Search<'s, 't, I, V, T>,
@@ -58,7 +56,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         budget: Budget,
         separation: f32,
     ) -> Self {
-        // A tick tests each node's sphere, each leaf's plane and each triangle twice at most.
+        // A tick tests each node's sphere, each leaf's plane and each triangle at most twice.
         let header = search.tree.header();
         let triangles = header.triangles.saturating_mul(1 + Budget::TRIANGLE);
         let most = header.nodes.saturating_add(triangles).saturating_mul(4);
@@ -96,7 +94,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 }
             }
         }
-        // Nodes opened from now on are tested at once.
+        // Nodes opened from here on are tested at once.
         let (mut from, end) = (0, self.front.used());
         while let Some(at) = self.front.next_due(from..end, self.threshold()) {
             match self.visit(at as u16)? {
@@ -109,7 +107,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                     return Ok(Outcome::Ended { lower, is_complete: false, restarted });
                 }
                 Visit::Full => {
-                    // What is due beyond this node would stay due, and the front full.
+                    // The due bounds after this node would stay due, and the front full.
                     self.front.clear();
                     return Ok(Outcome::Full { tests: self.search.meter.made() });
                 }
@@ -121,12 +119,12 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(Outcome::Ended { lower, is_complete: true, restarted })
     }
 
-    /// The closest triangle, where one was tested.
+    /// The closest triangle, if one was tested.
     pub fn triangle(&self) -> Option<TriangleRow> {
         self.search.best.map(|_| TriangleRow(self.search.best_triangle))
     }
 
-    /// A bound whose deadline is not after this is due.
+    /// A bound is due if its deadline is not later than this.
     #[inline(always)]
     fn threshold(&self) -> Deadline {
         self.clock.within(self.search.cutoff + self.search.coordinate_slack)
@@ -137,7 +135,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         self.clock.deadline(bound - self.margin)
     }
 
-    /// The answer. No part of the surface that was not searched is closer to the axis than `lower`.
+    /// The answer. No unsearched part of the surface is closer to the axis than `lower`.
     #[inline(always)]
     pub fn finish(&mut self, lower: f32) -> Result<Proximity, QueryError> {
         if let Some(place) = *self.front.best {
@@ -145,7 +143,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             *self.deadline_of(place).ok_or(QueryError::Corrupt { row: 0 })? = deadline;
         }
         let mut closest = self.search.finish(lower)?;
-        // A triangle that is closer by less than the accuracy may have been passed over.
+        // A triangle that is closer by less than the accuracy may have been skipped.
         closest.accuracy *= 2.0;
         Ok(closest)
     }
@@ -155,7 +153,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         self.front.node(place.node)?.deadlines.get_mut(usize::from(place.slot))
     }
 
-    /// Tests the bounds that are due below an opened node, and opens the children within the cutoff.
+    /// Tests the due bounds below an opened node, and opens the children within the cutoff.
     fn visit(&mut self, at: u16) -> Result<Visit, QueryError> {
         if let Step::OutOfBudget = self.test_due(at)? {
             return Ok(Visit::OutOfBudget);
@@ -182,7 +180,6 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(Visit::Done)
     }
 
-    /// The node in a place.
     #[inline(always)]
     fn record(&mut self, place: Place) -> Option<Node> {
         match Link::decode(self.front.node(place.node)?.link) {
@@ -201,13 +198,13 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Some(())
     }
 
-    /// Tests the children of an opened node that are due.
+    /// Tests the due children of an opened node.
     fn test_due(&mut self, at: u16) -> Result<Step, QueryError> {
         let corrupt = QueryError::Corrupt { row: u32::from(at) };
         let threshold = self.threshold();
         let opened = self.front.node(at).ok_or(corrupt)?;
         let (step, count) = match Link::decode(opened.link) {
-            // A free place falls due once the clock has counted `FAR` units; it is scheduled anew.
+            // A free slot becomes due after `FAR` units of motion; it is rescheduled.
             _ if opened.link == UNUSED => (Step::Done, 0),
             Link::Children { first, count } => {
                 let due = opened.due(count, threshold);
@@ -297,8 +294,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(Step::Done)
     }
 
-    /// Tests a triangle against its own plane, then exactly. Returns a bound, unless it is the closest so far, which has
-    /// none.
+    /// Tests a triangle against its own plane, then exactly. Returns a bound; none if it is the closest so far.
     fn test_closely(
         &mut self,
         triangle: u32,
@@ -318,7 +314,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         Ok(None)
     }
 
-    /// Tests some opened nodes, in turn from tick to tick, and closes those whose own spheres bound them as well.
+    /// Tests some opened nodes, in turn from tick to tick, and closes those whose own sphere gives a sufficient bound.
     #[inline(always)]
     fn close_some(&mut self, number: u32) -> Result<(), QueryError> {
         let corrupt = QueryError::Corrupt { row: 0 };
@@ -352,7 +348,7 @@ enum Visit {
     Full,
 }
 
-/// Takes the first element out of a set.
+/// Removes the lowest element of a set.
 #[inline(always)]
 fn next(set: &mut u32) -> Option<u8> {
     let rest = *set & set.checked_sub(1)?;

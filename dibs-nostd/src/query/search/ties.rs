@@ -1,8 +1,9 @@
 //! The triangles that may be the closest one, or share its closest point.
 //!
-//! A search finds one closest triangle, with an error. The true one, and all others that share its closest point, are as
-//! close within [`TIE`], and no bound rejects them: the slack of the cutoff is larger. So a search collects every
-//! triangle that it tests within that window, and a tracker those that it passes over, too. They decide the side.
+//! A search finds one closest triangle, with an error. The true closest one, and all others that share its closest
+//! point, are as close within [`TIE`], and no bound rejects them: the slack of the cutoff is larger. So a search
+//! collects every triangle that it tests within that tolerance, and a tracker also those that it skips. They decide the
+//! side.
 
 use heapless::Vec;
 
@@ -16,7 +17,7 @@ use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
-/// Most of them. Six or so share a vertex.
+/// Most triangles kept. Usually about six share a vertex.
 const MOST: usize = 32;
 
 /// A triangle about as close as the closest.
@@ -31,13 +32,13 @@ struct Tie {
 #[derive(Clone, Debug)]
 pub(in crate::query) struct Ties {
     rows: Vec<Tie, MOST>,
-    /// Square of the distance up to which a triangle counts.
+    /// Square of the distance up to which triangles are collected.
     limit: f32,
-    /// Square of the distance up to which the axis may meet it; negative if nobody asks.
+    /// Square of the distance up to which the axis may touch a triangle; negative if not needed.
     touching: f32,
-    /// There were too many, or the search did not look for all.
+    /// There were too many, or the search did not collect all.
     are_lost: bool,
-    /// They are the triangles that meet in one feature.
+    /// They are all the triangles that meet in one feature.
     are_star: bool,
 }
 
@@ -47,18 +48,18 @@ impl Ties {
         Self { rows, limit: -1.0, touching: -1.0, are_lost: true, are_star: false }
     }
 
-    /// The triangles that meet in a feature, to which they are added.
+    /// An empty list for the triangles that meet in a feature.
     pub const fn star() -> Self {
         let rows = Vec::new();
         Self { rows, limit: -1.0, touching: -1.0, are_lost: false, are_star: true }
     }
 
-    /// Adds a triangle of a star.
+    /// Adds a triangle that meets in the feature.
     pub fn add(&mut self, row: u32) {
         self.push(row, 0.0, 0.0);
     }
 
-    /// Forgets all. `is_crossable` if the axis can meet the surface, which is closed.
+    /// Clears the list. `is_crossable` if the axis can touch the surface and the surface is closed.
     #[inline(always)]
     pub(super) fn reset(&mut self, scale: f32, is_crossable: bool) {
         let accuracy = ACCURACY * scale + FLOOR;
@@ -68,7 +69,7 @@ impl Ties {
         (self.are_lost, self.are_star) = (false, false);
     }
 
-    /// Keeps those that are asked for.
+    /// Keeps the triangles that satisfy a condition.
     pub fn keep(&mut self, is_kept: impl Fn(u32) -> bool) {
         for tie in &mut self.rows {
             if !is_kept(tie.row) {
@@ -77,22 +78,22 @@ impl Ties {
         }
     }
 
-    /// Whether there are too many.
+    /// Whether triangles may be missing.
     pub const fn are_lost(&self) -> bool {
         self.are_lost
     }
 
-    /// Some may be missing.
+    /// Notes that triangles may be missing.
     #[inline(always)]
     pub(super) const fn lose(&mut self) {
         self.are_lost = true;
     }
 
-    /// Adds a triangle, where those within `limit` count.
+    /// Adds a triangle, if the limit is `limit`.
     #[inline(always)]
     pub(super) fn push(&mut self, row: u32, square: f32, limit: f32) {
         self.limit = limit;
-        // Otherwise each of thousands as close would look for room anew.
+        // Otherwise each of thousands of tied triangles would try to make room again.
         if self.are_lost {
             return;
         }
@@ -102,7 +103,7 @@ impl Ties {
         self.are_lost = self.rows.push(Tie { row, square }).is_err();
     }
 
-    /// Makes room.
+    /// Makes room by dropping triangles beyond the limit.
     #[cold]
     #[inline(never)]
     fn drop_farther(&mut self) {
@@ -113,23 +114,24 @@ impl Ties {
         self.rows.iter().filter(move |tie| tie.square <= limit).map(|tie| tie.row)
     }
 
-    /// All triangles that may be the closest, or share its closest point. `None` if they are not known.
+    /// All triangles that may be the closest, or share its closest point. `None` if unknown.
     pub fn rows(&self) -> Option<impl Iterator<Item = u32>> {
         (!self.are_lost).then(|| self.within(self.limit))
     }
 
-    /// Those that decide the side in f64: all. If too many meet in one feature, the first, since each stands for the feature.
+    /// The triangles that decide the side in f64: all. If too many meet in one feature, the first, since each
+    /// represents the feature.
     pub fn deciding(&self) -> Option<impl Iterator<Item = u32>> {
         let most = if self.are_lost { usize::from(self.are_star) } else { MOST };
         (most > 0).then(|| self.within(self.limit).take(most))
     }
 
-    /// Whether the triangles that the axis may meet are known.
+    /// Whether the triangles that the axis may touch are known.
     pub fn has_touched(&self) -> bool {
         !self.are_lost && self.touching >= 0.0
     }
 
-    /// The first triangle that the axis may meet, from a place on, and its place. A loop over an iterator of them takes
+    /// The first triangle at or after an index that the axis may touch, with its index. A loop over an iterator takes
     /// three times the code.
     pub fn touched_from(&self, place: usize) -> Option<(usize, u32)> {
         let mut rest = self.rows.iter().enumerate().skip(place);
@@ -137,7 +139,7 @@ impl Ties {
     }
 }
 
-/// The square of the distance up to which a triangle counts, where the closest is at `distance`.
+/// The square of the distance up to which triangles tie with the closest, at `distance`.
 #[inline(always)]
 pub(super) fn limit_of(distance: f32, scale: f32) -> f32 {
     let limit = distance + (TIE * scale + FLOOR);
@@ -145,8 +147,8 @@ pub(super) fn limit_of(distance: f32, scale: f32) -> f32 {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Visits every triangle that may be the closest, or share its closest point, for a search that began with the
-    /// closest one. A visit returns whether it goes on. Returns whether all were visited, and the tests made.
+    /// Visits every triangle that may be the closest, or share its closest point, for a search that started at the
+    /// closest one. A visit returns whether to continue. Returns whether all were visited, and the tests made.
     #[cold]
     #[inline(never)]
     pub fn each_tie(

@@ -1,8 +1,8 @@
 //! The wide search: batches of up to seven subtrees.
 //!
-//! A search of one subtree at a time is a chain of dependences: its distances decide which is next, and each child
-//! costs a branch that no processor predicts. This takes half of a query's time on a large processor. A batch overlaps
-//! the loads and roots of all its children, compares four children by one instruction, and sorts the rest without
+//! A search of one subtree at a time is a chain of dependences: its distances decide which subtree is next, and each
+//! child costs an unpredictable branch. This takes half of a query's time on a large processor. A batch overlaps the
+//! loads and square roots of all its children, compares four children by one instruction, and sorts the rest without
 //! branches.
 //!
 //! Batching wastes few tests: most queued subtrees would be visited anyway. It often saves some, because the
@@ -22,27 +22,26 @@ use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
 /// Most subtrees in a batch. A larger batch hides more latency but prunes with an older bound. The set of its children
-/// must fit in a word of 64 bits.
+/// must fit in 64 bits.
 const SUBTREES: usize = 7;
 const MOST: usize = SUBTREES * MAX_CHILDREN as usize;
 const BLOCKS: usize = MOST / 4;
 const MOST_NODE_BYTES: usize = node_bytes::<u32>();
-/// Most entries that a batch of several subtrees leaves on the stack, so that counts do not depend on the stack's
-/// size as long as it is large.
+/// Most entries that a batch of several subtrees leaves on the stack, so that test counts do not depend on the size of
+/// a large stack.
 const MOST_WAITING: usize = 128;
 
-/// A search by batches.
 pub(in crate::query) struct WideSearch<'s, 't, I, V: ?Sized, T> {
     search: Search<'s, 't, I, V, T>,
-    /// Most entries that a batch of several subtrees may leave: the rest of the stack is enough for one subtree at a
+    /// Most entries that a batch of several subtrees may leave: the rest of the stack suffices for one subtree at a
     /// time.
     room: usize,
     /// Records of the batch's children. Other nodes fill the last block of four: their pins may lower the cutoff, but
     /// they are not compared with it.
     records: [u8; (MOST + MAX_CHILDREN as usize) * MOST_NODE_BYTES],
-    /// Lower bounds of the children's parents.
+    /// Lower bounds inherited from the children's parents.
     parents: [f32; MOST + MAX_CHILDREN as usize],
-    /// Squares of the distances of their pins.
+    /// Squared distances of the children's pins.
     squares: [Vec4; BLOCKS],
     lowers: [[f32; 4]; BLOCKS],
     /// Sorting keys of the children below the cutoff.
@@ -63,7 +62,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         }
     }
 
-    /// Visits subtrees, near ones first, until none below the cutoff is left or the budget runs out.
+    /// Visits subtrees, nearest first, until none is below the cutoff or the budget runs out.
     pub fn run(mut self) -> Result<Proximity, QueryError> {
         while let Some(top) = self.search.waiting.checked_sub(1) {
             let corrupt = QueryError::Corrupt { row: top as u32 };
@@ -105,7 +104,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
     }
 
     /// Copies the children of the nearest subtrees, as many as the stack has room for. Returns the numbers of subtrees
-    /// and children; a subtree that is above the cutoff by now adds no children.
+    /// and children; a subtree above the current cutoff adds no children.
     #[inline(always)]
     fn take(&mut self) -> Option<(usize, usize)> {
         let Self { search, room, records, parents, .. } = self;
@@ -170,7 +169,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
             let codes = nodes.map(|node| node.radius_code as i32 as f32);
             let radius = Vec4::from_array(codes) * scale;
             let far = cutoff + radius;
-            // A NaN counts as near: the leaves below name the vertex that it comes from.
+            // NaN counts as near: the leaves below report the vertex that it comes from.
             let within = !squared.cmpgt(far * far).bitmask() & 0xF;
             near = near << 4 | u64::from(within);
             let links = Vec4::from_array(nodes.map(|node| f32::from_bits(node.link)));
@@ -183,7 +182,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
     }
 }
 
-/// Takes the first element out of a set.
+/// Removes the lowest element of a set.
 #[inline(always)]
 fn next(set: &mut u64) -> Option<usize> {
     let rest = *set & set.checked_sub(1)?;

@@ -1,4 +1,4 @@
-//! A tick's closest pair with all contacts, in one budget.
+//! A tick's closest pair and all contacts, within one budget.
 
 use super::{Purpose, Tracker, TrackerAnswer};
 use crate::query::contacts::Pair;
@@ -9,18 +9,19 @@ use crate::{Index, MovingSurface, Tool};
 impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     Tracker<'_, I, STACK, OPENED, RANGE>
 {
-    /// The closest pair, and all contacts within `margin` (mm): those of [`Query::contacts`](crate::Query::contacts).
+    /// The closest pair, and all contacts within `margin` (mm), as in [`Query::contacts`](crate::Query::contacts).
     ///
-    /// Where the surface is within the margin, a range search finds the others. The tracker remembers the nodes that it
-    /// opened, up to `RANGE`, and for how long their other children are beyond the margin. It starts anew for another surface, for a tool as
-    /// far from the last as a 16th of the root sphere's radius, and once all places are used
-    /// ([`opened_in_range`](Self::opened_in_range)). Where the budget ends, the list's bound can be less than a query's, which looks at near parts first.
+    /// Where the surface is within the margin, a range search finds the other contacts. The tracker remembers up to
+    /// `RANGE` nodes that it opened, and how long their other children stay beyond the margin. This memory restarts
+    /// for another surface, for a tool that moved by a 16th of the root sphere's radius, and once all slots are used
+    /// ([`opened_in_range`](Self::opened_in_range)). If the budget ends, the list's bound can be lower than a query's,
+    /// which searches near parts first.
     ///
-    /// Cost: that of [`closest`](Self::closest), a few instructions for each opened node, and what a query takes to compare
+    /// Cost: that of [`closest`](Self::closest), a few instructions for each opened node, and a query's comparisons of
     /// the triangles within the margin.
     ///
     /// # Errors
-    /// Those of [`Query::contacts`](crate::Query::contacts).
+    /// Same as [`Query::contacts`](crate::Query::contacts).
     pub fn contacts<S: MovingSurface + ?Sized, T: Tool, const N: usize, const NEAR: usize>(
         &mut self,
         surface: &S,
@@ -59,7 +60,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             None => contacts.add(&pair, &mut self.stack, &rest)?,
         };
         tracked.closest.add_tests(made);
-        // A search that found all but the side has found all contacts: the last tick's side comes after them.
+        // A search that is complete but for the side has found all contacts: the last tick's side is merged after them.
         if !is_cut {
             let TrackerAnswer { closest, is_kept, .. } = &mut tracked;
             let nearest = closest.lower;

@@ -1,8 +1,8 @@
 //! The direction where triangles tie.
 //!
-//! On the medial axis the last digits of a pose decide which triangle is the closest, and a force along its direction would
-//! turn to and fro. So an answer keeps the triangle that led the last one while that may be the closest, as far as the rounding
-//! of the two distances tells: not the error of the positions, within which a nearer wall is the nearer one.
+//! On the medial axis the last digits of a pose decide which triangle is the closest, and a force along its direction
+//! would oscillate. So an answer keeps the last answer's triangle while it may be the closest within the rounding of
+//! the two distances. The position error is not included: within it the nearer wall still counts as nearer.
 
 // Requirement: T-03
 
@@ -19,14 +19,14 @@ use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
 
-/// The cosine of the least turn that is looked at: 8 degrees. As a tool slides along a surface, its direction turns by less
-/// in a tick, and the last triangle need not be tested.
+/// The cosine of the least turn that is examined: 8 degrees. As a tool slides along a surface, its direction turns by
+/// less in a tick, and the last triangle need not be tested.
 const TURNED: f32 = 0.99;
 
 impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     Tracker<'_, I, STACK, OPENED, RANGE>
 {
-    /// Keeps the last tick's direction where the triangle that it led from may still be the closest.
+    /// Keeps the last tick's direction where its triangle may still be the closest.
     #[inline(always)]
     pub(super) fn keep_direction<V: VertexTable + ?Sized, T: Tool>(
         &self,
@@ -43,7 +43,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         }
     }
 
-    /// Takes the last tick's triangle into an answer if it ties with that of the answer, of the same solid and seen from the
+    /// Replaces an answer's triangle by the last tick's if the two tie, belong to the same solid and are seen from the
     /// same side.
     #[cold]
     #[inline(never)]
@@ -61,7 +61,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             return Ok(());
         };
         let is_outside = found.side == Side::Outside;
-        // On an open surface the other sheet may be seen from its inner side.
+        // At an open surface the other sheet may be seen from its inner side.
         let is_possible = match found.side {
             Side::Undefined(_) => false,
             Side::Outside => last.side == Side::Outside && !found.is_cut_short(),
@@ -74,9 +74,9 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let (rows, corners) = corners(tree, vertices, row)?;
         let at = tool.axis_point(found.axis_parameter);
         let closest = sqrt(at.distance_squared(found.point_on_surface));
-        // Of rounding alone: the surface's own error moves both triangles, and within it the nearer one is the wall.
+        // Only rounding: the surface's own error moves both triangles, and within it the nearer one counts.
         let tie = 2.0 * found.accuracy;
-        // A plane across the last pair rejects most triangles that do not tie.
+        // A plane perpendicular to the last pair rejects most triangles that do not tie.
         let (from, across, span) = if is_outside {
             (tool.axis_start(), -last.direction, tool.axis_span())
         } else {

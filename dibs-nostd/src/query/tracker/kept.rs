@@ -1,11 +1,11 @@
-//! What a tick's search left open, from the ticks before.
+//! Fills in what a tick's search left open, from earlier ticks.
 //!
-//! Two intervals hold the signed distance: that of the search, and the last tick's, widened by the motion. So does what they
-//! have in common. It decides most sides that a search leaves open, and where it does not, a constraint acts on its lower
+//! Two intervals hold the signed distance: the search's, and the last tick's widened by the motion. So does their
+//! intersection. It decides most sides that a search leaves open; where it does not, a constraint acts on its lower
 //! end, along the direction of the last pair.
 //!
-//! The side of an open surface is that of its closest sheet, which can change without contact: there the past stands in
-//! only where a search finds no side.
+//! The side of an open surface is that of its closest sheet, which can change without contact: there the last tick is
+//! used only if a search finds no side.
 
 // Requirement: T-02
 
@@ -21,15 +21,15 @@ use crate::tool::AxisPoint;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
 
-/// A pair closer than so many accuracies has no direction of its own.
+/// A pair closer than this many accuracies has no reliable direction.
 pub(super) const DIRECTED: f32 = 8.0;
 
 impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     Tracker<'_, I, STACK, OPENED, RANGE>
 {
-    /// Narrows an answer to what the last tick leaves possible, and remembers it for the next one. Its accuracy is without
-    /// the table's position error, which says nothing of the motion.
-    /// Returns whether the side is the last tick's.
+    /// Narrows an answer to the interval that the last tick allows, and remembers it for the next tick. The answer's
+    /// accuracy is without the table's position error, which does not limit the motion. Returns whether the side is the
+    /// last tick's.
     #[inline(never)]
     pub(super) fn keep_certain<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
@@ -56,7 +56,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
                     found.point_on_tool -= last.direction * tool.radius();
                 }
                 let own = Certain::of(found, tool.radius());
-                // Less is the rounding of two answers.
+                // A smaller gain is the rounding of two answers.
                 let gain = 2.0 * found.accuracy;
                 let is_narrower =
                     |last: &Certain| last.lower > own.lower + gain || last.upper < own.upper - gain;
@@ -73,7 +73,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         Ok(was_open && !matches!(found.side, Side::Undefined(_)))
     }
 
-    /// The answer with a side, within the last tick's interval.
+    /// Narrows an answer with a side to the last tick's interval.
     #[cold]
     fn narrow<V: VertexTable + ?Sized, T: Tool>(
         &self,
@@ -91,19 +91,19 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if last.upper < own.upper {
             both.upper = last.upper;
         }
-        // Impossible: the motion was more than was said.
+        // Impossible: the motion was larger than stated.
         if both.lower > both.upper {
             return Ok(own);
         }
         if last.upper + 2.0 * found.accuracy < own.upper {
-            // The last pair is deeper than any that this search found.
+            // The last pair is deeper than any pair of this search.
             self.take_pair(vertices, tool, options, found, &last)?;
         }
         both.set_ends(found, tool.radius());
         Ok(both.with_pair_of(found))
     }
 
-    /// The answer without a side, with the one that the last tick leaves.
+    /// Gives an answer without a side the side that the last tick allows.
     #[cold]
     fn without_side<V: VertexTable + ?Sized, T: Tool>(
         &self,
@@ -122,7 +122,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if own.upper < both.upper {
             both.upper = own.upper;
         }
-        // No point of the axis is deeper than its way to the pair.
+        // No point of the axis is deeper than its distance to the pair.
         let deepest = -(found.axis_distance + found.accuracy + tool.axis_length()) * (1.0 + SUMS);
         let deepest = if has_depth && own.lower > deepest { own.lower } else { deepest };
         if deepest > both.lower {
@@ -134,7 +134,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             return Ok(Some(both));
         }
         if both.lower > -nearest {
-            // The motion cannot have led inside.
+            // The motion was too small to reach the inside.
             if nearest > both.lower {
                 both.lower = nearest;
             }
@@ -147,7 +147,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             }
         } else {
             if both.upper < nearest {
-                // It cannot have led outside.
+                // The motion was too small to reach the outside.
                 if -nearest < both.upper {
                     both.upper = -nearest;
                 }
@@ -164,7 +164,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         Ok(Some(both.with_pair_of(found)))
     }
 
-    /// Makes the last tick's pair, as it is now, that of the answer.
+    /// Makes the last tick's pair, at its current positions, the answer's pair.
     #[cold]
     fn take_pair<V: VertexTable + ?Sized, T: Tool>(
         &self,
@@ -199,11 +199,11 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     }
 }
 
-/// Rounding of the two sums that lead from a separation to the axis and back, with room for that of the bound itself.
+/// Rounding of the two sums from a separation to the axis and back, with slack for the rounding of the bound itself.
 const SUMS: f32 = 4.0 / 16_777_216.0;
 
 impl Certain {
-    /// What an answer says of the axis.
+    /// The certain interval of an answer for the axis.
     #[inline(always)]
     fn of(found: &Proximity, radius: f32) -> Self {
         let accuracy = found.accuracy;
@@ -225,7 +225,6 @@ impl Certain {
         Self { lower: self.lower, upper: self.upper, ..Self::of(found, 0.0) }
     }
 
-    /// Makes these the ends of an answer.
     #[inline(always)]
     fn set_ends(&self, found: &mut Proximity, radius: f32) {
         found.lower = sum_down(sum_down(self.lower, -radius), found.accuracy);
@@ -236,7 +235,7 @@ impl Certain {
     }
 }
 
-/// Makes an answer's direction that of a tool outside. Returns whether its points are far enough from each other.
+/// Gives an answer the direction of a tool outside. Returns whether its points are far enough apart.
 #[cold]
 fn face_surface(found: &mut Proximity, tool: &impl Tool) -> bool {
     let on_axis = tool.axis_point(found.axis_parameter);

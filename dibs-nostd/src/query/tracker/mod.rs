@@ -1,4 +1,4 @@
-//! The closest pair from tick to tick: a tick costs in proportion to the change.
+//! The closest pair from tick to tick: a tick's cost is proportional to the change.
 
 // Requirement: T-01
 
@@ -20,36 +20,36 @@ use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 
-/// A query that remembers its last answer's proof.
+/// A query that reuses the proof of its last answer.
 ///
 /// A search leaves a *front*: the subtrees rejected by a lower bound and the triangles tested. When the tool moves by
 /// at most `a` (the larger of its ends' steps) and the surface by at most `b`, each of these bounds still holds, less
-/// `a + b`. So a tracker keeps the front from tick to tick, and tests only the bounds that have run out: as a rule some
+/// `a + b`. So a tracker keeps the front from tick to tick, and tests only the bounds that have run out: usually some
 /// ten of a thousand. The answers are those of [`Query::closest`](crate::Query::closest), within their accuracy.
 /// (Fronts of bounding volume trees: Klosowski et al. 1998, Tang et al. 2010. Bounds that expire: kinetic data
 /// structures; Barbič & James 2010.)
 ///
-/// The surface carries its motion, as [`MovingSurface::motion`]; where it was not measured, the tick is a whole query. An
-/// [`Assembler`](crate::Assembler) with a tree's gate measures it for the frames that it publishes, and an
-/// [`Odometer`](crate::Odometer) for other tables.
-/// Another tool counts as a step to its position. The stretch in the options may change from tick to tick: remembered
-/// bounds hold for any.
+/// The surface carries its motion, as [`MovingSurface::motion`]; where it was not measured, the tick is a whole query.
+/// An [`Assembler`](crate::Assembler) with a tree's gate measures it for the frames that it publishes, an
+/// [`Odometer`](crate::Odometer) for other tables. Another tool counts as a step to its position. The stretch in the
+/// options may change from tick to tick: remembered bounds hold for any stretch.
 ///
-/// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children, some hundred
-/// as a rule; the repository's `docs/evidence/guarantees.md` has the most that a beating heart took. If `OPENED` is too small,
-/// ticks are whole queries. Keep it in a `static`: it can be larger than a controller's stack.
+/// `STACK` must be at least [`Tree::stack`]. `OPENED` nodes of the tree are remembered with their children, usually
+/// some hundred; the repository's `docs/evidence/guarantees.md` has the most that a beating heart took. If `OPENED` is
+/// too small, ticks are whole queries. Keep the tracker in a `static`: it can be larger than a controller's stack.
 ///
-/// Where the axis crosses the surface, it remembers which parts of the axis cannot be deepest, and searches those points
-/// that may have become so. A budget is divided: three eighths at most go to the closest pair of an axis that is inside or
-/// crosses, half of one that may be, the rest to the depth. A point's search that the budget ends goes on in the next tick.
+/// Where the axis crosses the surface, the tracker remembers which parts of the axis cannot be deepest, and searches
+/// only points that may have become deepest. A budget is divided: the closest pair gets at most three eighths if the
+/// axis is inside or crossing, half if it may be, and the depth the rest. A point's search that the budget ends
+/// continues in the next tick.
 ///
-/// Where a pose's last digits decide which of several triangles is the closest, a force along its direction would turn to
-/// and fro. So on a closed surface an answer keeps the last tick's triangle while that is no farther than the closest by more
-/// than the rounding of both distances, without the error of the positions: from the axis outside, from the deepest point
-/// where the axis crosses or is inside. Separation, interval and side are the search's. Where the direction would turn by 8 degrees or more, this takes a triangle
-/// test.
+/// Where a pose's last digits decide which of several triangles is the closest, a force along its direction would
+/// oscillate. So at a closed surface an answer keeps the last tick's triangle while it is farther than the closest one
+/// by no more than the rounding of both distances, without the position error: from the axis if outside, from the
+/// deepest point if the axis crosses or is inside. Separation, interval and side are the search's. Where the direction
+/// would turn by 8 degrees or more, this takes one triangle test.
 ///
-/// RAM: 16 bytes for each entry of the stack, 44 for each of the `OPENED`, 12 for each of the `RANGE`, and 1,944.
+/// RAM: 16 bytes for each stack entry, 44 for each of `OPENED`, 12 for each of `RANGE`, plus 1,944.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -82,26 +82,26 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize, const RANGE: 
     triangle: Option<TriangleRow>,
 }
 
-/// The last tick, for those of several trackers.
+/// The last tick, for queries with several trackers.
 #[derive(Clone, Copy, Debug)]
 struct Last {
-    /// No point of the surface is closer to the axis, unless the tool may be inside: then negative infinity.
+    /// A lower bound on the distance from the axis to the surface; negative infinity if the tool may be inside.
     clear: f32,
-    /// The side was asked for.
+    /// Whether the side was asked for.
     is_signed: bool,
-    /// When a search of several pairs last came to its end.
+    /// When a search of several pairs was last completed.
     searched: Reading,
 }
 
-/// What a tick's closest pair is for.
+/// The purpose of a tick's closest pair.
 #[derive(Clone, Copy, PartialEq)]
 enum Purpose {
     /// It is the tick's answer.
     Answer,
-    /// Contacts are looked for next: unless the budget ended, the last tick's interval comes after them, and the position
-    /// error.
+    /// A search for contacts follows: unless the budget ended, the last tick's interval is merged after it, and the
+    /// position error added.
     Contacts,
-    /// A later tick has less to do. The whole budget is the pair's.
+    /// It reduces the work of a later tick. The pair gets the whole budget.
     Ahead,
 }
 
@@ -111,21 +111,21 @@ enum Purpose {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct TrackerAnswer {
-    /// The closest pair; its counts of tests are this tick's.
+    /// The closest pair; its test counts are this tick's.
     pub closest: Proximity,
-    /// The side is the last tick's, as far as the motion since leaves it possible, because this tick's search found none: its
-    /// budget ended, or the side is undefined. The pair may not be the closest one then; the certified interval holds.
+    /// The side is the last tick's, as the motion since allows it, because this tick's search found none: its budget
+    /// ended, or the side is undefined. The pair may then not be the closest one; the certified interval holds.
     pub is_kept: bool,
     /// The reason, if this tick was a whole query.
     pub fallback: Option<Fallback>,
-    /// Most (mm) that tool and surface together have moved since the last tick; `None` where it is not known, and of
+    /// Upper bound (mm) on the motion of tool and surface together since the last tick; `None` if unknown, and for
     /// several pairs.
     pub moved: Option<f32>,
-    /// Places of the tracker's `OPENED` used since the front last started.
+    /// Slots of `OPENED` used since the front last started.
     pub opened: u32,
-    /// Of [`Tracker::closest_of`], the closest pair's index; else 0.
+    /// The closest pair's index in [`Tracker::closest_of`]; else 0.
     pub pair: usize,
-    /// Pairs that were searched; the others were certain to be farther.
+    /// Number of pairs searched; the others were certainly farther.
     pub searched: u32,
 }
 
@@ -135,19 +135,20 @@ pub struct TrackerAnswer {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Fallback {
-    /// Nothing is remembered: the first tick, or the one after an error or a full front.
+    /// Nothing is remembered: this is the first tick, or the one after an error or a full front.
     Start,
-    /// The surface's motion since the last tick was not measured all the way.
+    /// The surface's motion was not measured over the whole time since the last tick.
     Surface,
-    /// Tool or surface moved so far that more than half of the front ran out.
+    /// Tool or surface moved so far that more than half of the front's bounds ran out.
     Jump,
-    /// More nodes had to be opened than there are places. The next tick starts anew. Where it comes often, a tracker costs more
-    /// than a query: it has too few places for this surface and these poses, which `dibs track` counts.
+    /// More nodes had to be opened than there are slots. The next tick restarts. If this occurs often, a tracker
+    /// costs more than a query: it has too few slots for this surface and these poses. `dibs track` counts the slots
+    /// needed.
     Full,
 }
 
 impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK, OPENED> {
-    /// A tracker on `tree` that has seen nothing yet, and remembers nothing between searches for contacts.
+    /// A new tracker on `tree`, which remembers nothing between searches for contacts.
     ///
     /// # Errors
     /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
@@ -160,8 +161,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK
 impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     Tracker<'t, I, STACK, OPENED, RANGE>
 {
-    /// As [`new`](Tracker::new), and remembers `RANGE` opened nodes between searches for [contacts](Self::contacts): some
-    /// hundred as a rule.
+    /// As [`new`](Tracker::new), but remembers `RANGE` opened nodes between searches for [contacts](Self::contacts),
+    /// usually some hundred.
     ///
     /// # Errors
     /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
@@ -186,14 +187,14 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         &self.tree
     }
 
-    /// The front, for pictures and tests: rows of the nodes ([`Tree::node`]) that have a bound or, of leaves, whose
-    /// triangles have. Every triangle is below exactly one of them. Empty until the first tick.
+    /// The front, for visualisation and tests: rows of the nodes ([`Tree::node`]) that have a bound or, for leaves,
+    /// whose triangles have bounds. Every triangle is below exactly one of them. Empty until the first tick.
     pub fn front(&self) -> impl Iterator<Item = u32> {
         self.memory.front.rows()
     }
 
-    /// Opened nodes that the last search for [contacts](Self::contacts) left, of `RANGE` places. Once all are used, the
-    /// next one starts anew; nodes for which there is no place are searched as a query does.
+    /// Number of nodes that the last search for [contacts](Self::contacts) left open, of `RANGE` slots. Once all are
+    /// used, the next search restarts; nodes without a slot are searched as in a query.
     #[must_use]
     pub const fn opened_in_range(&self) -> u32 {
         self.memory.range.opened()
@@ -205,16 +206,16 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         self.last = None;
     }
 
-    /// The closest pair between `tool` and the surface as it is now.
+    /// The closest pair between `tool` and the current surface.
     ///
-    /// As [`Query::closest`](crate::Query::closest), warm start included. A budget widens the interval as there, but not
-    /// beyond that of the last tick and the motion since ([`TrackerAnswer::is_kept`]), and the next tick continues where this
-    /// one ended.
+    /// As [`Query::closest`](crate::Query::closest), warm start included. A budget widens the interval as there, but
+    /// not beyond that of the last tick plus the motion since ([`TrackerAnswer::is_kept`]), and the next tick continues
+    /// where this one ended.
     ///
-    /// Cost: the budget at most, and one number for each opened node.
+    /// Cost: the budget at most, and one comparison for each opened node.
     ///
     /// # Errors
-    /// Those of [`Query::closest`](crate::Query::closest).
+    /// Same as [`Query::closest`](crate::Query::closest).
     pub fn closest<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
         surface: &S,
@@ -224,7 +225,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         self.within(surface, tool, options, f32::INFINITY, Purpose::Answer)
     }
 
-    /// The closest pair; of pairs that are farther than `separation` (mm), only that they are.
+    /// The closest pair; for pairs farther than `separation` (mm), only that they are farther.
     fn within<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
         surface: &S,
@@ -293,7 +294,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         Ok(TrackerAnswer { closest, is_kept, fallback, moved, opened, pair, searched })
     }
 
-    /// A whole query, with the budget less the `tests` already made.
+    /// A whole query, with the budget left after `tests`.
     #[cold]
     fn whole<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
@@ -313,7 +314,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     }
 }
 
-/// The part of a tick's budget that the closest pair may take: what is left goes to the depth, of an axis that may be inside.
+/// The closest pair's part of a tick's budget: the rest is for the depth of an axis that may be inside.
 fn share_of_pair(budget: Budget, past: &Certain) -> Budget {
     if past.upper < 0.0 {
         Budget::new(budget.tests() / 8 * 3)
@@ -340,14 +341,15 @@ impl Last {
         let (clear, is_signed) = match closest.side {
             Side::Undefined(NoSide::NotAsked) => (clear, false),
             Side::Undefined(NoSide::NoAdjacency) => (clear, true),
-            // Only a closed surface must be touched on the way in: the side of an open one is that of the closest sheet.
+            // Only a closed surface must be touched on the way in: the side of an open surface is that of the closest
+            // sheet.
             Side::Outside if is_closed => (clear, true),
             _ => (f32::NEG_INFINITY, true),
         };
         Self { clear, is_signed, searched }
     }
 
-    /// The distance within which nothing is certain to be, after a motion.
+    /// The distance within which there is certainly no surface, after a motion.
     fn clear_after(&self, moved: f32) -> f32 {
         let clear = self.clear - moved;
         clear - clear.abs() * f32::EPSILON

@@ -1,4 +1,4 @@
-//! Several trackers: the closest of all pairs. A pair that is certain to be farther is not looked at.
+//! Several trackers: the closest of all pairs. A pair that is certainly farther is not searched.
 
 // Requirement: T-01
 
@@ -8,39 +8,40 @@ use crate::query::{Budget, NoSide, Options, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
 
-/// Most tests made ahead in a tick, less one.
+/// Most tests made in advance in a tick, less one.
 const AHEAD: Budget = Budget::new(120);
 
-/// How much farther than the closest pair others are shown to be, in units: an eighth to a sixteenth of the root sphere's
-/// radius.
+/// How much farther than the closest pair the others are proven to be, in units: an eighth to a sixteenth of the root
+/// sphere's radius.
 const LEAD: u32 = 1 << 21;
 
 /// A bound on a pair that is not searched.
 struct Bound {
-    /// No separation is less; negative infinity if nothing is known.
+    /// A lower bound on the separation; negative infinity if nothing is known.
     apart: f32,
-    /// Motion since the pair was last searched to the end.
+    /// Motion since the pair's last complete search.
     stale: f32,
 }
 
 impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     Tracker<'_, I, STACK, OPENED, RANGE>
 {
-    /// The closest of several pairs of a surface and a tool, each with a tracker of its own; `None` for an empty slice. A
-    /// chain of tools is a pair for each of them and its surface.
+    /// The closest of several pairs of a surface and a tool, each with its own tracker; `None` for an empty slice. A
+    /// chain of tools is one pair for each tool with its surface.
     ///
-    /// A pair is passed over while it is certain to be farther than the closest one: its distance when it was last
-    /// searched, less the motion since. A tool that was outside a closed surface then is outside still. Pairs inside or
-    /// crossing are searched at every tick, and so are all of an open surface, whose side may change without contact. In a tick with few tests, the pair whose certainty ends first is searched
-    /// ahead for up to 65 tests more, only as far as it has to be, so that no tick finds a pair that rested long.
+    /// A pair is skipped while it is certainly farther than the closest one: its distance at its last search, less the
+    /// motion since. A tool that was then outside a closed surface is still outside. Pairs that are inside or crossing
+    /// are searched at every tick, and so are all pairs at an open surface, whose side may change without contact. In a
+    /// tick with few tests, the pair whose certainty runs out first is searched in advance with up to 65 more tests,
+    /// only as far as needed. This spreads the work of pairs that were long skipped.
     ///
-    /// The interval begins at the least lower end of all pairs, the accuracy is the worst, the tests are those of all. The
-    /// side is not known ([`NoSide::CutShort`]) if the budget left that of any pair open.
+    /// The interval begins at the least lower end of all pairs, the accuracy is the worst, the test counts are sums
+    /// over all pairs. The side is [`NoSide::CutShort`] if the budget left the side of any pair open.
     ///
-    /// Cost: the budget at most, for all pairs together.
+    /// Cost: at most the budget, for all pairs together.
     ///
     /// # Errors
-    /// Those of [`closest`](Self::closest), of any pair.
+    /// Same as [`closest`](Self::closest), for any pair.
     ///
     /// ```
     /// use dibs_build::{Builder, generate};
@@ -74,7 +75,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     ) -> Result<Option<TrackerAnswer>, QueryError> {
         let Some(first) = Self::nearest(pairs, options) else { return Ok(None) };
         let mut found: Option<TrackerAnswer> = None;
-        // The pair with the least lead for each motion since it was searched; none if all have four times as much.
+        // The pair with the least lead relative to its motion since the last search; none if every lead is at least
+        // four times that motion.
         let (mut ahead, mut lead_ahead, mut stale_ahead) = (None, 4.0, 1.0);
         let mut rest = *options;
         let others = (0..pairs.len()).filter(|&at| at != first);
@@ -84,7 +86,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
                 let Bound { apart, stale } = tracker.bound(*surface, *tool, options);
                 let lead = apart - best.closest.separation;
                 if lead >= 0.0 {
-                    // Written so that a lead of zero counts.
+                    // Written so that a lead of zero is included.
                     if stale * lead_ahead >= lead * stale_ahead {
                         (ahead, lead_ahead, stale_ahead) = (Some(at), lead, stale);
                     }
@@ -108,8 +110,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         Ok(found)
     }
 
-    /// Searches a pair for a part of the way, so that less is left for the tick that needs it. What was certain of it
-    /// stays. Returns the tests made.
+    /// Searches a pair partly in advance, so that the tick that needs it has less to do. Earlier certain bounds stay.
+    /// Returns the tests made.
     fn look_ahead<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
         surface: &S,
@@ -122,7 +124,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             return Ok(Tests::NONE);
         };
         let clear = before.clear_after(self.memory.clock.length(moved));
-        // A tool that has not touched a closed surface since is on the same side.
+        // A tool that has not touched a closed surface since then is on the same side.
         let keeps_side = before.is_signed && clear > 0.0 && self.tree.is_closed();
         let (options, separation) = if options.is_signed && !keeps_side {
             (*options, f32::INFINITY)
@@ -140,7 +142,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         Ok(found.tests())
     }
 
-    /// Index of the pair that may be closest.
+    /// Index of the pair that may be the closest.
     fn nearest<S: MovingSurface + ?Sized, T: Tool>(
         pairs: &[(&mut Self, &S, &T)],
         options: &Options,
@@ -155,7 +157,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         nearest
     }
 
-    /// The bound on the separation that holds without a search.
+    /// The bound on the separation that holds before a search.
     fn bound<S: MovingSurface + ?Sized, T: Tool>(
         &self,
         surface: &S,
@@ -176,11 +178,11 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
 }
 
 impl TrackerAnswer {
-    /// The closer of two pairs, with what was found out of both.
+    /// The closer of two pairs, with the bounds and counts of both.
     fn and(self, other: Self) -> Self {
         let (one, two) = (self.closest, other.closest);
         let closer = if two.separation < one.separation { other } else { self };
-        // A pair whose side the budget left open may be inside.
+        // A pair whose side was left open by the budget may be inside.
         let cut_short = Side::Undefined(NoSide::CutShort);
         let is_open = one.side == cut_short || two.side == cut_short;
         let mut closest = one.or_nearer(two);

@@ -21,11 +21,10 @@ use crate::{
     VertexTable, measure_stretch,
 };
 
-/// A bound in the front.
 struct Bound {
-    /// The opened node's place, and the child.
+    /// The opened node's slot, and the child.
     place: (u16, u32),
-    /// The reading at which it runs out; tells it from a bound found later.
+    /// The reading at which it runs out; distinguishes it from a later bound.
     deadline: Deadline,
     bound: f64,
     /// The distance of the nearest vertex below it.
@@ -66,7 +65,7 @@ fn bounds<const STACK: usize, const OPENED: usize>(
     bounds
 }
 
-/// Frames of the random walk; `DIBS_BOUND_FRAMES` for more, of 8 ticks each.
+/// Frames of the random walk, 8 ticks each; `DIBS_BOUND_FRAMES` sets more.
 fn frames() -> usize {
     env::var("DIBS_BOUND_FRAMES").map_or(60, |text| text.parse().expect("a number of frames"))
 }
@@ -88,7 +87,7 @@ fn no_bound_exceeds_the_distance() {
         let [before, after] = pair else { unreachable!() };
         let step = odometer.step(before.as_slice(), after.as_slice());
         for tick in 0..8 {
-            // Now and then so far that the front starts anew.
+            // Sometimes so far that the front restarts.
             let size = if tick == 7 { 10.0 } else { 0.5 };
             (tip, span) = (tip * 0.999 + vector(size), span * 0.999 + vector(size));
             let tool = Capsule::new(tip, tip + span, 2.0).expect("a valid capsule");
@@ -154,7 +153,7 @@ fn a_pair_rests_only_if_it_is_farther_than_the_errors_of_both_searches() {
     }
 }
 
-/// Rows as they came, larger than the limit allows: the answer says that it rests on the tree's limit.
+/// Rows as received, beyond the stretch limit: the answer states that it relies on the tree's limit.
 #[test]
 fn an_answer_says_whether_the_stretch_was_checked() {
     let built = Builder::new().stretch(1.5).build(&band(160)).expect("builds");
@@ -197,8 +196,8 @@ fn band(squares: u32) -> Mesh {
     }
 }
 
-/// Puts a sphere above one end of a band and moves either of them straight along the band, so that the sphere and the
-/// other end approach. Returns the slack left of a bound found at the start, as a share of the way since.
+/// Puts a sphere above one end of a band and moves one of them along the band, so that the sphere and the other end
+/// approach. Returns the remaining slack of a bound found at the start, as a fraction of the distance moved.
 fn approach(built: &BuiltTree, moves_tool: bool) -> f64 {
     let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
     let mut tracker = Tracker::<_, 128, 128>::new(&tree).expect("enough");
@@ -230,7 +229,7 @@ fn approach(built: &BuiltTree, moves_tool: bool) -> f64 {
     spare
 }
 
-/// On a straight way bounds are used up but for rounding, so a motion understated by a thousandth would show.
+/// In straight motion bounds are used up except for rounding, so a motion underestimated by a thousandth would show.
 #[test]
 fn bounds_are_used_up_as_fast_as_tool_and_surface_move() {
     let built = Builder::new().stretch(1.5).build(&band(160)).expect("builds");
@@ -241,7 +240,7 @@ fn bounds_are_used_up_as_fast_as_tool_and_surface_move() {
     }
 }
 
-/// A surface whose positions are off by so much.
+/// A surface with this position error.
 struct Off<'a> {
     rows: &'a [Vec3],
     motion: Option<MotionReading>,
@@ -270,7 +269,7 @@ impl MovingSurface for Off<'_> {
     }
 }
 
-/// What a tick keeps of the last one is certain of the positions. Their error is this tick's.
+/// The bounds kept from the last tick are certain for the table's positions. Their position error is this tick's.
 #[test]
 fn an_error_that_grows_widens_what_is_kept() {
     let mesh = generate::heart(320).unwrap().mesh;

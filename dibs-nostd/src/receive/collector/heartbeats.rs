@@ -1,4 +1,4 @@
-//! Heartbeats: which are taken, and when the sender is known to have lived.
+//! Heartbeats: which are accepted, and when the sender is known to have been alive.
 
 // Requirement: B-05
 
@@ -13,7 +13,7 @@ use crate::wire::{Heartbeat, Mac, Packet, is_newer};
 pub struct LastHeartbeat {
     /// The sender's session.
     pub session: u32,
-    /// Number of the heartbeat.
+    /// The heartbeat's number.
     pub beat: u32,
     /// The newest epoch that the sender had begun.
     pub epoch: u32,
@@ -21,11 +21,11 @@ pub struct LastHeartbeat {
     pub received: Millis,
 }
 
-/// Largest difference of two beats that counts as one sender's.
+/// Largest difference of two beat numbers that are attributed to one sender.
 const LARGEST_GAP: u32 = 16;
 
 impl Collector {
-    /// Takes a heartbeat, unless it is older than what has come.
+    /// Accepts a heartbeat, unless it is older than the last.
     pub fn heartbeat<M: Mac>(
         &mut self,
         packet: &Packet<'_>,
@@ -46,8 +46,8 @@ impl Collector {
                 !is_newer(session, last.session)
             }
         });
-        // Without a key one stray heartbeat from the far future must not refuse all genuine ones. Two in a row that are
-        // in order are a sender's; a repeated one is not.
+        // Without a key one stray heartbeat with a far later number must not cause all genuine ones to be refused. Two
+        // successive heartbeats in order are taken for a sender's; a repeated one is not.
         let is_in_order = !M::TAGGED
             && self.heartbeat.is_none_or(|last| last.beat != beat)
             && self.straggler.is_some_and(|(of, before)| {
@@ -62,11 +62,11 @@ impl Collector {
         Ok(())
     }
 
-    /// The sender lived when it took the status that it echoes; without an echo, count its arrival. A delayed heartbeat
-    /// therefore counts with its delay. An echo ahead of this clock is from another run and counts for nothing.
+    /// The sender was alive when it received the status that it echoes; without an echo, the arrival counts. So a
+    /// delayed heartbeat counts with its delay. An echo ahead of this clock is from another run and is ignored.
     pub(in crate::receive) fn note_alive(&mut self, echo: Option<u32>) {
         let at = echo.map_or(self.now, Millis);
-        // An echo up to [`AHEAD`] ahead of this clock counts as now.
+        // An echo at most [`AHEAD`] ahead of this clock counts as now.
         let age = elapsed(self.now, at);
         let at = if age == Millis(0) { self.now } else { at };
         // Ages are compared, not readings, which wrap.

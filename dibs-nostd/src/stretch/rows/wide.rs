@@ -1,7 +1,7 @@
 //! The quick check of four triangles at a time, for processors with vector registers.
 //!
-//! Where one of the four fails it, the row-by-row check goes over them, from the state that it would have had. Numbers
-//! round as there and are added in the same order, so the bits are the same.
+//! If one of the four fails, the row-by-row check goes over them, from the state that it would have had. Values are
+//! rounded and added in the same order, so the bits are the same.
 
 use glam::Vec4;
 
@@ -32,7 +32,7 @@ struct Four {
 }
 
 impl Last {
-    /// The edge before the first triangle of a run: see [`Table::before`].
+    /// The edge before the first triangle of a range: see [`Table::before`].
     #[inline(always)]
     fn before<I: Index>(metric: &impl MetricBits, corners: &I::Corners) -> Option<Self> {
         let metric = Metric::new(metric.bits().map(f32::from_bits));
@@ -60,7 +60,7 @@ impl Last {
             let a = format::vertex_number::<I>(corners.as_ref(), 0)?;
             let b = format::vertex_number::<I>(corners.as_ref(), 1)?;
             let c = format::vertex_number::<I>(corners.as_ref(), 2)?;
-            // The marks of `Join`, without branches: their order cannot be predicted.
+            // The codes of `Join`, without branches: their order cannot be predicted.
             let is_fan = mark >> 31 != 0;
             let is_start = !is_fan && mark & 1 == 0;
             let joined = if is_fan { (self.centre, self.third) } else { (self.third, self.centre) };
@@ -97,8 +97,9 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         Some(square.to_array())
     }
 
-    /// Checks four triangles at a time, up to the first four that do not all pass. Returns how many fours passed.
-    // By itself, so that its state stays in registers.
+    /// Checks four triangles at a time, up to the first four that do not all pass. Returns how many groups of four
+    /// passed.
+    // A separate function, so that its state stays in registers.
     #[inline(never)]
     fn fours<I: Index, M: Measure, R: MetricBits>(
         &self,
@@ -152,7 +153,7 @@ pub(super) fn measure<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBi
         Some((before, Last::before::<I>(metric, corners)?))
     });
     let Some((before, mut last)) = start else { return (row, worst, size) };
-    // The state before `row` where the row-by-row check was last; elsewhere it follows from `last`.
+    // The state before `row` where the row-by-row check ended; elsewhere it follows from `last`.
     let mut before = Some(before);
     while !metrics.is_empty() {
         let passed =
@@ -199,8 +200,8 @@ mod tests {
     use crate::tree::Tree;
     use crate::tree::format::PathKind;
 
-    /// Runs of triangles on moved surfaces: the same bits and the same row as by the check of one after another, with
-    /// corners that are far off or not finite, too.
+    /// Ranges of triangles on moved surfaces give the same bits and the same row as the check of one after another,
+    /// also with corners that are far off or not finite.
     #[test]
     fn four_at_a_time_are_measured_as_one_after_another() {
         let mesh = generate::heart(600).expect("a valid size").mesh;
@@ -238,7 +239,7 @@ mod tests {
         assert!((10..800).contains(&stopped), "{stopped} runs ended early");
     }
 
-    /// Measures a run in both ways, and returns the row where both ended.
+    /// Measures a range in both ways, and returns the row where both ended.
     fn same<I: Index>(
         blob: &[u8],
         surface: &[Vec3],

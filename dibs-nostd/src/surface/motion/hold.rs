@@ -1,9 +1,10 @@
-//! Frames that are held: whether their motion is worth a measurement.
+//! Held frames: whether measuring their motion pays.
 
 use super::{MotionReading, MovingTable, Odometer};
 use crate::VertexTable;
 
-/// Tests of a whole query for each root of the surface's vertices: 5,000 to 500,000 triangles take four to six.
+/// Tests of a whole query, as a multiple of the square root of the number of vertices: 5,000 to 500,000 triangles take
+/// four to six.
 const TESTS: usize = 5;
 
 /// Rows measured in the time of a test.
@@ -12,10 +13,10 @@ const ROWS: usize = 2;
 impl Odometer {
     /// The frame `after`, which is held until the next one; `before` is the frame held until now.
     ///
-    /// A motion spares a tracker at most one whole query at each new frame. Where a query costs less than measuring the
-    /// rows, as on any large surface, the odometer starts anew instead, and trackers do too; where it costs more, this is
-    /// [`step`](Self::step) and [`Step::after`](super::super::Step::after). For several tools, or for a surface that moves
-    /// between frames, measure the step.
+    /// A measured motion saves a tracker at most one whole query at each new frame. If a query costs less than
+    /// measuring the rows, as on any large surface, the odometer restarts instead, and so do trackers; if it costs
+    /// more, this is [`step`](Self::step) and [`Step::after`](super::super::Step::after). For several tools, or for a
+    /// surface that moves between frames, measure the step.
     ///
     /// ```
     /// use dibs_build::{Builder, generate};

@@ -1,4 +1,4 @@
-//! The odometer goes on from the frame measured last, and from no other.
+//! The odometer continues from the last measured frame only.
 
 // Requirement: T-04
 
@@ -16,7 +16,7 @@ use crate::{MovingSurface, Tree};
 /// A change of a frame.
 type Change = fn(&mut [Vec3], &mut Rng);
 
-/// Changes that a sum of products without a shift, or one of rows in any order, takes for none.
+/// Changes that a sum of products without a shift, or one over rows in any order, does not detect.
 const CHANGES: [Change; 9] = [
     |rows, _| rows.iter_mut().for_each(|row| row.x = -row.x),
     |rows, _| rows.iter_mut().for_each(|row| *row = Vec3::new(-row.x, -row.y, row.z)),
@@ -58,7 +58,7 @@ fn an_odometer_starts_anew_with_any_other_frame() {
         CHANGES[trial % CHANGES.len()](&mut other, &mut rng);
         let step = odometer.step(other.as_slice(), next.as_slice());
         assert_eq!(step.after().motion().unwrap().since(&first), None, "change {trial}");
-        // And it goes on with the frame that it measured last, wherever that lies.
+        // It continues with the last measured frame, at any address.
         let before = step.after().motion().unwrap();
         let copy = next.clone();
         let step = odometer.step(copy.as_slice(), rows.as_slice());

@@ -1,4 +1,4 @@
-//! The error that a surface between its frames, or beyond them, carries into answers.
+//! The position error of a surface between its frames, or beyond them.
 
 // Requirement: F-05
 
@@ -28,8 +28,8 @@ impl VertexTable for Inexact {
     }
 }
 
-/// A position `a + s (b - a)` is off by `|1 - s|` times the error of `a` and `s` times that of `b`, whichever is
-/// larger, and also beyond `b`, where the first factor is below 0 without its sign.
+/// A position `a + s (b - a)` has `|1 - s|` times the error of `a` plus `s` times that of `b`, whichever is larger,
+/// also beyond `b`, where `1 - s` is negative.
 #[test]
 fn a_blend_is_off_by_the_errors_of_both_frames() {
     let mesh = generate::heart(320).unwrap().mesh;
@@ -53,8 +53,7 @@ fn a_blend_is_off_by_the_errors_of_both_frames() {
     }
 }
 
-/// No position that was rounded to the grid is farther from its row than the table says, and the farthest nearly as
-/// far.
+/// No position rounded to the grid is farther from its row than the stated error, and the farthest is nearly that far.
 #[test]
 fn a_quantised_table_states_its_error() {
     let mut rng = fastrand::Rng::with_seed(4);

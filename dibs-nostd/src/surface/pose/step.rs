@@ -1,4 +1,4 @@
-//! From one pose to the next: how far points move, the pose between frames and beyond, and its rounding.
+//! The step from one pose to the next: the motion of points, poses between and beyond frames, and rounding.
 
 use glam::Vec3;
 
@@ -8,16 +8,16 @@ use crate::math::sqrt::sqrt;
 /// Half a unit in the last place of one.
 const HALF_UNIT: f32 = 1.0 / 16_777_216.0;
 
-/// Sine of half the largest angle (0.5 rad) of a step that goes on beyond its frames.
+/// Sine of half the largest angle (0.5 rad) of an extrapolated step.
 pub(super) const MOST_SINE: f32 = 0.247_404;
 
 impl RigidPose {
-    /// Most (mm, rounded up) that any point within `lever` of `centre` moves from here to another pose.
+    /// Upper bound (mm, rounded up) on the motion of any point within `lever` of `centre` from here to another pose.
     ///
-    /// A point `c + y` of the mesh moves by `(B c - A c) + (M - 1) A y`: the centre's own displacement, and what the rotation
-    /// `M` from one pose to the other makes of the arm `y`, which has the same length in both. A rotation by an angle moves
-    /// the end of an arm by at most `2 sin(angle / 2)` of its length: exactly that where the arm is square to the axis. So
-    /// the sum is a bound, and the least one where the centre's displacement is along that.
+    /// A point `c + y` of the mesh moves by `(B c - A c) + (M - 1) A y`: the centre's own displacement, plus the effect
+    /// of the rotation `M` from one pose to the other on the arm `y`, which has the same length in both. A rotation by
+    /// an angle moves the end of an arm by at most `2 sin(angle / 2)` of its length, exactly that if the arm is
+    /// perpendicular to the axis. So the sum is a bound, and the least one if the centre moves in the same direction.
     pub(crate) fn step(&self, to: &Self, centre: Vec3, lever: f32) -> f32 {
         if self == to {
             return 0.0;
@@ -26,31 +26,29 @@ impl RigidPose {
         let chord = 2.0 * sqrt(turn.axis.length_squared() / turn.squared());
         let shifted = (to.shift - self.shift) + turn.adds(self.turn.apply(centre));
         let moved = length(shifted) + chord * lever;
-        // The quaternion between is off by 7 halves of a unit, so the chord is by 14, and the centre's arm by as much and by
+        // The relative quaternion has an error of 7 half units, so the chord has 14; the centre's arm has the same plus
         // the rounding of two rotations.
         moved * (1.0 + 16.0 * HALF_UNIT) + (lever + length(centre)) * (64.0 * HALF_UNIT)
     }
 
-    /// Most (mm) by which a point is off that [`apply_inverse`](Self::apply_inverse) gives, of a pose that came so.
+    /// Upper bound (mm) on the rounding of a point from [`apply_inverse`](Self::apply_inverse), for a pose as received.
     ///
-    /// Each product of the cross products and each of their sums is rounded: in halves of a unit of the vector's length the
-    /// first cross product is off by 3, the second by 7, both together, with the factor before them, by less than 30, the sum
-    /// and the difference before by one each.
+    /// Each product of the cross products and each of their sums is rounded. In half units of the vector's length the
+    /// first cross product has an error of 3, the second of 7, both together with the factor before them less than 30;
+    /// the sum and the difference before add one each.
     pub(crate) fn rounding(local: Vec3) -> f32 {
         size(local) * (34.0 * HALF_UNIT)
     }
 }
 
-/// The motion from one pose to the next: about the mesh's centre, which goes straight, evenly.
+/// The motion from one pose to the next: about the mesh's centre, which moves in a straight line, at constant speed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PoseStep {
     after: RigidPose,
     centre: Vec3,
-    /// The centre's arm from the mesh's origin, turned as it is at the end.
+    /// The vector from the mesh's origin to the centre, rotated as at the end.
     arm: Vec3,
-    /// Half of the rotation vector.
     half: Vec3,
-    /// The centre's displacement.
     shifted: Vec3,
 }
 
@@ -58,7 +56,7 @@ impl PoseStep {
     /// The step between two poses of a mesh with this centre; `None` if it turns by more than half a radian.
     pub(crate) fn between(before: &RigidPose, after: &RigidPose, centre: Vec3) -> Option<Self> {
         let turn = after.turn.after(&before.turn);
-        // The shorter of the two ways round.
+        // The shorter of the two rotations.
         let length = sqrt(turn.squared());
         let vector = turn.axis * (1.0 / if turn.w < 0.0 { -length } else { length });
         let square = vector.length_squared();
@@ -78,7 +76,7 @@ impl PoseStep {
         })
     }
 
-    /// The pose a part of the step beyond its end, -1 to 2; exactly the last one for 0.
+    /// The pose at a fraction of the step beyond its end, -1 to 2; exactly the last pose for 0.
     pub(crate) fn beyond(&self, part: f32) -> RigidPose {
         if part == 0.0 {
             return self.after;
@@ -94,11 +92,12 @@ impl PoseStep {
         RigidPose { turn: turn.times(&self.after.turn), shift }
     }
 
-    /// Most (mm) by which a point is off that the inverse of a pose of this step gives.
+    /// Upper bound (mm) on the rounding of a point from the inverse of a pose of this step.
     ///
-    /// In halves of a unit: the quaternion of the step is off by 11 at most, so that beyond by 22, which turn by 44; the
-    /// product with the last one turns by 16 more. The centre's displacement is off by 46 of its arm, so by 92 beyond, and
-    /// what the turn adds to the arm by 30. The shift's sums are rounded, too; and the inverse, as for a pose that came so.
+    /// In half units: the step's quaternion has an error of at most 11, so 22 beyond the end, which turn by 44; the
+    /// product with the last quaternion turns by 16 more. The centre's displacement has an error of 46 of its arm, so
+    /// 92 beyond the end, and the rotation of the arm adds 30. The shift's sums are rounded, too; and the inverse, as
+    /// for a received pose.
     pub(crate) fn rounding(&self, local: Vec3, pose: &RigidPose, part: f32) -> f32 {
         let turned = self.rounding_of_vector(local, part);
         if part == 0.0 {
@@ -108,7 +107,7 @@ impl PoseStep {
         turned + parts * HALF_UNIT
     }
 
-    /// The same of a vector, which the shift leaves as it is.
+    /// The same for a vector, which the shift does not change.
     pub(crate) fn rounding_of_vector(&self, local: Vec3, part: f32) -> f32 {
         if part == 0.0 {
             return RigidPose::rounding(local);
@@ -116,7 +115,7 @@ impl PoseStep {
         size(local) * (100.0 * HALF_UNIT)
     }
 
-    /// The velocity (mm in the time of a step) of a point of the mesh that is at `point`, that part of the step beyond its end.
+    /// The velocity (mm per step time) of a mesh point at `point`, at this fraction of the step beyond its end.
     pub(crate) fn velocity(&self, part: f32, point: Vec3) -> Vec3 {
         let centre = self.after.shift + self.arm + self.shifted * part;
         (self.half * 2.0).cross(point - centre) + self.shifted
@@ -132,7 +131,7 @@ impl Turn {
         }
     }
 
-    /// The rotation that leads from another one to this.
+    /// The rotation from another one to this one.
     fn after(&self, first: &Self) -> Self {
         self.times(&first.inverse())
     }

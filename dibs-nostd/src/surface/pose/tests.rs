@@ -1,4 +1,4 @@
-//! Poses against f64: bounds on motion and rounding, searched for what breaks them.
+//! Poses against f64: bounds on motion and rounding, with a search for counterexamples.
 
 // Requirement: F-08
 
@@ -24,7 +24,7 @@ fn any(rng: &mut Rng, size: f32) -> Vec3 {
     vector(rng, size * part)
 }
 
-/// The numbers that a search changes: two poses, a centre, an arm and a part of the step.
+/// The values varied by a search: two poses, a centre, an arm and a fraction of the step.
 #[derive(Clone, Copy, Debug)]
 struct Case {
     before: RigidPose,
@@ -34,10 +34,10 @@ struct Case {
     part: f32,
 }
 
-/// A pose beside another one, turned by at most so much.
+/// A pose near another one, rotated by at most this angle.
 fn beside(rng: &mut Rng, pose: &RigidPose, angle: f32, shift: f32) -> RigidPose {
     let turn = vector(rng, 1.0).normalize_or_zero() * (angle * rng.f32());
-    // Lengths within 2^-20 of one are one.
+    // Lengths within 2^-20 of one count as one.
     let length = 1.0 + (rng.f32() - 0.5) * 4e-7;
     let rotation = (Quat::from_scaled_axis(turn) * pose.rotation()).normalize() * length;
     let sign = if rng.bool() { 1.0 } else { -1.0 };
@@ -56,7 +56,7 @@ impl Case {
         Self { before, after, centre, point, part }
     }
 
-    /// One number is a little different.
+    /// Changes one number a little.
     fn changed(&self, rng: &mut Rng) -> Self {
         let size = 10.0_f32.powf(-4.0 * rng.f32());
         let mut next = *self;
@@ -70,7 +70,8 @@ impl Case {
         next
     }
 
-    /// The exact pose after the last frame, at the case's part of the step: the rotation, and where the mesh's origin is.
+    /// The exact pose after the last frame, at the case's fraction of the step: the rotation, and the position of the
+    /// mesh's origin.
     fn exact(&self) -> (DQuat, DVec3) {
         let ((a, s), (b, t)) = (exact(&self.before), exact(&self.after));
         let turn = b * a.inverse();
@@ -87,7 +88,7 @@ fn exact(pose: &RigidPose) -> (DQuat, DVec3) {
     (pose.rotation().as_dquat().normalize(), pose.shift().as_dvec3())
 }
 
-/// The largest value of many climbs.
+/// The largest value found by hill climbing from many starts.
 fn climbed(seed: u64, starts: usize, steps: usize, value: impl Fn(&Case) -> Option<f64>) -> f64 {
     let mut rng = Rng::with_seed(seed);
     let mut most = 0.0_f64;
@@ -108,8 +109,8 @@ fn climbed(seed: u64, starts: usize, steps: usize, value: impl Fn(&Case) -> Opti
     most
 }
 
-/// How far points move between two poses, as a part of the bound: never more, and almost all where the arm is square to the
-/// axis and the centre goes its way.
+/// The motion of points between two poses, as a fraction of the bound: never above 1, and nearly 1 if the arm is
+/// perpendicular to the axis and the centre moves in the same direction.
 #[test]
 fn no_point_moves_farther_than_the_bound() {
     let most = climbed(1, 2_000, 400, |case| {
@@ -127,7 +128,8 @@ fn no_point_moves_farther_than_the_bound() {
     assert_eq!(pose.step(&pose, Vec3::ONE, 100.0), 0.0);
 }
 
-/// A tool's point in the mesh is within the stated rounding of the exact one, on poses as they came and between and beyond.
+/// A tool's point in mesh coordinates is within the stated rounding of the exact one, at received poses and between and
+/// beyond.
 #[test]
 fn a_point_in_the_mesh_is_off_by_no_more_than_its_rounding() {
     let off = |case: &Case, (rotation, shift): (DQuat, DVec3), pose: &RigidPose| {
@@ -151,7 +153,6 @@ fn a_point_in_the_mesh_is_off_by_no_more_than_its_rounding() {
     assert!(most > 0.02 && beyond > 0.02);
 }
 
-/// The velocity is the derivative of the way.
 #[test]
 fn a_velocity_is_that_of_the_points() {
     let mut rng = Rng::with_seed(5);
@@ -174,7 +175,7 @@ fn a_velocity_is_that_of_the_points() {
     assert!(checked > 1_500, "{checked}");
 }
 
-/// Half a radian goes on, and no more; a quaternion and its negative are one rotation.
+/// A step of half a radian is extrapolated, a larger one is not; a quaternion and its negative are one rotation.
 #[test]
 fn a_step_that_turns_by_more_than_half_a_radian_does_not_go_on() {
     let turned =
@@ -195,7 +196,7 @@ fn a_step_that_turns_by_more_than_half_a_radian_does_not_go_on() {
     }
 }
 
-/// What is no rotation, or no number, is refused by its cause.
+/// Values that are not a rotation, or NaN, are refused with their cause.
 #[test]
 fn hostile_numbers_are_no_pose() {
     let refused =

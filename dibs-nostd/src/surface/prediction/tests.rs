@@ -1,4 +1,4 @@
-//! The motion of an extrapolated surface as its odometer states it, which only the crate can read.
+//! The motion of an extrapolated surface as stated by its odometer, which only the crate can read.
 
 // Requirement: T-04
 
@@ -22,14 +22,13 @@ use crate::{
 /// Vertices of the heart of 320 triangles.
 const ROWS: usize = 162;
 
-/// The ways in which the frames move.
 #[derive(Clone, Copy, PartialEq)]
 enum Motion {
     /// Velocities change a little from frame to frame, at steady rates of frames and ticks.
     Steady,
-    /// At others.
+    /// The same at irregular rates.
     Smooth,
-    /// And now and then at once.
+    /// With sudden changes now and then.
     Sudden,
     /// By a few units in the last place of a coordinate, far from the origin.
     Creeping,
@@ -53,14 +52,14 @@ fn positions(surface: &impl VertexTable) -> Vec<Vec3> {
     (0..ROWS as u32).map(|row| surface.position(row).unwrap()).collect()
 }
 
-/// The farthest that a row is from another.
+/// The largest distance between corresponding rows.
 fn apart(before: &[Vec3], now: &[Vec3]) -> f64 {
     let of = |(a, b): (&Vec3, &Vec3)| a.as_dvec3().distance(b.as_dvec3());
     before.iter().zip(now).map(of).fold(0.0, f64::max)
 }
 
 /// Between any two ticks, on the same frame, at a new one or after skipped ones, no vertex moves farther than the
-/// odometer says, nor through any number of ticks. At a new frame it does not say much more.
+/// odometer states, nor through any number of ticks. At a new frame it does not overstate by much.
 #[test]
 fn no_vertex_moves_farther_than_its_course_says() {
     for motion in [Motion::Steady, Motion::Smooth, Motion::Sudden, Motion::Creeping] {
@@ -79,7 +78,7 @@ fn follow(motion: Motion) {
     let unit = Unit::of(&tree);
     let far = if motion == Motion::Creeping { Vec3::splat(400.0) } else { Vec3::ZERO };
     let mut rows: Vec<Vec3> = built.to_rows(&mesh.positions).iter().map(|row| *row + far).collect();
-    // A position is off by at most so much, at either end.
+    // Bound on a position's rounding, at either end.
     let rounding = (100.0 + 2.0 * f64::from(far.x)) * f64::from(32.0 * f32::EPSILON);
     let step = if motion == Motion::Creeping { 1e-4 } else { 0.01 };
     let mut velocity = Vec3::ZERO;
@@ -130,7 +129,7 @@ fn follow(motion: Motion) {
             }
             last = Some((motion, found, epoch));
         }
-        // A tick may come up to its own time late, and so after the next frame was.
+        // A tick may be delayed, and so come after the next frame.
         now = if is_steady || rng.bool() { now } else { tick };
     }
     let [moved, stated] = sums;
@@ -173,7 +172,7 @@ fn the_order_of_two_readings_does_not_matter() {
     }
 }
 
-/// Of any numbers, however large, a prediction says nothing or no less than the motion.
+/// For any numbers, however large, a prediction gives no bound or one of at least the motion.
 #[test]
 fn a_course_is_not_cut_to_the_numbers_that_fit() {
     let mut rng = Rng::with_seed(8);
@@ -205,7 +204,7 @@ fn a_course_is_not_cut_to_the_numbers_that_fit() {
     assert_ne!(Prediction::new((1 << 32) - 1, &ahead, 1.0), Prediction::NONE);
 }
 
-/// An odometer that cannot count on starts anew.
+/// An odometer whose counter would overflow restarts.
 #[test]
 fn a_reading_that_does_not_fit_is_a_start() {
     let start = MotionReading::start(7);

@@ -2,16 +2,16 @@
 
 use super::{METRIC_BYTES, rows_from};
 
-/// The rest shape of a triangle, as its stretch is measured against it.
+/// The rest shape of a triangle, to which its stretch refers.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metric {
     /// The Gram matrix of the edges from the centre to the other of the first two corners and to the third corner, or
     /// the three squared lengths: see `docs/format.md`.
     pub squares: [f32; 3],
-    /// The join of the triangle to the one in the row before.
+    /// How the triangle joins the one in the previous row.
     pub join: Join,
-    /// The centre is its second corner, not its first.
+    /// Whether the centre is its second corner, not its first.
     pub is_reversed: bool,
 }
 
@@ -33,8 +33,8 @@ impl Metric {
     }
 }
 
-/// The role, in the triangle of the row before, of a triangle's first edge, which leads from its centre to the other of
-/// its first two corners.
+/// The role of a triangle's first edge, from its centre to the other of its first two corners, in the triangle of the
+/// previous row.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Join {
@@ -42,7 +42,7 @@ pub enum Join {
     Start,
     /// The edge from the centre to the third corner.
     Fan,
-    /// The same edge reversed: the third corner there is the centre here.
+    /// The same edge reversed: that triangle's third corner is this one's centre.
     Flip,
 }
 
@@ -60,7 +60,7 @@ impl Join {
         }
     }
 
-    /// Whether a triangle continues the one before in this way, by the corners of both, the centre first.
+    /// Whether a triangle continues the previous one in this way, by the corners of both, the centre first.
     #[must_use]
     pub const fn is_between(self, [a, _, c]: [u32; 3], [centre, other, _]: [u32; 3]) -> bool {
         match self {

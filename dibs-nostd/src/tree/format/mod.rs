@@ -1,9 +1,9 @@
-//! The tree's bytes: little-endian records at fixed places, read from flash without a parsing pass.
+//! The tree's bytes: little-endian records at fixed offsets, read from flash without a parsing pass.
 //!
 //! `docs/format.md` is the specification, this module its only reader, and [`field`] the table of the header. Most
-//! functions are `const`, so that a tree may be validated in a constant; a generated one is validated at start-up.
+//! functions are `const`, so that a tree can be validated in a constant; a generated tree is validated at start-up.
 //!
-//! One file, because no other reads the bytes.
+//! One file, because no other file reads the bytes.
 
 mod metric;
 #[cfg(feature = "wide")]
@@ -44,7 +44,7 @@ pub const METRIC_BYTES: usize = 12;
 /// Bytes of one row of the limits section.
 #[doc(hidden)]
 pub const LIMIT_BYTES: usize = 2;
-/// The limit code that stands for the tree's own stretch limit.
+/// The limit code of the tree's own stretch limit.
 #[doc(hidden)]
 pub const MAX_LIMIT_CODE: u32 = 0xFFFF;
 
@@ -81,9 +81,9 @@ pub mod field {
     pub const RADIUS_UNIT: usize = 32;
     /// Largest distance of a vertex from its position in the mesh's file, `f32`.
     pub const POSITION_ERROR: usize = 36;
-    /// 1 where the tree has an origin section, else 0.
+    /// 1 if the tree has an origin section, else 0.
     pub const ORIGIN: usize = 40;
-    /// Roots besides the first.
+    /// Number of roots less one.
     pub const OTHER_ROOTS: usize = 44;
     /// Rows of the section table.
     pub const SECTIONS: usize = 48;
@@ -101,11 +101,11 @@ pub mod field {
     pub const RESERVED: [usize; 2] = [72, 76];
 }
 
-/// CRC-32 (ISO-HDLC, that of zlib and Ethernet) of trees and bus packets, by a table of 1 KiB.
+/// CRC-32 (ISO-HDLC, as in zlib and Ethernet) of trees and bus packets, by a table of 1 KiB.
 ///
-/// Detected for certain: every burst of up to 32 bits; any 4 flipped bits in up to 2,974 data bits, any
-/// 3 in up to 91,607, any 2 in a tree (Koopman, "32-bit cyclic redundancy codes for internet
-/// applications", DSN 2002). Of other damage one pattern in 2^32 passes.
+/// Certainly detected: every burst of up to 32 bits; any 4 flipped bits in up to 2,974 data bits, any 3 in up to
+/// 91,607, any 2 in a tree (Koopman, "32-bit cyclic redundancy codes for internet applications", DSN 2002). Of other
+/// damage one pattern in 2^32 is missed.
 ///
 /// A `static`, because every use of a constant would add another table.
 #[doc(hidden)]
@@ -124,22 +124,22 @@ pub mod section {
     pub const REST: u32 = 4;
     /// Rest metric of every triangle, three `f32` (optional: the stretch measurement needs it).
     pub const METRIC: u32 = 5;
-    /// Stretch limit of every triangle, a 16-bit part of the tree's (optional: without it the tree's limit holds for
-    /// each).
+    /// Stretch limit of every triangle, a 16-bit fraction of the tree's (optional: without it the tree's limit applies
+    /// to each).
     pub const LIMITS: u32 = 6;
     /// Displacement modes (optional).
     pub const MODES: u32 = 7;
-    /// Three neighbours a triangle (optional: sides and contacts need it).
+    /// Three neighbours of every triangle (optional: sides and contacts need them).
     pub const ADJACENCY: u32 = 8;
-    /// The tree's origin in the mesh's file, three `f64` (where the header has it).
+    /// The tree's origin in the mesh's file, three `f64` (if the header says so).
     pub const ORIGIN: u32 = 9;
     /// A label of every triangle, one byte (optional).
     pub const LABELS: u32 = 10;
-    /// Coarse nodes, their elements, and the vertices that they carry (of a tree with volume paths).
+    /// Coarse nodes, their elements, and the vertices that they move (in a tree with volume paths).
     pub const COARSE_NODES: u32 = 11;
-    /// The first triangle and the solid of every root (of a tree with several roots and adjacency).
+    /// The first triangle and the solid of every root (in a tree with several roots and adjacency).
     pub const SOLIDS: u32 = 12;
-    /// The bit of kinds that a reader skips where it does not know them.
+    /// The flag of kinds that a reader may skip if unknown.
     pub const SKIPPABLE: u32 = 1 << 31;
 }
 
@@ -150,17 +150,17 @@ pub mod section {
 pub enum PathKind {
     /// Along mesh edges: coverage holds while no edge is longer than `s` times its rest length.
     EdgePath,
-    /// Across triangle interiors: coverage holds while no triangle's largest singular value
-    /// (deformation gradient against the rest shape, which counts as higher where a triangle is flat:
-    /// see [`measure_stretch`](crate::measure_stretch)) exceeds `s`.
+    /// Across triangle interiors: coverage holds while no triangle's largest singular value (of the deformation
+    /// gradient from the rest shape, whose height has a minimum: see [`measure_stretch`](crate::measure_stretch))
+    /// exceeds `s`.
     Surface,
-    /// Through the elements of a volume that carries the surface: coverage holds while no element's largest singular
+    /// Through the elements of a volume that moves the surface: coverage holds while no element's largest singular
     /// value exceeds `s`.
     Volume,
 }
 
 impl PathKind {
-    /// The byte that stands for this kind in the header.
+    /// The code of this kind in the header.
     #[must_use]
     pub const fn code(self) -> u8 {
         match self {
@@ -180,7 +180,7 @@ impl PathKind {
     }
 }
 
-/// A node's children, or a leaf's triangles, as a run of rows.
+/// A node's children, or a leaf's triangles, as a range of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
     /// Rows `first..first + count` of the node table.
@@ -204,8 +204,7 @@ const COUNT_SHIFT: u32 = 28;
 const FIRST_MASK: u32 = (1 << COUNT_SHIFT) - 1;
 
 impl Link {
-    /// The link as it is stored: bit 31 marks a leaf, bits 28 to 30 hold `count - 1`, bits 0 to 27
-    /// `first`.
+    /// The stored link: bit 31 marks a leaf, bits 28 to 30 hold `count - 1`, bits 0 to 27 `first`.
     #[must_use]
     pub const fn encode(self) -> u32 {
         let (mark, first, count) = match self {
@@ -228,7 +227,6 @@ impl Link {
     }
 }
 
-/// A node as it is stored.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Node {
     pub pin: u32,
@@ -260,7 +258,7 @@ const fn rows_from(bytes: &[u8], row: u32, stride: usize) -> Option<&[u8]> {
     }
 }
 
-/// `count` rows of `stride` bytes from row `first` on; `None` unless all of them are there.
+/// `count` rows of `stride` bytes from row `first` on; `None` unless all exist.
 #[inline(always)]
 pub(crate) fn run(bytes: &[u8], first: u32, count: u32, stride: usize) -> Option<&[u8]> {
     let start = (first as usize).checked_mul(stride)?;
@@ -375,7 +373,7 @@ pub(crate) const fn rest_position(rest: &[u8], row: u32) -> Option<glam::Vec3> {
     ))
 }
 
-/// The origin's coordinates; zeros where the section is absent.
+/// The origin's coordinates; zeros if the section is absent.
 pub(crate) const fn origin(section: &[u8]) -> [f64; 3] {
     let (numbers, _) = section.as_chunks::<8>();
     match numbers {
@@ -406,7 +404,7 @@ pub(crate) const fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
     }
 }
 
-/// The part of `bytes` that a section table row points at.
+/// The part of `bytes` to which a section table row points.
 pub(crate) const fn range(bytes: &[u8], offset: u32, length: u32) -> Option<&[u8]> {
     match bytes.split_at_checked(offset as usize) {
         Some((_, tail)) => match tail.split_at_checked(length as usize) {

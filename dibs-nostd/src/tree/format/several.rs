@@ -1,4 +1,4 @@
-//! Several rows of a table by one bounds check, for the wide search.
+//! Several rows of a table with one bounds check, for the wide search.
 //!
 //! Reads have one size, so that no loop depends on a count. They may include rows after the requested ones, and zeros
 //! past the end of the table.
@@ -6,7 +6,7 @@
 use super::{Node, node_bytes};
 use crate::Index;
 
-/// Copies eight node records: a run of `count`, and the records after it.
+/// Copies eight node records: a range of `count`, and the records after it.
 #[inline(always)]
 pub(crate) fn copy_nodes<I: Index>(
     nodes: &[u8],
@@ -44,8 +44,8 @@ pub(crate) fn four_nodes<I: Index>(rows: &[u8]) -> Option<[Node; 4]> {
     }
 }
 
-/// Twelve vertices, of which the first `count + 2` are those of a leaf of `count` triangles: the first triangle's
-/// corners, and the third corner of each other, since only that may be new to the leaf.
+/// Twelve vertices, of which the first `count + 2` belong to a leaf of `count` triangles: the first triangle's corners,
+/// and the third corner of each other one, since only that may be new to the leaf.
 #[inline(always)]
 pub(crate) fn leaf_vertices<I: Index>(
     triangles: &[u8],
@@ -57,8 +57,8 @@ pub(crate) fn leaf_vertices<I: Index>(
     Some([a, b, c, d, e, f, g, h, i, j, j, j])
 }
 
-/// Four triangles: the first of a run of `count`, and any rows after a shorter run. All the first corners, all the
-/// second and all the third.
+/// Four triangles: the first of a range of `count`, and any rows after a shorter range. All first corners, all second
+/// and all third.
 #[inline(always)]
 pub(crate) fn four_triangles<I: Index>(
     triangles: &[u8],
@@ -85,7 +85,7 @@ fn indices<I: Index, const N: usize>(bytes: &[u8], at: usize, needed: usize) -> 
     }
 }
 
-/// The first `N` rows, of which `needed` must exist. If there are fewer than `N`, `last` holds them with zeros
+/// The first `N` rows, of which `needed` must exist. If there are fewer than `N`, they are copied to `last`, with zeros
 /// appended.
 #[inline(always)]
 fn chunk<'r, T: Copy + Default, const N: usize>(

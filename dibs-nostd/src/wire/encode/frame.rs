@@ -8,11 +8,11 @@ use crate::wire::{
 };
 use crate::{RigidPose, VertexTable};
 
-/// Cuts one frame into packets of at most `MTU` bytes: begin, vertices, commit; behind the begin a pose, if the frame has
-/// [one](Self::with_pose).
+/// Splits one frame into packets of at most `MTU` bytes: begin, a pose if the frame has [one](Self::with_pose),
+/// vertices, commit.
 ///
-/// `MTU` is 64 for CAN-FD, up to [`MAX_PACKET`](crate::wire::MAX_PACKET) elsewhere; less than 64 does
-/// not compile. No memory but the caller's buffer.
+/// `MTU` is 64 for CAN-FD, up to [`MAX_PACKET`](crate::wire::MAX_PACKET) elsewhere; less than 64 does not compile. It
+/// needs no memory but the caller's buffer.
 ///
 /// ```
 /// use dibs_nostd::{wire::{Encoding, FrameEncoder, FrameId, Packet}, glam::Vec3};
@@ -90,10 +90,10 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         frame.fits()
     }
 
-    /// A partial frame: the vertices farther than the encoding's error from the receiver's, which are `held`, in the
-    /// frame `base_epoch` of the same session. It includes a few others in between, where that saves packets.
+    /// A partial frame: the vertices farther than the encoding's error from `held`, the receiver's positions in the
+    /// frame `base_epoch` of the same session. It includes a few others in between if that saves packets.
     ///
-    /// `held` must be the positions that the receiver decoded, not those before quantising.
+    /// `held` must be the positions that the receiver decoded, not those before quantisation.
     ///
     /// # Errors
     /// As [`new`](Self::new), and [`EncodeError::Base`] or [`EncodeError::BaseEpoch`].
@@ -130,11 +130,12 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         self
     }
 
-    /// The same frame at a pose, for a receiver of [`Posed`](crate::guard::Posed) frames: positions are those before it. A
-    /// partial frame without one keeps that of its base; a whole one without is where the mesh's file has it.
+    /// The same frame with a pose, for a receiver of [`Posed`](crate::guard::Posed) frames: positions are in mesh
+    /// coordinates. A partial frame without a pose keeps that of its base; a whole frame without one is in the
+    /// coordinates of the mesh's file.
     ///
     /// # Errors
-    /// [`EncodeError::Packets`], because the pose takes one.
+    /// [`EncodeError::Packets`], because the pose takes a packet.
     pub fn with_pose(mut self, pose: RigidPose) -> Result<Self, EncodeError> {
         self.begin.is_posed = true;
         self.pose = Some(pose);
@@ -165,8 +166,8 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
         }
     }
 
-    /// A partial frame never takes more packets than a whole one: each packet starts at a vertex that
-    /// moved, and takes all that fit behind it.
+    /// A partial frame never takes more packets than a whole one: each packet starts at a moved vertex, and takes all
+    /// that fit after it.
     fn fits(self) -> Result<Self, EncodeError> {
         let packets = self.begin.rows.div_ceil(self.capacity()) + u32::from(self.pose.is_some());
         if packets > MAX_CONTENT_PACKETS { Err(EncodeError::Packets { packets }) } else { Ok(self) }
@@ -242,7 +243,7 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
         PacketWriter::new(buffer, kind, &self.id, self.sequence, count, first)
     }
 
-    /// The next packet: vertices from the first row, from here on, that must be sent, or the commit.
+    /// The next packet: vertices from the first row at or after this one that must be sent, or the commit.
     fn vertices_from(&self, row: u32) -> Next {
         match (row..self.begin.rows).find(|&row| self.must_be_sent(row)) {
             Some(first) => Next::Vertices { first },
@@ -261,7 +262,7 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
         let Some(held) = self.held else { return true };
         let (now, held) = (self.positions.position(row), held.position(row));
         let (Some(now), Some(held)) = (now, held) else { return true };
-        // Written so that NaN is sent. The limit is lowered by the rounding of the difference.
+        // Written so that NaN is sent. The limit is reduced by the rounding of the difference.
         let limit = self.begin.encoding.error() * (1.0 - 4.0 * f32::EPSILON);
         !(now == held || (now - held).length() <= limit)
     }

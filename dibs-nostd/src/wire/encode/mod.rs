@@ -20,8 +20,9 @@ use super::{
 };
 use crate::tree::{SurfaceFacts, Unit};
 
-/// Writes a heartbeat to the buffer. `id` has the newest epoch that the sender has begun, or one less than the first
-/// frame's before that. `beat` counts up by one. `echo` is the clock of the newest status that the sender has taken.
+/// Writes a heartbeat to the buffer. `id` has the newest epoch that the sender has begun; before the first frame, that
+/// frame's epoch less one. `beat` is incremented each time. `echo` is the clock of the newest status received by the
+/// sender.
 pub fn encode_heartbeat<'b, M: Mac>(
     id: &FrameId,
     beat: u32,
@@ -53,8 +54,8 @@ pub fn encode_hello<'b, M: Mac>(
     packet.finish(mac, id.session).0
 }
 
-/// Writes a status to the buffer: the answer to a hello, or else as many counters as fit. The status' number selects
-/// them, so that a few statuses carry all.
+/// Writes a status to the buffer: the answer to a hello, or otherwise as many counters as fit. The status' number
+/// selects them, so that a few statuses report all.
 pub fn encode_status<'b, M: Mac, const MTU: usize>(
     mesh_id: u32,
     status: &Status,
@@ -101,7 +102,7 @@ pub fn encode_status<'b, M: Mac, const MTU: usize>(
     packet.finish(mac, session).0
 }
 
-/// A begin packet without its end.
+/// A begin packet without its last fields.
 fn begin_packet<'b, M: Mac>(
     buffer: &'b mut [u8],
     id: &FrameId,
@@ -116,7 +117,7 @@ fn begin_packet<'b, M: Mac>(
     packet
 }
 
-/// Rows of this size that fit one packet behind `fixed` bytes.
+/// Number of rows of this size that fit in a packet after `fixed` bytes.
 const fn capacity<M: Mac>(mtu: usize, fixed: usize, row: usize) -> u32 {
     assert!(mtu >= MIN_MTU, "a packet needs a transport unit of at least 64 bytes");
     let tag = if M::TAGGED { TAG_BYTES } else { 0 };
@@ -124,7 +125,7 @@ const fn capacity<M: Mac>(mtu: usize, fixed: usize, row: usize) -> u32 {
     if rows > 255 { 255 } else { rows as u32 }
 }
 
-/// One packet being written. `MTU` and the counts ensure that the buffer is large enough.
+/// A packet being written. `MTU` and the counts ensure that the buffer is large enough.
 struct PacketWriter<'b, M> {
     bytes: Bytes<'b>,
     direction: Direction,
@@ -172,7 +173,7 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         self.bytes.put(bytes);
     }
 
-    /// A number of 24 bits; 0, which is unknown, for a larger one.
+    /// A number of 24 bits; a larger one becomes 0, which means unknown.
     fn put_u24(&mut self, number: u32) {
         let [n0, n1, n2, high] = number.to_le_bytes();
         self.put(&if high == 0 { [n0, n1, n2] } else { [0; 3] });
@@ -184,7 +185,6 @@ impl<'b, M: Mac> PacketWriter<'b, M> {
         self.put_u24(surface.triangles);
     }
 
-    /// The body of a begin packet.
     fn begin(&mut self, begin: &Begin) {
         let [_, _, high @ ..] = begin.session.to_le_bytes();
         self.put(&high);

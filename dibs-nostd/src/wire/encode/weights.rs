@@ -7,7 +7,7 @@ use crate::wire::{
     NoMac, kind,
 };
 
-/// Cuts the weights of one modal frame into packets of at most `MTU` bytes: begin, weights, commit.
+/// Splits the weights of one modal frame into packets of at most `MTU` bytes: begin, weights, commit.
 ///
 /// ```
 /// use dibs_nostd::wire::{FrameId, WeightsEncoder};
@@ -28,7 +28,7 @@ pub struct WeightsEncoder<'a, const MTU: usize, M = NoMac> {
     freshness: Freshness,
     surface: SurfaceFacts,
     mac: M,
-    /// Weights sent; `None` before the begin.
+    /// Number of weights sent; `None` before the begin.
     sent: Option<u32>,
     is_done: bool,
     sequence: u16,
@@ -39,7 +39,7 @@ impl<'a, const MTU: usize> WeightsEncoder<'a, MTU> {
     /// A modal frame.
     ///
     /// # Errors
-    /// [`EncodeError`] names the first weight that is not finite, or that there are none or too many.
+    /// [`EncodeError`]: the first weight that is not finite, or the number of weights if there are none or too many.
     pub fn new(id: FrameId, weights: &'a [f32]) -> Result<Self, EncodeError> {
         if weights.is_empty() || weights.len() > MAX_WEIGHTS as usize {
             return Err(EncodeError::Rows { rows: weights.len() });

@@ -24,9 +24,9 @@ use crate::{Budget, Capsule, MovingSurface, Odometer, Options, Tree};
 const LIMIT: f32 = 6.0;
 const RIDGE: f32 = 0.1;
 
-/// The bounds in the front, in mm: none exceeds the distance of the nearest vertex below it, and after a whole search none
-/// is less than the limit, but for rounding. All triangles are below one of them, or in a leaf within the range, and no
-/// triangle twice.
+/// The bounds in the front, in mm: none exceeds the distance of the nearest vertex below it, and after a whole search
+/// none is less than the limit, except for rounding. Every triangle is below exactly one of them, or in a leaf within
+/// the range.
 fn bounds<const M: usize>(
     memory: &mut Memory<1, 1, M>,
     tree: &Tree<'_, u16>,
@@ -77,7 +77,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
     let mut vector = |size: f32| Vec3::from([(); 3].map(|()| (rng.f32() - 0.5) * size));
     let mut stack = [Waiting { lower: 0.0, link: 0 }; 128];
     let mut memory = Memory::<1, 1, 256>::new(Unit::of(&tree));
-    // Deadlines wrap soon.
+    // Deadlines wrap early.
     memory.clock = MotionClock::wrapping_after(Unit::of(&tree), 1 << 22);
     let (mut tip, mut span) = (Vec3::new(50.0, 0.0, 20.0), Vec3::new(30.0, 20.0, 40.0));
     let (mut checked, mut kept) = (0, 0);
@@ -85,7 +85,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
         let [before, after] = pair else { unreachable!() };
         let step = odometer.step(before.as_slice(), after.as_slice());
         for tick in 0..8 {
-            // Every other frame the tool rests; now and then it leaps.
+            // Every other frame the tool rests; sometimes it jumps.
             if number % 2 == 0 {
                 let size = if tick == 7 { 10.0 } else { 0.5 };
                 (tip, span) = (tip * 0.999 + vector(size), span * 0.999 + vector(size));
@@ -117,7 +117,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
                 moved.keep(is_whole);
                 Ok::<_, QueryError>(is_whole)
             };
-            // Budgets that end anywhere, until one is enough.
+            // Budgets of any size, until one is enough.
             let budgets = if tick == 4 { 0..2_000 } else { 2_000..2_001 };
             let is_whole = budgets.into_iter().any(|node_tests| {
                 search(&Options::cold().budget(Budget::new(node_tests))).expect("an answer")
@@ -134,7 +134,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
     assert!(checked > 20_000 && kept > 300 && memory.clock.has_wrapped());
 }
 
-/// Nodes that a budget never reaches stay due, however far tool and surface move meanwhile: deadlines wrap.
+/// Nodes that a budget never reaches stay due, however far tool and surface move in between: deadlines wrap.
 #[test]
 fn a_node_that_no_search_reaches_stays_due() {
     let mesh = generate::heart(1_280).expect("a valid size").mesh;

@@ -1,4 +1,4 @@
-//! The plane across the closest pair.
+//! The plane perpendicular to the closest pair.
 
 use glam::Vec3;
 
@@ -8,15 +8,15 @@ use crate::query::search::Search;
 use crate::query::search::slack::ACCURACY;
 use crate::{Index, Tool, VertexTable};
 
-/// The plane across the closest pair. Most triangles around the pair are beyond it, and triangles that share the
-/// closest point are not nearer; neither need an exact test.
+/// The plane perpendicular to the closest pair. Most triangles around the pair are beyond it, and triangles that share
+/// the closest point are not nearer; neither kind needs an exact test.
 pub(super) struct Facing {
     start: Vec3,
-    /// From the axis to the closest triangle, of length 1; zero where there is none, or they touch.
+    /// Unit vector from the axis to the closest triangle; zero if there is none, or they touch.
     normal: Vec3,
-    /// The farthest that the axis reaches along the normal, from its start.
+    /// The axis' largest coordinate along the normal, from its start.
     foremost: f32,
-    /// Triangles farther than this along the normal cannot be closer than the closest by more than the accuracy.
+    /// Triangles farther than this along the normal cannot be closer than the closest one by more than the accuracy.
     pub within: f32,
 }
 
@@ -41,7 +41,7 @@ impl Facing {
         Self { start, normal, foremost, within }
     }
 
-    /// No point of a triangle is closer to the axis than this.
+    /// A lower bound on a triangle's distance from the axis.
     #[inline(always)]
     pub fn lowest(&self, corners: &[Vec3; 3]) -> f32 {
         least(corners.map(|corner| self.normal.dot(corner - self.start))) - self.foremost

@@ -12,7 +12,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
-    /// Tests the planes of those children that are leaves. Returns the set of children that remain.
+    /// Tests the planes of the children that are leaves. Returns the set of remaining children.
     #[inline(always)]
     pub(super) fn reject_leaves(&mut self, near: u64, mut leaves: u64) -> Option<u64> {
         let (tree, vertices) = (self.search.tree, self.search.vertices);
@@ -32,8 +32,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// As [`Search::leaf`], but tests the triangles, from the first that the plane does not reject, four at a time and
-    /// each against its own plane only.
+    /// As [`Search::leaf`], but tests four triangles at a time, from the first that the plane does not reject, each
+    /// against its own plane only.
     #[inline(always)]
     pub(super) fn leaf_at_once(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
         if self.meter.node().is_none() {
@@ -47,7 +47,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if within == 0 {
             return Ok(Step::Done);
         }
-        // From the third on, each vertex is the last corner of a triangle, and the triangles before it are beyond the
+        // From the third vertex on, each is the last corner of a triangle, and the triangles before it are beyond the
         // plane.
         let beyond = within.trailing_zeros().saturating_sub(2);
         let (mut first, mut count) = (first + beyond, count.saturating_sub(beyond));
@@ -70,7 +70,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Step::Done)
     }
 
-    /// Tests a triangle, if the budget is enough.
+    /// Tests a triangle if the budget suffices.
     #[inline(always)]
     fn triangle(&mut self, triangle: u32) -> Result<Step, QueryError> {
         if triangle == self.best_triangle {
@@ -89,7 +89,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Step::Done)
     }
 
-    /// The set of those of four triangles that are not beyond the plane towards their corners' mean.
+    /// The set of those of four triangles that are not beyond their plane towards the corners' mean.
     #[inline(always)]
     fn within_own_planes(&self, a: Vec3x4, b: Vec3x4, c: Vec3x4) -> u32 {
         let mean = a.plus(b).plus(c).times(Vec4::splat(THIRD));
@@ -101,7 +101,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 }
 
 impl Plane {
-    /// The set of a leaf's vertices that are not beyond the plane, in the order in which its triangles name them.
+    /// The set of a leaf's vertices that are not beyond the plane, in the order in which its triangles list them.
     #[inline(always)]
     fn vertices_within<I: Index, V: VertexTable + ?Sized>(
         &self,
@@ -125,7 +125,7 @@ impl Plane {
     }
 }
 
-/// The set of those of four points that are not beyond a plane, or each its own. A NaN is not beyond.
+/// The set of those of four points that are not beyond a plane, or each its own plane. NaN is not beyond.
 #[inline(always)]
 fn within(normal: Vec3x4, limit: Vec4, points: Vec3x4) -> u32 {
     !normal.dot(points).cmpgt(limit).bitmask() & 0xF

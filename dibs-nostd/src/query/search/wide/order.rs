@@ -8,10 +8,10 @@ use crate::query::search::Waiting;
 use crate::tree::format::{Link, whole_node};
 use crate::{Index, Tool, VertexTable};
 
-/// Trees with more nodes than this are larger than a processor's nearest cache.
+/// Trees with more nodes than this do not fit a processor's first-level cache.
 const CACHED: u32 = 4096;
 
-/// The low bits of a key: the child's index, counted backwards.
+/// The low bits of a key: the child's index, counted down.
 const INDEX: u32 = 63;
 
 /// A key that is below all others.
@@ -20,8 +20,8 @@ const NONE: i32 = -1;
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
     /// Pushes the children in a set, the nearest on top.
     ///
-    /// A child's place is the number of children that are farther. Counting takes more comparisons than an
-    /// insertion sort, but four at a time and without a branch.
+    /// A child's position is the number of children that are farther. Counting takes more comparisons than an insertion
+    /// sort, but four at a time and without a branch.
     #[inline(always)]
     pub(super) fn push(&mut self, mut set: u64) -> Option<()> {
         let Self { search, records, lowers, keys, .. } = self;
@@ -49,7 +49,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
         }
         for own in keys.get(..count.div_ceil(4))? {
             let mut farther = [0; 4];
-            // Not flattened, or the compiler would vectorise along the keys instead.
+            // Not flattened, so that the compiler does not vectorise along the keys instead.
             for keys in all {
                 for key in keys {
                     farther = array::from_fn(|i| farther[i] + u32::from(*key > own[i]));
@@ -57,7 +57,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
             }
             for (key, place) in own.iter().zip(farther) {
                 let at = INDEX - (*key as u32 & INDEX);
-                // No place where the block is longer than the stack.
+                // Out of range where the block is longer than the stack.
                 if let Some(place) = stack.get_mut(place as usize) {
                     let link = whole_node::<I>(records, at)?.link;
                     *place = Waiting { lower: *lowers.get(at as usize)?, link };
