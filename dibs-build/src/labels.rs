@@ -41,7 +41,7 @@ pub enum LabelsErrorKind {
     },
     /// The mesh's file has as many faces as the mesh has triangles, but some faces were dropped and others cut up.
     #[error(
-        "has {found} labels, and the mesh's file has as many faces as triangles are left of others: mend the mesh, \
+        "has {found} labels, for the faces of the mesh's file or for the triangles left of it: mend the mesh, \
          so that none is dropped (--strict names them)"
     )]
     Ambiguous {

@@ -56,10 +56,10 @@ pub enum WindingError {
         /// The other one.
         other: usize,
     },
-    /// So many closed parts that the test which of them contain which would take too long.
+    /// Too many closed parts to test which of them contain others.
     #[error(
-        "the surface has {parts} closed parts, and whether they lie in each other is tested for at most {most}: build a \
-         tree for each few of them"
+        "the surface has {parts} closed parts, and which of them contain others is tested for at most {most}: build \
+         several trees, each of some of them"
     )]
     Parts {
         /// Closed parts.

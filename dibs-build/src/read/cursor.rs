@@ -95,7 +95,7 @@ impl<'a> Cursor<'a> {
 
     /// The next number, which is text even in a binary file.
     pub fn text_number(&mut self) -> Result<f64> {
-        let word = self.needed("number where one must be")?;
+        let word = self.needed("number where one is expected")?;
         coordinate(word)
             .ok_or_else(|| self.malformed(format!("'{}' is not a number", excerpt(word))))
     }
@@ -112,7 +112,7 @@ impl<'a> Cursor<'a> {
     }
 
     pub fn whole(&self, number: f64) -> Result<u64> {
-        index(number).ok_or_else(|| self.malformed(format!("{number} is no number of a thing")))
+        index(number).ok_or_else(|| self.malformed(format!("{number} is not a count or an index")))
     }
 
     /// An error unless so many elements, of at least so many bytes each, can follow; called before memory is allocated
@@ -153,7 +153,7 @@ impl<'a> Cursor<'a> {
             self.skip(count * scalar.bytes())?;
         } else {
             for _ in 0..self.check_room(count, 2, "values")? {
-                self.needed("value where one must be")?;
+                self.needed("value where one is expected")?;
             }
         }
         Ok(None)

@@ -48,7 +48,7 @@ fn check(metadata: &std::fs::Metadata) -> io::Result<()> {
 /// As [`whole`]. Also where it is not UTF-8.
 pub(crate) fn text(path: &Path) -> io::Result<String> {
     String::from_utf8(whole(path)?)
-        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text in UTF-8"))
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not text in UTF-8"))
 }
 
 #[cfg(test)]

@@ -213,7 +213,7 @@ impl Mesh {
             *value = file.number(Scalar::F64)?;
         }
         if self.row.insert(tag, self.raw.positions.len() as u32).is_some() {
-            return Err(file.malformed(format!("node {tag} stands there twice")));
+            return Err(file.malformed(format!("node {tag} is defined twice")));
         }
         self.raw.positions.push(position);
         Ok(())

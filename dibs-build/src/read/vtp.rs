@@ -231,7 +231,7 @@ impl File<'_> {
             }
             let numbers = self.numbers(&array)?;
             let indices = || {
-                let not_one = |number: &f64| malformed(format!("{number} is no number of a point"));
+                let not_one = |number: &f64| malformed(format!("{number} is not a point number"));
                 numbers.iter().map(|n| index(*n).ok_or_else(|| not_one(n))).collect::<Result<_>>()
             };
             match array.name.as_str() {

@@ -47,7 +47,7 @@ impl Lines {
             bail!("{}: longer than {LONGEST} bytes; give one pose a line", name());
         }
         let line = String::from_utf8(line)
-            .map_err(|_| anyhow!("{}: is no text; give CSV or JSON lines in UTF-8", name()))?;
+            .map_err(|_| anyhow!("{}: is not text; give CSV or JSON lines in UTF-8", name()))?;
         // Excel begins a file with a byte order mark.
         let line = line.trim_start_matches('\u{feff}').trim();
         let has_none = line.is_empty() || self.number == 1 && grammar::is_header(line);

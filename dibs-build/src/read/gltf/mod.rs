@@ -65,7 +65,7 @@ pub(super) fn read(bytes: &[u8], folder: &Path) -> Result<Raw> {
     while let Some((number, above)) = waiting.pop() {
         let node = get(&document.nodes, number, "node")?;
         if std::mem::replace(&mut seen[number], true) {
-            return Err(malformed(format!("node {number} stands in the scene twice")));
+            return Err(malformed(format!("node {number} is in the scene twice")));
         }
         let place = above * node.place();
         surface.node(node, number, &place)?;

@@ -132,7 +132,7 @@ impl Model {
         let row = |of: &str| {
             let text = needed(of)?;
             let row = text.trim().parse();
-            row.map_err(|_| malformed(format!("'{}' is no number of a vertex", excerpt(&text))))
+            row.map_err(|_| malformed(format!("'{}' is not a vertex number", excerpt(&text))))
         };
         match name.as_ref() {
             "model" => {

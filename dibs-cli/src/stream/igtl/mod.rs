@@ -231,7 +231,7 @@ impl Igtl {
         let device = self.pose_device.as_deref().unwrap_or_default();
         let read = kind.read(content, device).map_err(|error| match error {
             PoseError::Layout => {
-                (Cause::Layout, "has not the bytes that its type has".to_owned())
+                (Cause::Layout, "its size is not that of its type".to_owned())
             }
             PoseError::NoRotation => {
                 let why =
