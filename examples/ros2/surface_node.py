@@ -2,10 +2,10 @@
 
     python3 surface_node.py heart.ply heart.dibs udp:192.168.1.20:5000
 
-`/surface`, a PointCloud2, has the vertices of the tree's mesh in the order of its file, in metres (REP 103), and the time of
-the capture. `/surface_mesh`, a shape_msgs/Mesh, has the triangles too, which are compared with the tree's, and no time. Axes
-are those of the mesh's file: turn them before. A cloud that does not fit is refused by its cause, and the receiver's surface
-ages. bindings/python/tests/test_ros2.py runs it where rclpy is installed.
+`/surface`, a PointCloud2, has the vertices of the tree's mesh in the order of its file, in metres (REP 103), and the
+time of capture. `/surface_mesh`, a shape_msgs/Mesh, has triangles as well, which are compared with the tree's, but no
+time. Axes must be those of the mesh's file: convert them first. A cloud that does not fit is refused with the cause,
+and the receiver's surface ages. bindings/python/tests/test_ros2.py runs this if rclpy is installed.
 """
 
 import sys

@@ -14,8 +14,8 @@ void schedule_start(void);
 /* Stops the interrupts. */
 void schedule_stop(void);
 
-/* Does a slice of work on complete frames, and writes the status to send, if one is due; its length, or 0. Meanwhile the bus
-   interrupt is disabled: for some microseconds no byte is taken. */
+/* Does a slice of work on complete frames, and writes the status to send, if one is due. Returns its length, or 0. The
+bus interrupt is disabled meanwhile: for some microseconds no byte is received. */
 size_t schedule_background(uint8_t status[DIBS_STATUS]);
 
 /* Control ticks run so far. */

@@ -1,5 +1,5 @@
-/* The debugger's services: the length of a run, a message, and the end. Without a debugger a `bkpt` is a fault: leave this
-   out on silicon. */
+/* The debugger's services: the length of a run, a message, and the end. Without a debugger a `bkpt` is a fault, so
+remove this on real hardware. */
 #ifndef SEMIHOSTING_H
 #define SEMIHOSTING_H
 

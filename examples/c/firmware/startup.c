@@ -15,8 +15,8 @@
 /* Of the linker script. */
 extern uint32_t data_start[], data_end[], data_in_flash[], bss_start[], bss_end[], _stack_start[];
 
-/* A fault is broken hardware, a defect or a stack overflow: the program ends, so that a test sees it. The stack pointer
-   cannot be trusted, so it is set anew. */
+/* A fault is broken hardware, a defect or a stack overflow: the program ends, so that a test notices. The stack pointer
+may be invalid, so it is reset. */
 __attribute__((naked)) static void fault(void) {
     __asm volatile("ldr r0, =_stack_start\n mov sp, r0\n b stop_on_fault");
 }

@@ -31,8 +31,8 @@ static const dibs_guard_limits limits = {
     .speed = 100.0f,
     .age = 6000,
     .ticks_a_second = TICK_RATE,
-    /* More than the closest pair on the heart needs, and within a tick on every admitted surface. The spring tells depths
-       of a quarter of a millimetre apart. */
+    /* The budget exceeds the needs of the closest pair on the heart, and fits in a tick on every admitted surface. The
+       tolerance changes the spring's force by a quarter of a newton. */
     .options = {.budget = 1750, .depth_tolerance = 0.25f},
     /* Nobody acknowledges here; a real robot leaves this out. */
     .automatic = 1,

@@ -43,7 +43,7 @@ pub fn joints(
     };
     let inverse = inverse.as_chunks::<16>().0;
     let joint = |(number, &node): (usize, &usize)| {
-        let world = get(worlds, node, "node")?.ok_or_else(|| malformed("a joint in a cycle of nodes"))?;
+        let world = get(worlds, node, "node")?.ok_or_else(|| malformed("a joint in a cycle"))?;
         let bind = inverse.get(number).map_or(DMat4::IDENTITY, DMat4::from_cols_array);
         Ok(world * bind)
     };
