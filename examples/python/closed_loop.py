@@ -21,7 +21,7 @@ HAND = 200.0  # mm/s
 
 
 class Heart:
-    """A heart that beats, played over and over."""
+    """A beating heart, in a loop."""
 
     def __init__(self, triangles=1_000):
         mesh, motion = dibs.generate("heart", triangles)
@@ -40,7 +40,7 @@ class Heart:
 
 
 def hand(target, tool, tick):
-    """The motion that the hand wants: a pull to the target, and a turn of the wrist."""
+    """The motion that the hand commands: a pull to the target, and a rotation of the wrist."""
     pull = (target - tool[:3]) * PULL * TICK
     pull *= min(1.0, HAND * TICK / np.linalg.norm(pull))
     return dibs.RigidMotion(tool[:3], pull, [0.0, 0.0, 0.0005 * np.sin(0.01 * tick)])

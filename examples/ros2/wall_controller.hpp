@@ -17,10 +17,10 @@ ten * lines around it; alone.cpp calls it without ROS.
 
 class WallController {
 public:
-    /** `tree` are the bytes of `dibs build`; `vertices` as `dibs inspect` prints them; `limits` of the tissue. */
+    /** `tree` are the bytes of `dibs build`; `vertices` is the number that `dibs inspect` prints. */
     dibs::Code configure(std::span<const std::uint8_t> tree, std::uint32_t vertices, const dibs_guard_limits &limits,
                          const dibs_wall &of_wall) {
-        /* Until it succeeds, packets and ticks have an error, and the force is the hold. */
+        /* Until it succeeds, packets and ticks return an error, and the force is the hold. */
         bus = nullptr;
         guard = nullptr;
         bytes.assign(tree.begin(), tree.end());
@@ -30,9 +30,9 @@ public:
         return dibs_start(memory.get(), size, bytes.data(), bytes.size(), &limits, &bus, &guard);
     }
 
-    /** A datagram of `dibs stream` or of surface_node.py, at a time in ms. Returns the status to send back, which may be empty. */
+    /** Receives a datagram of `dibs stream` or surface_node.py, at a time in ms. Returns the status to send, if any. */
     std::span<const std::uint8_t> receive(std::span<const std::uint8_t> packet, std::uint32_t now) {
-        /* What is wrong with a packet or a frame is counted, and the surface published last stays. */
+        /* Errors of packets and frames are counted, and the latest published surface stays. */
         dibs_bus_packet(bus, packet.data(), packet.size(), now, nullptr);
         dibs_advance advance = DIBS_ADVANCE_PENDING;
         while (dibs_bus_work(bus, 1000, &advance) == DIBS_CODE_OK && advance == DIBS_ADVANCE_PENDING) {}
@@ -55,7 +55,7 @@ public:
     /** Whether only an acknowledgement is missing to leave the safe state. */
     bool waits() const { return answer.trust.waits_for_acknowledgement != 0; }
 
-    /** An operator's acknowledgement: between two ticks, of the same thread. */
+    /** An operator's acknowledgement: call it between two ticks, in the same thread. */
     dibs::Code acknowledge() { return dibs_guard_acknowledge(guard); }
 
 private:

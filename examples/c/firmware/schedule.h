@@ -1,4 +1,4 @@
-/* The two interrupts, and the watch over the first one's deadline. */
+/* The two interrupts, and the monitoring of the control tick's deadline. */
 #ifndef SCHEDULE_H
 #define SCHEDULE_H
 
@@ -21,7 +21,7 @@ size_t schedule_background(uint8_t status[DIBS_STATUS]);
 /* Control ticks run so far. */
 uint32_t schedule_ticks(void);
 
-/* Fills in what is known here of the run. */
+/* Fills in this module's fields of the summary. */
 void schedule_sum_up(summary_record *summary);
 
 /* The handlers: of SysTick, and of UART 0. */

@@ -1,5 +1,5 @@
 /*
- * The control loop on this computer: answers a script of events. Floats are printed by their bits.
+ * The control loop on a host computer: executes a script of events. Floats are printed as their bits.
  *
  *     dibs-host TREE SCRIPT
  *
@@ -122,7 +122,7 @@ static dibs_tool take_tool(char *text) {
     return tool;
 }
 
-/* A whole file, and a zero. */
+/* Reads a whole file, and appends a zero. */
 static uint8_t *file_read(const char *path, size_t *length) {
     FILE *file = fopen(path, "rb");
     long size = -1;
