@@ -1,4 +1,5 @@
-//! A simulated hand that pushes against the constraint: all contacts hold it, the closest pair alone not always.
+//! A simulated hand that pushes against the constraint: all contacts together hold it, but the closest pair alone not
+//! always.
 
 // Requirements: C-03, C-04
 
