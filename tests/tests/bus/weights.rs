@@ -65,7 +65,7 @@ impl Bus {
     }
 }
 
-/// A frame of weights becomes their surface, with its label, age and bound on the stretch.
+/// A frame of weights becomes its surface, with label, age and a bound on the stretch.
 #[test]
 fn weights_come_over_the_bus() {
     let mut bus = bus();
@@ -143,7 +143,7 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
     assert!(bus.send(100, &bus.recorded[8].clone()).is_ok());
 }
 
-/// A receiver of vertices takes no weights.
+/// A receiver of vertices accepts no weights.
 #[test]
 fn a_receiver_of_vertices_refuses_weights() {
     let (mut assembler, _) = dibs_tests::bus::bus();
@@ -192,7 +192,7 @@ fn the_gate_is_exact_whatever_the_bound() {
     assert!(bounded > 100 && measured > 20 && refused > 20);
 }
 
-/// Weights of this process: those of packets to the bit, and refused as theirs.
+/// Weights from this process: the same as in packets to the bit, and refused for the same causes.
 #[test]
 fn weights_come_by_a_call() {
     let (mut near, mut far) = (bus(), bus());
