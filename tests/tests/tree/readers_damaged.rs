@@ -1,4 +1,4 @@
-//! Damaged mesh files are refused with a message, or give a sound mesh; no reader panics.
+//! Damaged mesh files are refused with a message, or give a valid mesh; no reader panics.
 
 // Requirement: M-03
 
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::mesh_files::{Folder, samples};
 
-/// Checks the promises of every accepted mesh.
+/// Checks the guarantees of every accepted mesh.
 fn check_promises(import: &Import) {
     let mesh = &import.mesh;
     assert!(!mesh.triangles.is_empty());
