@@ -192,8 +192,7 @@ impl<'p> Builder<'p> {
         self
     }
 
-    /// Whether the tree carries the triangles' rest metric (12 bytes a triangle), which the stretch
-    /// measurement needs.
+    /// Whether the tree has the triangles' rest metric (12 bytes a triangle), for the stretch measurement needs.
     #[must_use]
     pub fn with_metric(mut self, with: bool) -> Self {
         self.with_metric = with;

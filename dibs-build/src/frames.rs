@@ -273,8 +273,7 @@ fn squares(triangles: &[[u32; 3]], at: impl Fn(u32) -> Option<Vec3>) -> Option<f
     Some(sum)
 }
 
-/// The signed volume that closed triangles enclose, and the sum of its terms' magnitudes; `None` where a position is
-/// missing.
+/// The signed volume within closed triangles, and the sum of its terms' magnitudes; `None` if a position is missing.
 fn volume(triangles: &[[u32; 3]], at: impl Fn(u32) -> Option<Vec3>) -> Option<(f64, f64)> {
     let near = at(triangles.first()?[0])?.as_dvec3();
     let (mut sum, mut terms) = (0.0, 0.0);

@@ -1,5 +1,4 @@
-//! The file of labels that `dibs build --labels` reads: one for each face of a mesh's file, or each triangle of the
-//! mesh.
+//! The labels that `dibs build --labels` reads: one for each face of the file, or each triangle of the mesh.
 //!
 //! Text: lines that start with `#` and empty ones are skipped; then one number from 0 to 255 a line, in the file's order.
 

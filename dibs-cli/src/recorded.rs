@@ -86,8 +86,7 @@ impl Recorded {
         Ok(Self { frames: rows, nodes, stretches, rate })
     }
 
-    /// The stretch of the surface after a frame if its motion from the previous frame continues; an error beyond the
-    /// limit.
+    /// The stretch after a frame if the motion from the previous frame continues; an error beyond the limit.
     pub fn stretch_beyond<I: Index>(
         &self,
         tree: &Tree<'_, I>,

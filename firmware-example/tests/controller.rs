@@ -24,7 +24,6 @@ const SILENCE_LIMIT: u32 = Trust::SERIAL.silence.1;
 const SURFACE_AGE_WARNING: u32 = Trust::SERIAL.age.0;
 const SURFACE_AGE_LIMIT: u32 = Trust::SERIAL.age.1;
 
-/// The firmware's tree.
 fn firmware_tree() -> &'static surface::Tree {
     static TREE: OnceLock<surface::Tree> = OnceLock::new();
     TREE.get_or_init(|| surface::TREE.validate().expect("valid"))

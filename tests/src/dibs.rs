@@ -34,8 +34,7 @@ pub fn queries<'t>(built: &'t BuiltTree, knowledge: Knowledge) -> Box<dyn Method
     }
 }
 
-/// The same queries with vertices in the mesh's order, read through the tree's vertex order, to measure the benefit of
-/// that order.
+/// The same queries with vertices in the mesh's order, read through the tree's, to measure the benefit of that order.
 ///
 /// # Panics
 /// If the bytes are not those of a tree.

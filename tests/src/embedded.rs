@@ -141,8 +141,7 @@ impl NodeMotion {
     pub const ALL: [Self; 6] =
         [Self::Pulled, Self::Waves, Self::Noise, Self::Bent, Self::Needle, Self::Pressed];
 
-    /// Nodes after a random motion of this kind, weakened until their measured stretch is within the limit, and a rigid
-    /// motion.
+    /// Nodes after a random motion of this kind, weakened until their stretch is within the limit, and a rigid motion.
     #[must_use]
     pub fn apply(self, nodes: &Nodes<'_>, rng: &mut Rng) -> Vec<Vec3> {
         let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();

@@ -146,8 +146,7 @@ impl Scene {
         pushed
     }
 
-    /// Commands the instrument's motion with the velocity of the push in free space: filtered, or limited by velocity
-    /// rows only.
+    /// Commands the instrument to move as the push would in free space: filtered, or limited by velocity rows only.
     ///
     /// # Panics
     /// If a query fails.

@@ -53,8 +53,7 @@ pub fn exact((rotation, shift): &Sent) -> (DQuat, DVec3) {
     (rotation.as_dquat().normalize(), shift.as_dvec3())
 }
 
-/// The pose extrapolated beyond two poses, by a fraction of the step between them, about a centre that moves in a
-/// straight line.
+/// The pose extrapolated beyond two poses, by a fraction of their step, about a centre that moves in a straight line.
 #[must_use]
 pub fn beyond(before: &Sent, after: &Sent, part: f64, centre: DVec3) -> (DQuat, DVec3) {
     let ((a, s), (b, t)) = (exact(before), exact(after));
@@ -82,8 +81,7 @@ pub fn steady_at(centre: Vec3, start: &Sent, spin: Vec3, flow: Vec3, time: f64) 
     (turned, middle - turned * centre)
 }
 
-/// The separation of a capsule from a surface in world coordinates, in f64: signed for a sphere, otherwise as if
-/// outside.
+/// The separation of a capsule from a surface in the world, in f64: signed for a sphere, otherwise as if outside.
 pub struct Truth {
     /// The separation (mm).
     pub separation: f64,

@@ -225,8 +225,7 @@ fn off(
 ) -> f64 {
     let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
     let high = signed - f64::from(tool.radius);
-    // An axis inside is measured at its deepest point. If the surface intersects itself, a point of the axis may have
-    // no depth.
+    // An axis inside is measured at its deepest point. If the surface intersects itself, a point may have no depth.
     let deepest = (inside && tool.start != tool.end)
         .then(|| sides::deepest_separation(rows, triangles, tool, POINTS));
     let (low, high) = match deepest {

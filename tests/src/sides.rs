@@ -146,8 +146,7 @@ pub fn deepest_separation(
 }
 
 /// An interval that contains the signed separation of any tool from a closed surface. If the axis is within `accuracy`
-/// of the surface, the interval covers crossing and not crossing; where the surface intersects itself, it covers both
-/// sides.
+/// of the surface, the interval covers crossing and not crossing; where it intersects itself, both sides.
 #[must_use]
 pub fn signed_separation(
     positions: &[Vec3],

@@ -1,5 +1,4 @@
-//! The benchmark's seeded streams: deformed surfaces with tools around them, a surface that pulses, and the beating
-//! heart.
+//! The benchmark's seeded streams: deformed surfaces with tools around them, one that pulses, and the beating heart.
 
 use std::f32::consts::TAU;
 

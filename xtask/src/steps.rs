@@ -10,8 +10,7 @@ use anyhow::{Context, Result};
 use crate::process::run;
 use crate::workspace;
 
-/// Most lines of an error that the list repeats. One line is not enough: a list of broken promises starts with a
-/// heading.
+/// Most lines of an error in the list. One line is not enough: a list of broken promises starts with a heading.
 const REASON_LINES: usize = 4;
 
 const PASSED: &str = "passed";

@@ -36,8 +36,7 @@ pub fn is_built() -> bool {
     env::var_os(BUILT).is_some()
 }
 
-/// Builds every program and library, as the tests do: built separately, each would compile its dependencies again, with
-/// fewer features.
+/// Builds everything as the tests do: built separately, each would compile its dependencies again, with fewer features.
 ///
 /// # Errors
 /// If something does not compile.

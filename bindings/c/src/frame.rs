@@ -236,8 +236,7 @@ pub(crate) fn rows(positions: *const f32, count: u32) -> Result<&'static [[f32; 
     Ok(rows)
 }
 
-/// Measures the stretch of the frame's vertices, which makes queries on it cheaper. A receiver's frames are already
-/// measured.
+/// Measures the stretch of the frame, which makes queries on it cheaper. A receiver's frames are already measured.
 ///
 /// Cost: linear in the triangles.
 ///

@@ -258,8 +258,7 @@ pub struct dibs_interval {
     pub upper: f32,
 }
 
-/// The certified interval of a pair's separation: both bounds include the accuracy, rounded outwards. Act on the lower
-/// one.
+/// The certified interval of a separation: both bounds include the accuracy, rounded outwards. Act on the lower one.
 ///
 /// Without a side the tool may be inside to any depth: the lower bound is negative infinity. With `DIBS_SIDE_NOT_ASKED`
 /// and `DIBS_SIDE_NO_ADJACENCY` it is that of a tool outside.

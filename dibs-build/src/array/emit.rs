@@ -52,8 +52,7 @@ pub struct Summary {
     pub roots: u32,
     /// Radius of the largest root's sphere at rest, in the mesh's unit.
     pub root_radius: f32,
-    /// Least and greatest corner of the box around the vertices at rest; `None` if the tree has neither a rest shape
-    /// nor nodes.
+    /// The corners of the box around the vertices at rest; `None` if the tree has neither a rest shape nor nodes.
     pub bounding_box: Option<[[f32; 3]; 2]>,
     /// Mean length of the triangles' sides at rest.
     pub mean_edge: Option<f64>,

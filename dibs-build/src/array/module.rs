@@ -50,8 +50,7 @@ pub mod {name} {{
     pub type Tree = ::dibs_nostd::Tree<'static, Index>;
 
 {guard}
-    /// Two buffers for the vertices as they are now, 24 bytes of RAM a vertex: one is read while the bus fills
-    /// the other.
+    /// Two buffers for the current vertices, 24 bytes of RAM a vertex: one is read while the bus fills the other.
     pub type Frames = ::dibs_nostd::Frames<VERTICES>;
 
     /// The bus's end of the buffers.

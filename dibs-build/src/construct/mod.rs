@@ -236,8 +236,7 @@ impl<'a> Constructor<'a> {
         }
     }
 
-    /// Fails once all searches together have looked at too many arcs. Whether a build fails does not depend on the
-    /// threads.
+    /// Fails once all searches together have looked at too many arcs; when does not depend on the threads.
     fn check_work(&self) -> Result<(), BuildError> {
         let triangles = self.surface.mesh.triangles.len();
         let levels = triangles.max(2).ilog2() as usize + 1;

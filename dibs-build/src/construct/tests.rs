@@ -100,8 +100,7 @@ fn random(vertices: u32, count: u32) -> Mesh {
     mesh(positions, (0..count).map(corners).collect())
 }
 
-/// A ribbon of triangles, each larger than the previous by a constant factor: a plane through its middle cuts off its
-/// end.
+/// A ribbon of triangles, each larger than the previous by a factor: a plane through its middle cuts off its end.
 fn growing(count: u32) -> Mesh {
     let at = |row: u32| 1e-9 * 1e17_f32.powf(row as f32 / (count / 2) as f32);
     let sides = |row| [1.0, -1.0].map(|side| Vec3::new(1.0, 0.01 * side, 0.0) * at(row));

@@ -128,8 +128,7 @@ impl Cortex {
 }
 
 impl Surface for Cortex {
-    /// Projects along the direction from the centre, so that triangles that do not overlap as seen from the centre
-    /// never intersect.
+    /// Projects from the centre, so that triangles that do not overlap as seen from it never intersect.
     fn project(&self, point: DVec3) -> (DVec3, DVec3) {
         let direction = point.normalize();
         (direction * self.radius(direction), direction)

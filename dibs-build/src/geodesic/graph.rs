@@ -90,8 +90,7 @@ struct Unfolding<'a> {
     /// Whether each triangle is flat, so that its rest shape does not fit those of its neighbours.
     flat: &'a [bool],
     source: u32,
-    /// The edges between the source and the last unfolded triangle, each with the limit ratio of the triangle before
-    /// it.
+    /// The edges from the source to the last unfolded triangle, each with the limit ratio of the triangle before it.
     crossed: Vec<([DVec2; 2], f64)>,
     found: &'a mut Vec<(u32, f64)>,
 }

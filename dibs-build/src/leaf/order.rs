@@ -78,8 +78,7 @@ const FLIP: Cost = 1 << 8;
 /// Largest cost of a sharp corner. Eight of them cost less than a flip, so that openness decides only between orders
 /// with equal joins.
 const POINTED_MOST: f64 = 31.0;
-/// The cost of a measurement from a corner below 18 degrees, if the triangle has a wider one: more than all joins of a
-/// leaf.
+/// The cost of a measurement from a corner below 18 degrees, if there is a wider one: more than all joins of a leaf.
 const UNFIT: Cost = 1 << 16;
 /// The cost of a measurement from a corner below 3 degrees, where the stretch has an error of a thousandth.
 const ILL_CONDITIONED: Cost = 1 << 24;

@@ -145,8 +145,7 @@ impl Section {
         Self { modes, ranges, growths, unit, slack: 0.0, position_error, rms_error, anchors }
     }
 
-    /// Sets the slack of the stretch bound: for the rounding of positions, of anchors, and of points between two
-    /// anchors.
+    /// Sets the slack of the stretch bound: for the rounding of positions, anchors, and points between two anchors.
     fn allow_for_rounding(&mut self, rest: &[Vec3], triangles: &Triangles) {
         let weights = || self.ranges.iter().map(largest);
         let axis = evaluation_error(rest, &self.modes, self.unit, weights());

@@ -262,8 +262,7 @@ impl Grid {
         x + self.size[0] * (y + self.size[1] * z)
     }
 
-    /// The tetrahedron around a position, or the nearest one. Of equally near ones it takes the one that extrapolates
-    /// least.
+    /// The tetrahedron around a position, or the nearest one; of equally near ones the one that extrapolates least.
     fn place_of(&self, tetrahedra: &[Cell], position: DVec3) -> Place {
         let near = &self.cells[self.row(self.place(position))];
         let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);

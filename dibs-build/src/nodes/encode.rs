@@ -58,8 +58,7 @@ pub(crate) fn least_stretch_limit(nodes: &Nodes<'_>) -> f32 {
     let limit = |element| {
         let corners = nodes.element(element)?.map(|node| nodes.rest_position(node));
         let [a, b, c, d] = corners.map(|corner| corner.map(Vec3::as_dvec3));
-        // The stored limit is lower by the margin for the check's rounding; this restores the limit that the builder
-        // was given.
+        // The stored limit is lower by the margin for rounding; this restores the limit that the builder was given.
         let scale = 1.0 + MARGIN / openness(edges([a?, b?, c?, d?]));
         Some(f64::from(nodes.element_limit(element)?) * scale.sqrt())
     };
@@ -81,8 +80,7 @@ struct Shape {
     ratio: f64,
 }
 
-/// The path through four corners whose edges are nearest to orthogonal: the corners' order, the edges, and their
-/// openness.
+/// The path through four corners with the most orthogonal edges: the corners' order, the edges, and their openness.
 fn path(corners: [DVec3; 4]) -> ([usize; 4], DMat3, f64) {
     let along = |order: [usize; 4]| {
         let edges = edges(order.map(|at| corners[at]));

@@ -199,8 +199,7 @@ impl Volume {
         &self.tetrahedra
     }
 
-    /// The nodes in f32, relative to an origin, and the faces of the tetrahedra: motions of the nodes are checked
-    /// against it.
+    /// Nodes in f32, relative to an origin, and faces of the tetrahedra: motions of the nodes are checked against it.
     pub(crate) fn skeleton(&self, origin: DVec3) -> Mesh {
         let positions = self.nodes.iter().map(|&node| (node - origin).as_vec3()).collect();
         let faces = self.tetrahedra.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [b, c, d]]);

@@ -1,5 +1,4 @@
-//! Converts a file's coordinates to a mesh's: to millimetres, relative to an origin near the mesh where f32 requires
-//! it.
+//! Converts a file's coordinates to a mesh's: millimetres, relative to an origin near the mesh where f32 requires it.
 
 // Requirement: M-05
 
@@ -8,8 +7,7 @@ use super::raw::Raw;
 use crate::Unit;
 use glam::{DVec3, Vec3};
 
-/// A mesh is recentred where f32 would round it by more than this fraction of its extent: about the accuracy of a
-/// query.
+/// A mesh is recentred if f32 would round it by more than this fraction of its extent: about the accuracy of a query.
 const MOST_ROUNDING: f64 = 1.0 / 1_048_576.0;
 
 /// Distance between neighbouring numbers, as a fraction of the mesh's extent, above which the shape is lost.

@@ -8,8 +8,7 @@ use std::borrow::Cow;
 /// The contents of a file, before the checks that need all of it.
 #[derive(Default)]
 pub(crate) struct Raw {
-    /// In f64, so that the rounding to f32 can be measured, and a coordinate too large for f32 differs from an infinite
-    /// one.
+    /// In f64: so the rounding to f32 can be measured, and a coordinate too large for f32 differs from an infinite one.
     pub positions: Vec<[f64; 3]>,
     /// The corners of all polygons, one after the other.
     pub corners: Vec<u32>,

@@ -8,8 +8,7 @@
 //! Coverage only requires that builder, tree and stretch check use the same shape: an arc along an edge has the length
 //! of that edge in the rest shape of one of its triangles, and the stretch check bounds how much longer the edge is
 //! now. The rest shapes of neighbours need not match at their common edge; that of a flat triangle does not, so no
-//! chord crosses it. The fattened shape is nowhere shorter than the true one, so the true rest shape stays within its
-//! spheres.
+//! chord crosses it. The fattened shape is nowhere shorter than the true one, so the true one stays within its spheres.
 
 // Requirement: A-02
 
@@ -116,8 +115,7 @@ mod tests {
         [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
     proptest! {
-        /// A flat triangle grows until it is not flat, and no direction in it becomes shorter; other triangles do not
-        /// change.
+        /// A flat triangle grows until it is not flat, and shrinks in no direction; other triangles do not change.
         #[test]
         fn only_flat_triangles_grow(a in point(), b in point(), at in -0.2_f32..1.2, off in point(),
                                     power in -6.0_f32..0.0, turn in 0..3_usize) {

@@ -89,8 +89,7 @@ impl MotionStretch {
         Ok(Self::of_elements(mesh.triangles.len(), rounding, motion, progress, stretch))
     }
 
-    /// The same for the tetrahedra of a volume, whose nodes the motion moves: [`Needed::triangle`] is then a
-    /// tetrahedron.
+    /// The same for the tetrahedra of a volume whose nodes move: [`Needed::triangle`] is then a tetrahedron.
     ///
     /// # Errors
     /// [`MotionMismatchError`] where a frame does not fit the nodes.

@@ -69,8 +69,7 @@ impl Cut {
         let below = tree.descendants(node);
         let itself = node..node + 1;
         let vertices = tree.vertices_of(if below.is_empty() { &itself } else { &below });
-        // Rows are numbered in the order of the leaves: most rows of a subtree are consecutive, and at the end of its
-        // list.
+        // Rows have the order of the leaves: most rows of a subtree are consecutive, and at the end of its list.
         let run = vertices.windows(2).rev().take_while(|pair| pair[0] + 1 == pair[1]).count() + 1;
         let (others, rows) = vertices.split_at(vertices.len() - run);
         Self {

@@ -48,8 +48,7 @@ impl Swept {
         self.tree.refit_over(&self.before);
     }
 
-    /// The closest pair between the tool and the surface at the fraction `share` of the interval between the two
-    /// frames.
+    /// The closest pair of tool and surface at the fraction `share` of the interval between the two frames.
     pub fn find(&mut self, tool: &Probe, share: f32) -> Found {
         self.share = share;
         let found;

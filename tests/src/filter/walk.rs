@@ -78,8 +78,7 @@ pub struct Tally {
     pub unsafe_ticks: u64,
     /// Ticks without a safe motion and with a separation below the stand-off.
     pub below: u64,
-    /// Ticks in which the safe motion was lost, on a convex surface whose frames are new, with a robot that is faster
-    /// than it.
+    /// Ticks in which the safe motion was lost, on a convex surface with new frames, with a robot faster than it.
     pub cries: u64,
     /// Ticks near the surface.
     pub near: u64,

@@ -1,5 +1,4 @@
-//! Attacks on bus and sender by somebody without the key, and accidents with the same effect. Each of them once
-//! succeeded.
+//! Attacks on bus and sender by somebody without the key, and accidents with the same effect. Each once succeeded.
 
 // Requirement: B-03
 

@@ -32,8 +32,7 @@ fn arithmetic() -> String {
     let packets = f64::from(VERTICES.div_ceil(ROWS[0]) + 1) * FRAMES_A_SECOND * HOUR;
     let heartbeats = HEARTBEATS_A_SECOND * HOUR;
     let forgeries = FORGERIES_A_SECOND * HOUR;
-    // At this rate the receiver forgets as many forgeries as arrive; and no limit may exceed the largest number that it
-    // remembers.
+    // At this rate the receiver forgets as many forgeries as arrive; no limit may exceed the number that it remembers.
     let slow = f64::from(BusHealth::FORGERIES_A_SECOND) * HOUR;
     let most = f64::from(BusHealth::MOST_FORGERIES);
     let mut text = String::new();

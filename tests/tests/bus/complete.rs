@@ -109,8 +109,7 @@ fn a_frame_without_any_one_of_its_packets_is_not_published() {
     }
 }
 
-/// A sender restarts within a frame, and numbers its frames from the same epoch: a mixture of both frames is not
-/// published.
+/// A sender restarts within a frame, and numbers from the same epoch: a mixture of both frames is not published.
 #[test]
 fn two_frames_of_one_epoch_are_never_mixed() {
     let (old, new) = (surface(1), surface(500));

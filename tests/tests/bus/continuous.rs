@@ -61,7 +61,6 @@ fn send<G: Gate>(
     bus.published() == Some(id)
 }
 
-/// A surface's positions.
 fn positions(surface: &impl VertexTable) -> Vec<Vec3> {
     (0..ROWS as u32).map(|row| surface.position(row).expect("a row")).collect()
 }
@@ -223,8 +222,7 @@ fn a_surface_is_held_where_its_extrapolation_would_tear() {
     }
 }
 
-/// If the motion or the extrapolation was not measured, or two frames have the same time, the surface is held at the
-/// last frame.
+/// If motion or extrapolation was not measured, or two frames have one time, the surface is held at the last frame.
 #[test]
 fn a_surface_of_unknown_motion_is_held() {
     let mut rng = Rng::with_seed(9);

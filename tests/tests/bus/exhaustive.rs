@@ -26,8 +26,7 @@ struct Model {
 }
 
 impl Model {
-    /// Receives packet `which` of a frame: 0 is the begin, 1 to 3 have rows, 4 is the commit. Returns the published
-    /// epoch.
+    /// Receives packet `which` of a frame: 0 is the begin, 1 to 3 rows, 4 the commit. Returns the published epoch.
     fn take(&mut self, epoch: u32, which: usize, now: u32) -> Option<u32> {
         if self.published.is_some_and(|published| epoch <= published) {
             return None;

@@ -35,8 +35,7 @@ fn packets(mesh_id: u32, now: u32, table: &[Vec3]) -> Vec<Vec<u8>> {
 }
 
 /// The loop of a controller, with the generated module: answers are correct for the true surface at each tick,
-/// velocities are those of its vertices, admitted motions keep the stand-off, and after a refused frame the last good
-/// one stays.
+/// velocities are its vertices', admitted motions keep the stand-off, and after a refused frame the last one stays.
 #[test]
 fn a_controller_runs_on_nodes() {
     static HEART: embedded_heart::Surface = embedded_heart::Surface::new();

@@ -145,8 +145,7 @@ fn walk(world: &World<'_>) -> u32 {
     checked
 }
 
-/// Nodes that grow, rotate and travel: the surface that they move is correct between frames, whatever its vertices'
-/// weights.
+/// Nodes that grow, rotate and travel: their surface is correct between frames, whatever its vertices' weights.
 #[test]
 fn nodes_may_have_a_pose() {
     const STACK: usize = embedded_heart::STACK;

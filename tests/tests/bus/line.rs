@@ -103,8 +103,7 @@ impl<M: Mac + 'static> Source<M> {
         self.clock.store(u64::from(now), Ordering::Relaxed);
     }
 
-    /// Passes the receiver's status to the sender, and the sender's packets to the receiver. Returns the result of the
-    /// sender's poll.
+    /// Passes the status to the sender, and its packets to the receiver. Returns the result of the sender's poll.
     pub fn hear(
         &mut self,
         assembler: &mut Guarded<M>,

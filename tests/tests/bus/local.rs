@@ -206,8 +206,7 @@ fn a_call_and_packets_take_turns() {
     assert_eq!(bus.counters().of(Event::Abandoned), 10);
 }
 
-/// A solver in one thread and a control loop in another: neither waits for the other, and every answer is of a complete
-/// surface.
+/// A solver and a control loop in two threads: neither waits for the other, and every answer is of a complete surface.
 #[test]
 fn a_solver_s_thread_feeds_the_control_loop() {
     let (mesh, built) = shuffled();

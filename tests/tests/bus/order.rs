@@ -50,8 +50,7 @@ fn epochs_wrap() {
     }
 }
 
-/// A frame of a later session is accepted whatever its epoch; a frame of an earlier session is refused whatever its
-/// epoch.
+/// Whatever their epochs, a frame of a later session is accepted, and one of an earlier session refused.
 #[test]
 fn sessions_supersede_and_wrap() {
     let mut bus = bus();

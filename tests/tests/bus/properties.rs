@@ -37,8 +37,7 @@ proptest! {
         prop_assert_eq!(published(&mut reader), published(&mut expected));
     }
 
-    /// Sends frames over a line that loses, repeats, reorders and damages packets: every published frame is one that
-    /// was sent.
+    /// Over a line that loses, repeats, reorders and damages packets, every published frame is one that was sent.
     #[test]
     fn only_what_was_sent_is_published(
         faults in prop::collection::vec((0..6_u8, any::<prop::sample::Index>(), 0..512_usize), 0..30),

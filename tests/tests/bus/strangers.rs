@@ -1,5 +1,4 @@
-//! Strangers without the key change neither the count of rejections nor the state, and the rate of their guesses is
-//! measured.
+//! Strangers without the key change neither the rejections' count nor the state, and the rate of guesses is measured.
 
 // Requirement: B-04
 

@@ -127,8 +127,7 @@ fn captures_that_go_back_give_no_time() {
         }
     }
     assert_eq!(way, 0.0);
-    // The jitter of a pipeline: of two sources, with ages of 5 and 45 ms, the later captures are accepted, and nothing
-    // jumps.
+    // Jitter: of two sources, with ages of 5 and 45 ms, the later captures are accepted, and nothing jumps.
     let mut passed = 0;
     for number in 1..20_u32 {
         let (age, shift) = if number % 2 == 0 { (5, 0.0) } else { (45, 0.0) };

@@ -92,8 +92,7 @@ fn weights_come_over_the_bus() {
     }
 }
 
-/// Weights out of range, frames of vertices, and mixtures of two frames are refused and counted, and the last good
-/// surface stays.
+/// Weights out of range, frames of vertices, and mixed frames are refused and counted, and the last good surface stays.
 #[test]
 fn hostile_frames_of_weights_are_rejected_and_counted() {
     let mut bus = bus();
@@ -155,8 +154,7 @@ fn a_receiver_of_vertices_refuses_weights() {
     assert_eq!(assembler.accept(begin, Millis(0)), Err(ReceiveError::Encoding));
 }
 
-/// A surface whose bound exceeds the limit is measured. Exactly the surfaces within the limit are admitted, whatever
-/// the bound.
+/// A surface whose bound exceeds the limit is measured. Those within the limit are admitted, whatever the bound.
 #[test]
 fn the_gate_is_exact_whatever_the_bound() {
     let (mesh, motion) = trembling(320, 3, 6);

@@ -41,8 +41,7 @@ struct Listed {
     side: Side,
 }
 
-/// Searches contacts of tools within a few accuracies of a triangle, on both sides of it: with a query and with a
-/// tracker.
+/// Searches contacts of tools within a few accuracies of a triangle, on both sides: with a query and a tracker.
 fn at_the_surface(
     options: &Options,
     mut check: impl FnMut(&BuiltTree, &[Vec3], [Vec3; 2], &Listed),

@@ -424,8 +424,7 @@ fn no_budget_hides_a_contact_at_a_vertex() {
     assert!(bounded > 20, "{bounded}");
 }
 
-/// Inside the surface, the nearest triangle found within a small budget may be on the far side: its force would point
-/// inwards.
+/// Inside, the nearest triangle found within a small budget may be on the far side: its force would point inwards.
 #[test]
 fn no_budget_turns_the_force_inwards() {
     let mesh = ball(4);
@@ -524,8 +523,7 @@ fn one_wall_is_never_two() {
         let part = found.force.z / 2.0;
         assert!((0.99..1.07).contains(&part), "{count}: {part}");
     }
-    // A wall that approaches the tool has the same effect as a tool that approaches the wall, on the damper and on the
-    // row.
+    // A wall that approaches the tool has the same effect as the opposite, on the damper and on the row.
     let damped = Proxy::new(SpringDamper::stiffness(1.0).damping(0.01).max_force(50.0), 3.0);
     let mut moving = contact;
     moving.velocity = Vec3::Z * 40.0;

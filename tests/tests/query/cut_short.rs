@@ -166,8 +166,7 @@ fn a_tick_that_ended_knows_not_where_the_axis_meets_the_surface() {
     assert!(cut > 1_000, "{cut}");
 }
 
-/// Around the middle of a ball all vertices are equally far, so that each point of the axis needs a search of the whole
-/// tree.
+/// Near a ball's centre all vertices are equally far, so that each point of the axis needs a search of the whole tree.
 #[test]
 fn a_depth_takes_no_more_work_than_it_states() {
     let mesh = ball(5);

@@ -1,5 +1,4 @@
-//! A short list of contacts states correctly how far it is complete: compared with a list that has room for every
-//! triangle.
+//! A short list of contacts states correctly how far it is complete: compared with one with room for every triangle.
 
 // Requirement: S-05
 

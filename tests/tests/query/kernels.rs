@@ -167,8 +167,7 @@ impl Case {
         let end = self.end.as_dvec3() - start;
         let corners = self.corners.map(|c| c.as_dvec3() - start);
         let pair = closest_pair(DVec3::ZERO, end, corners);
-        // The rounding of a short pair's direction is amplified by the size: only pairs of some length can be certified
-        // from below.
+        // The rounding of a short pair's direction grows with the size: only long pairs can be certified from below.
         let size = self.size();
         if pair.distance > 1e-6 * size {
             let doubt = 1e-3 * U * size + 1e-14 * size * size / pair.distance;

@@ -167,8 +167,7 @@ fn the_force_is_that_of_the_best_of_all_active_sets() {
 
 /// A small change of the walls changes the force little. The compliance bounds the change: by `by_depths` times a
 /// change of the depths alone, and by `by_normals` times a change of the normals as well. A shallow wall's activation
-/// grows by 16 over the deepest depth, and may move the proxy by three depths. A wall with a depth of 0 changes
-/// nothing.
+/// grows by 16 over the deepest depth, and may move the proxy by three depths. One of depth 0 changes nothing.
 #[test]
 fn the_force_is_continuous() {
     let template = contact();

@@ -381,8 +381,7 @@ fn no_side_is_wrong_next_to_a_saddle() {
     assert!(cfg!(debug_assertions) || stated > 2_000, "{stated}");
 }
 
-/// A path may lead around an open surface: an axis without an intersection between two points may have them on both
-/// sides.
+/// A path may lead around an open surface: an axis without intersection may have points on both sides.
 #[test]
 fn a_depth_behind_an_open_sheet_is_found() {
     // Two sheets with a gap between them, and a wall that the axis meets.

@@ -249,8 +249,7 @@ fn hostile_ways_are_refused_or_never_cleared() {
     assert!(is_unclear, "{found:?}");
 }
 
-/// Nothing moves, so any positive distance rules out contact for the whole motion; a budget that shows none is no
-/// error.
+/// Nothing moves, so any positive distance rules out contact; a budget that shows none is no error.
 #[test]
 fn a_sweep_at_rest_needs_no_budget() {
     let mesh = dibs_build::generate::heart(1_000).expect("a valid size").mesh;

@@ -1,5 +1,4 @@
-//! Sides at ties between sheets, compared with winding numbers in f64: walls that touch or collapsed, blades, spikes,
-//! lattices.
+//! Sides at ties between sheets, compared with winding numbers: touching or collapsed walls, blades, spikes, lattices.
 //!
 //! `DIBS_CLIMBS` sets the number of hill climbs towards ties.
 //!
@@ -202,8 +201,7 @@ impl<'t> Asked<'t> {
         }
     }
 
-    /// By how much a sheet with the wrong side is farther than the closest one, relative to the distance: the least
-    /// value.
+    /// By how much a sheet with the wrong side is farther than the closest, relative to the distance: the least value.
     fn lead(&self, at: DVec3, inside: bool) -> f64 {
         let (mut closest, mut wrong) = (f64::INFINITY, f64::INFINITY);
         for corners in &self.triangles {
@@ -436,8 +434,7 @@ fn a_collapsed_vessel_has_no_inside() {
     }
 }
 
-/// Two solids that touch at an edge have a side everywhere except at the edge; a fin has none there, and the reason
-/// says so.
+/// Solids that touch at an edge have a side everywhere but at the edge; a fin has none there, and the reason says so.
 #[test]
 fn an_edge_of_more_than_two_triangles_takes_no_side_from_the_rest() {
     let mesh = pinched();

@@ -154,8 +154,7 @@ fn closest_of_two(
     (found, whole)
 }
 
-/// Around the border of an open sheet a tool reaches its other side without touching it, and is the deepest of all
-/// there.
+/// Around the border of a sheet a tool reaches its other side without touching it, and is the deepest of all there.
 #[test]
 fn a_resting_link_is_seen_to_pass_around_a_border() {
     let mesh = sheet(20, 80.0, |_, _| 0.0);

@@ -1,5 +1,4 @@
-//! The depth of a crossing axis with a tracker, which keeps its proof from tick to tick, compared with complete
-//! queries.
+//! The depth of a crossing axis by a tracker, which keeps its proof between ticks, compared with complete queries.
 
 // Requirements: S-03, T-01
 

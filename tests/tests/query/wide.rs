@@ -1,5 +1,4 @@
-//! The wide (batched) search: its counts, its stacks and its budgets. `differential.rs` tests the accuracy of both
-//! searches.
+//! The wide (batched) search: its counts, stacks and budgets. `differential.rs` tests the accuracy of both searches.
 
 // Requirement: A-01
 

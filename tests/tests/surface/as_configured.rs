@@ -1,5 +1,4 @@
-//! Limits hold as configured: on size if triangles have their own stretch limits, of exactly 1, and learned from a
-//! motion.
+//! Limits hold as configured: on size if triangles have their own limits, of exactly 1, and learned from a motion.
 
 // Requirements: F-02, F-03
 
@@ -60,8 +59,7 @@ fn shrinkage_is_as_configured_where_triangles_have_their_own_limits() {
     }
 }
 
-/// A limit of 1 admits the rest shape, also after rigid motions that f32 represents exactly, and modes can be built on
-/// it.
+/// A limit of 1 admits the rest shape, also after rigid motions exact in f32, and modes can be built on it.
 #[test]
 fn a_limit_of_exactly_one_admits_the_rest_shape() {
     let whole = generate::heart(320).expect("a valid size");

@@ -175,8 +175,7 @@ fn a_surface_between_two_frames_and_beyond_them_has_a_stretch_of_both() {
     let stated = beyond.stretch().expect("both are known").sigma();
     assert!((stated - (1.5 * more.sigma() + 0.5 * less.sigma())).abs() < 1e-6);
     assert!(measure_stretch(&tree, &beyond).map_or(1.5, |measured| measured.sigma()) <= stated);
-    // Half an interval beyond the later frame: one and a half errors of the later frame, plus half an error of the
-    // earlier.
+    // Half an interval beyond the later frame: one and a half of its errors, plus half an error of the earlier.
     assert!((beyond.position_error() - 2.0 * ERROR).abs() < 1e-6);
 }
 

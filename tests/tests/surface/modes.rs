@@ -22,8 +22,7 @@ use dibs_tests::{ask, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// The stated errors hold at every vertex of every frame, and are reached. Positions agree with a sum in f64 up to
-/// rounding.
+/// The stated errors hold at all vertices of all frames, and are reached. Positions are a sum in f64 up to rounding.
 #[test]
 fn every_frame_is_within_the_stated_error() {
     let (mesh, motion) = trembling(2_000, 5, 1);

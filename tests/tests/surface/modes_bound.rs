@@ -124,8 +124,7 @@ impl Stored {
     }
 }
 
-/// Anchors, segments, rounding and slack have the documented effect: less would not be sound, and more would refuse
-/// frames.
+/// Anchors, segments, rounding and slack are as documented: less would not be sound, and more would refuse frames.
 #[test]
 fn the_stretch_bound_is_the_documented_one() {
     const SLACK: f32 = 0.01;

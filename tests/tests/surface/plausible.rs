@@ -305,8 +305,7 @@ fn the_motion_of_a_heart_is_plausible() {
     }
 }
 
-/// The default limit on shrinkage leaves a margin on a heart whose motion was recorded: no region shrinks to less than
-/// half.
+/// The default limit on shrinkage leaves a margin on a recorded heart: no region shrinks to less than half.
 #[test]
 #[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]
 fn a_recorded_heart_shrinks_far_less_than_the_limit() {

@@ -193,8 +193,7 @@ fn each_region_is_measured_on_its_own() {
     }
 }
 
-/// A region may begin in the middle of a fan. The edge that its first triangle shares with the previous region belongs
-/// to both.
+/// A region may begin within a fan. The edge that its first triangle shares with the previous region belongs to both.
 #[test]
 fn an_edge_between_two_regions_counts_for_both() {
     let mesh = generate::heart(2_000).expect("a valid size").mesh;

@@ -336,8 +336,7 @@ fn metric_and_limits_stand_where_the_specification_says() {
             let refused = refuse(metric + 24, wrong.to_bits());
             assert_eq!(refused, Err(FormatError::Metric { triangle: 2 }));
         }
-        // A triangle that starts a fan must not be marked as one that continues or flips a fan, or be measured from
-        // another corner.
+        // A fan's first triangle must not be marked as continuing or flipping it, or be measured from another corner.
         let touches = |row: usize| rows(row).iter().any(|v| rows(row - 1).contains(v));
         let alone = starts.into_iter().skip(1).find(|&row| !touches(row)).expect("not one patch");
         let at = metric + 12 * alone;

@@ -56,8 +56,7 @@ proptest! {
         }
     }
 
-    /// Polygons of any shape, flat or not, simple or not, are cut without a panic, and n corners give at most n - 2
-    /// triangles.
+    /// Polygons of any shape, flat or not, simple or not, are cut without panic: n corners give up to n - 2 triangles.
     #[test]
     fn polygons_of_any_shape_are_cut(
         points in prop::collection::vec((-5_i8..5, -5_i8..5, -1_i8..2), 3..40)

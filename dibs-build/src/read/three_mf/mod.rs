@@ -49,8 +49,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     model.assemble(bytes.len())
 }
 
-/// Number of parts that slicers mark, in files of their own, as subtracted from an object or as a region of other
-/// settings.
+/// Parts that slicers mark, in files of their own, as subtracted from an object or as a region of other settings.
 fn modifiers(package: &mut Package<'_>) -> Result<usize> {
     let mut modifiers = 0;
     // The files of Bambu Studio and OrcaSlicer, and of PrusaSlicer.

@@ -6,8 +6,7 @@
 
 // Requirement: B-10
 
-/// Rounds after which colours must distinguish all vertices: organs take fewer than ten, a regular grid as many as its
-/// length.
+/// Rounds until colours must distinguish all vertices: organs take fewer than ten, a regular grid up to its length.
 const ROUNDS: usize = 64;
 
 /// The result of comparing two lists of triangles.
@@ -20,8 +19,7 @@ pub enum Matched {
     None,
 }
 
-/// Compares with the winding of the triangles, and if that fails without it: a builder may have flipped triangles
-/// outwards.
+/// Compares with the triangles' winding, and if that fails without it: a builder may have flipped triangles outwards.
 pub fn matched(ours: &[[u32; 3]], theirs: &[[u32; 3]]) -> Matched {
     if ours.len() != theirs.len() {
         return Matched::None;
@@ -84,8 +82,7 @@ impl<'a> Colours<'a> {
         sorted
     }
 
-    /// Gives each vertex a new colour that depends on its old one and its neighbours', but not on the order of the
-    /// triangles.
+    /// Gives each vertex a new colour from its old one and its neighbours', whatever the order of the triangles.
     fn refine(&mut self) {
         let mut next: Vec<u64> = self.of.iter().map(|&colour| mixed(colour)).collect();
         for &[a, b, c] in self.triangles {

@@ -100,8 +100,7 @@ impl Door {
         }
     }
 
-    /// The next connection: to a server within the time that the user allows from `since` on; from a client at any
-    /// time.
+    /// The next connection: to a server within the user's time limit from `since` on; from a client at any time.
     pub fn next(&mut self, since: Instant) -> Result<Peer> {
         loop {
             let made = match self {

@@ -189,8 +189,7 @@ fn symmetric_meshes_are_not_guessed() {
     assert!(matches!(matched(&one[..2], &one[..1]), Matched::None));
 }
 
-/// A quad covers two triangles of the tree. A polygon of all points has room for half of the triangles, and its mesh is
-/// refused.
+/// A quad covers two triangles of the tree. A polygon of all points has room for half of them, and its mesh is refused.
 #[test]
 fn faces_have_no_more_triangles_than_their_corners_make() {
     let mesh = heart(1000).expect("a size").mesh;

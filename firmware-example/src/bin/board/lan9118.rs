@@ -50,7 +50,6 @@ const CHECKSUM: usize = 4;
 /// Most reads of a register while waiting for the chip.
 const PATIENCE: u32 = 100_000;
 
-/// A register by its offset.
 const fn at(offset: usize) -> Register {
     // SAFETY: called only with offsets of the LAN9118's registers, which are at this address on the board.
     unsafe { Register::at(0xA000_0000 + offset) }

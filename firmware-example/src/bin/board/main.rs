@@ -31,7 +31,6 @@ use semihosting::Arguments;
 /// Records that can wait for the telemetry line.
 const QUEUE: usize = 64;
 
-/// The records of a tick.
 type Records = (Tick, Option<Push>);
 
 static SURFACE: surface::Surface = surface::Surface::new();

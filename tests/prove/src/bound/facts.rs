@@ -53,7 +53,6 @@ impl Most {
     }
 }
 
-/// A fact.
 pub struct Fact {
     pub name: &'static str,
     pub terms: &'static [(i64, Count)],

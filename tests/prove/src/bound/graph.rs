@@ -28,7 +28,6 @@ pub struct Edge {
     pub tail: Option<u32>,
 }
 
-/// A function.
 pub struct Function {
     pub start: u32,
     pub name: String,

@@ -6,7 +6,6 @@ use anyhow::{Result, ensure};
 
 use super::graph::Function;
 
-/// A loop.
 pub struct Loop {
     /// The block through which control enters.
     pub header: usize,

@@ -125,8 +125,7 @@ pub struct Proven {
     pub kind: &'static Kind,
     pub analysis: Analysis,
     pub bound: Bound,
-    /// Instructions of every query, of each further root, of each node test and of each triangle test, in units of 1 /
-    /// [`UNIT`].
+    /// Instructions of every query, each further root, each node test and each triangle test, in units of 1 / [`UNIT`].
     constants: [i128; 4],
 }
 
@@ -193,7 +192,6 @@ fn counted(queries: usize) -> Result<Vec<Script>> {
     Ok(scripts)
 }
 
-/// Queries that are traced.
 pub fn to_trace(queries: usize) -> Result<Vec<Script>> {
     let one = [
         Subject::new("heart", generate::heart(1_280)?.mesh, 8),

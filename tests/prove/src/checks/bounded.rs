@@ -22,8 +22,7 @@ use crate::harness::{Check, Effort};
 use crate::probe::ticks::{Script, read};
 use crate::probe::{COUNTING, board, build_for_board, run_on_board};
 
-/// The budgets in tests, and the suffixes of their figures' names: the largest number of instructions of a tick on the
-/// board.
+/// The budgets in tests, and the suffixes of their figures' names: the most instructions of a tick on the board.
 const BUDGETS: [(u32, &str); 4] = [(36, "20k"), (170, "40k"), (290, "60k"), (500, "100k")];
 
 /// Ticks for each frame of the heart's motion: 25 frames a second.

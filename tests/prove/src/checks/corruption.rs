@@ -120,8 +120,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
     let rows = built.to_rows(&surface.mesh.positions);
     let tool = pose(&rows, &triangles, rng);
     let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles").separation;
-    // Upper bound on the work for a sound tree, including the root's test: an exact test of each triangle counts as
-    // eight.
+    // Upper bound on the work for a sound tree, with the root's test: an exact test of each triangle counts as eight.
     let most = 3 * sound.node_count() + 9 * (sound.triangle_count() + 1) + 1;
     let mut bytes = built.blob().to_vec();
     let mut tally = Tally::default();

@@ -179,8 +179,7 @@ fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Resu
     best.map(|(_, frame)| frame).context("no place for a shape")
 }
 
-/// The surface deformed towards a sphere, as far as the frame is admitted: a sphere's points are equally far from its
-/// centre.
+/// The surface deformed towards a sphere, as far as admitted: a sphere's points are equally far from its centre.
 fn round(mesh: &Mesh, is_fit: impl Fn(&[Vec3]) -> bool) -> Vec<Vec3> {
     let middle = mesh.positions.iter().sum::<Vec3>() / mesh.positions.len() as f32;
     let at = |share: f32, size: f32| -> Vec<Vec3> {

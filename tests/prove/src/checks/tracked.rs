@@ -98,8 +98,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// The tool moves once through the middle of the heart and back. The number is fixed, because golden figures are
-/// compared.
+/// The tool moves once through the middle of the heart and back. Fixed, because golden figures are compared.
 const TICKS: u32 = 7_000;
 
 /// A run over the path: the suffix of its figures' names, the options of its ticks, and the probe's program.

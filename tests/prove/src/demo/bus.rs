@@ -48,8 +48,7 @@ impl Bus {
         }
     }
 
-    /// Frames to send and their rate: over Ethernet at least 60 a second, with interpolated frames midway between the
-    /// recorded ones.
+    /// Frames and their rate: over Ethernet at least 60 a second, with interpolated frames between the recorded ones.
     pub fn frames(self, motion: &Motion, rate: f32) -> (Vec<Vec<Vec3>>, f32) {
         let parts = match self {
             Self::Serial => 1,

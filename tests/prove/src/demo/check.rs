@@ -15,10 +15,8 @@ use super::surface::rows;
 /// The result of checking one answer.
 #[derive(Clone, Copy, Debug)]
 pub struct Checked {
-    /// The tick.
     pub tick: u32,
-    /// Error of the answer in units of its [`accuracy_of`] plus the rounding of vertices that nodes move: at most 1 is
-    /// correct.
+    /// Error of the answer in units of its [`accuracy_of`] plus the embedded vertices' rounding: at most 1 is correct.
     pub error: f64,
     /// The true separation from the answer's surface, in mm; if the answer is an interval, its lower bound.
     pub separation: f64,
@@ -31,8 +29,7 @@ impl Checked {
     }
 }
 
-/// The accuracy of an answer on the vertices as decoded, which both sides use here: the stated one without the bus's
-/// quantisation.
+/// The accuracy of an answer on the decoded vertices that both sides use: that stated, without the bus's quantisation.
 pub fn accuracy_of(tick: &Tick) -> f64 {
     without(tick.accuracy, tick.position_error)
 }
@@ -76,7 +73,6 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
 /// A published frame, compared as a whole with the frame sent.
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
-    /// Its epoch.
     pub epoch: u32,
     /// Whether every vertex equals the sent one, to the bit.
     pub is_same: bool,

@@ -39,8 +39,7 @@ pub struct Touches {
     /// Ticks with more contacts than the buffer holds.
     contacts_cut: usize,
     proxy_force_max_n: f32,
-    /// Largest change in the magnitude of a force from one tick to the next on the same frame: the controller's, and
-    /// the proxy's.
+    /// Largest change in a force's magnitude between two ticks on the same frame: the controller's, and the proxy's.
     force_step_max_n: f32,
     proxy_force_step_max_n: f32,
     /// Ticks with the instrument in the surface, and the number of these in which a force was below that of the wall's

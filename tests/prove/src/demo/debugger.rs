@@ -1,5 +1,4 @@
-//! A debugger that changes one byte of the emulated board's memory while it runs, by the GDB remote protocol that QEMU
-//! offers.
+//! A debugger that changes one byte of the emulated board's memory as it runs, by the GDB remote protocol of QEMU.
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;

@@ -1,5 +1,4 @@
-//! A network that floods the controller: the sender's packets among garbage, repetitions, fragments, ARP and
-//! broadcasts.
+//! A network that floods the controller: the sender's packets in garbage, repetitions, fragments, ARP and broadcasts.
 //!
 //! The emulator's socket backend accepts raw Ethernet frames, one a datagram, so that frames arrive that no network
 //! stack would send.

@@ -26,8 +26,7 @@ const SLACK: f64 = 0.02;
 /// faster than 25 mm/s towards a push of 4.5 N catches up with it.
 const YIELDS: f64 = 1.0;
 
-/// Largest energy (mJ) that the wall may give to the hand, and the largest step of its force (N): the controller's
-/// limits.
+/// Largest energy (mJ) that the wall may give to the hand, and largest step of its force (N): the controller's limits.
 const TANK: f64 = 1.0;
 const STEP: f32 = 0.5;
 
@@ -96,8 +95,7 @@ pub struct Hand {
     /// Largest force of the wall, and its largest change from tick to tick, in N.
     push_force_max_n: f32,
     push_force_step_max_n: f32,
-    /// Largest energy, in mJ, that the wall had given to the hand at any time, minus the energy that the hand had given
-    /// before.
+    /// Largest energy (mJ) that the wall had given to the hand at any time, minus what the hand had given before.
     energy_given_max_mj: f64,
     /// Number of ticks by the filter's reason.
     reasons: BTreeMap<&'static str, usize>,
@@ -127,7 +125,6 @@ pub struct Way {
     /// Mean speeds (mm/s) while it was held: of the unresisted motion, and of the instrument.
     speed_commanded_mean: f64,
     speed_moved_mean: f64,
-    /// Instructions of an answer.
     answer_instructions_mean: f64,
     answer_instructions_max: u64,
     /// Largest fraction of the closest pair's budget that a tick used.

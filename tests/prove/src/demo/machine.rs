@@ -28,14 +28,12 @@ pub enum Machine {
         toolchain: String,
         /// The emulator's version.
         emulator: String,
-        /// Its bus.
         bus: Bus,
         /// What moves its instrument.
         robot: Robot,
     },
     /// The same control logic as a program.
     Host {
-        /// The program.
         program: PathBuf,
         /// Why it runs here and not on the board.
         reason: String,

@@ -43,8 +43,7 @@ pub const LATTICE: &str = "lattice:9,8,7";
 /// commands, without penetrating it. Every answer is checked against an exhaustive search.
 #[derive(clap::Args, Default)]
 pub struct Options {
-    /// Mesh of the surface at rest, in any format that `dibs build` reads; the generated heart of 10,272 triangles
-    /// if absent.
+    /// The mesh at rest, in any format that `dibs build` reads; the generated heart of 10,272 triangles if absent.
     #[arg(long, requires = "motion")]
     pub mesh: Option<PathBuf>,
     /// Its motion: .pc2, .npy or a series (heart_%03d.vtp), with a position for each of the mesh's vertices in every frame.

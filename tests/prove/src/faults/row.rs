@@ -11,8 +11,7 @@ use serde::Serialize;
 pub struct Row {
     pub fault: &'static str,
     pub injected: u64,
-    /// Number of faults after which something was rejected, abandoned or ignored as a duplicate, or the frame was not
-    /// published.
+    /// Faults after which something was rejected, abandoned or ignored as a duplicate, or the frame was not published.
     pub detected: u64,
     /// Number of faults without a noticed effect, where the frame was published as sent.
     pub harmless: u64,

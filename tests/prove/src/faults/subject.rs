@@ -169,7 +169,6 @@ impl Log {
 
 /// A receiver, on the host or the board.
 pub trait Receiver {
-    /// Its counters.
     fn counters(&self) -> &Counters;
 
     /// Its present status.
@@ -265,7 +264,6 @@ impl<M: Mac> Receiver for Controller<'_, M> {
     }
 }
 
-/// The MAC for a challenge.
 pub fn mac_under(challenge: u64) -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, challenge)
 }

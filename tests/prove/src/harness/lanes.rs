@@ -42,7 +42,6 @@ pub struct Beside {
 }
 
 impl Beside {
-    /// Starts it.
     pub fn start(effort: &Effort) -> Result<Self> {
         let folder = workspace::target().join("beside");
         // Removed, so that no file of an earlier run is mistaken for this one's.

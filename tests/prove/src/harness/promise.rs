@@ -47,8 +47,7 @@ impl fmt::Display for Bound {
 }
 
 impl Bound {
-    /// Whether a figure satisfies the bound; `other` returns other figures. Golden bounds are checked against the
-    /// records.
+    /// Whether a figure satisfies the bound; `other` returns other figures. Golden bounds are checked with the records.
     pub fn holds(self, figure: f64, other: impl Fn(&str) -> Option<f64>) -> bool {
         match self {
             Self::Informs | Self::Golden => true,

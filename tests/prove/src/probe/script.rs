@@ -40,7 +40,6 @@ pub enum Record {
     Bound,
     /// Every position of a modal frame of this many vertices.
     Positions(u32),
-    /// A query.
     Query {
         /// Whether the tool is a capsule.
         is_capsule: bool,
@@ -60,9 +59,7 @@ pub enum Table {
     Rows,
     /// The rows of two frames.
     Moving,
-    /// Nodes.
     Nodes,
-    /// Modes.
     Modes,
     /// Modes, with a cache of positions.
     Memory,

@@ -71,8 +71,7 @@ pub fn script(built: &BuiltTree, motion: &Motion, bits: u32, ticks: u32) -> Resu
     Ok(script.end())
 }
 
-/// The ends of a chain whose first link is the tool; each link is rotated by a tenth of a radian relative to the
-/// previous one.
+/// The ends of a chain whose first link is the tool; each link is rotated by 0.1 rad relative to the previous one.
 fn joints(tool: &Capsule) -> [Vec3; JOINTS] {
     let mut link = tool.end() - tool.start();
     let mut joints = [tool.start(); JOINTS];

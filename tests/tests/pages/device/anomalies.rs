@@ -1,6 +1,5 @@
 //! Known anomalies: where the library is worse than it should be, or where its promise has a surprising limit.
 
-/// An anomaly.
 pub struct Anomaly {
     /// It is never reused for another anomaly.
     pub id: &'static str,

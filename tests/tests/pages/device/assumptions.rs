@@ -1,6 +1,5 @@
 //! Assumptions of use, and where they are checked.
 
-/// An assumption.
 pub struct Assumption {
     /// It is never reused for another assumption.
     pub id: &'static str,

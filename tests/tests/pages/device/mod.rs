@@ -1,5 +1,4 @@
-//! Pages for a device's file: assumptions of use, known anomalies, and an index by clause. `DIBS_WRITE=1` writes them
-//! again.
+//! Pages for a device's file: assumptions of use, anomalies, and an index by clause. `DIBS_WRITE=1` writes them again.
 //!
 //! These fail: a missing check of an assumption, a variant that does not exist, a missing file or figure of an anomaly,
 //! an id that is used twice, and a page of the index that does not exist.

@@ -1,6 +1,5 @@
 //! The failures of each public call of `guard`: what the caller gets, and what stays.
 
-/// A call.
 pub struct Call {
     pub name: &'static str,
     pub goes_wrong: &'static str,

@@ -13,7 +13,6 @@ pub struct Mark {
     pub ids: BTreeSet<String>,
     /// Whether it tests requirements; other files implement them.
     pub is_test: bool,
-    /// The checks in it.
     pub checks: Vec<String>,
 }
 

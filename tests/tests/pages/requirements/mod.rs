@@ -2,8 +2,7 @@
 //! again.
 //!
 //! Sources state what they implement and what they test, in a line after the file's documentation, as in this file.
-//! These fail: an id without implementation or test, a file of tests without an id, an unknown id, a figure that is not
-//! recorded.
+//! These fail: an id without implementation or test, a file of tests without id, an unknown id, a figure not recorded.
 
 // Requirement: E-03
 
