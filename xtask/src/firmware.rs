@@ -8,7 +8,6 @@ use anyhow::{Context, Result};
 use crate::process::run;
 use crate::toolchain::Cross;
 
-/// The firmware's surface.
 pub struct Surface {
     /// A mesh file, or the generated heart.
     pub mesh: Option<PathBuf>,

@@ -50,7 +50,6 @@ pub struct Worst {
 }
 
 impl Binary {
-    /// Reads a linked program.
     pub fn read(program: &Path) -> Result<Self> {
         let bytes = fs::read(program)
             .with_context(|| format!("cannot read the firmware {}", program.display()))?;
@@ -131,7 +130,6 @@ impl Binary {
         Ok(place.with_context(|| format!("no vector leads to {name}"))? + 1)
     }
 
-    /// The name of the function at an address.
     pub fn name(&self, address: u32) -> Option<&str> {
         self.functions.get(&address).map(|function| &*function.name)
     }

@@ -34,7 +34,6 @@ type Ends = (Bus<'static, 'static, u16>, Guard<'static, 'static, u16, 64, OPENED
 /// Largest rounding (mm) of a query's answer.
 const ROUNDING: f32 = 1e-3;
 
-/// A sum, rounded up.
 fn sum_up(a: f32, b: f32) -> f32 {
     let sum = f64::from(a) + f64::from(b);
     let nearest = sum as f32;

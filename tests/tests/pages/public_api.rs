@@ -216,7 +216,6 @@ impl Listing {
     }
 }
 
-/// The file of a module, and the folder of its submodules.
 fn module_file(folder: &Path, name: &str) -> Option<(PathBuf, PathBuf)> {
     let inner = folder.join(name);
     let files = [folder.join(format!("{name}.rs")), inner.join("mod.rs")];

@@ -14,7 +14,6 @@ use fastrand::Rng;
 use glam::{DMat3, DVec3, Vec3};
 
 const MARGIN: f32 = 3.0;
-/// The library's compliance.
 const COMPLIANCE: f64 = 1.0 / 16.0;
 /// A wall whose depth is less than the largest depth divided by this has a smaller activation.
 const SHALLOW: f64 = 16.0;

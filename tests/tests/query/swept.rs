@@ -50,7 +50,6 @@ struct Way<'a> {
 }
 
 impl Way<'_> {
-    /// The true separation at a time.
     fn separation(&self, time: f64) -> f64 {
         let [first, last] = self.t.map(f64::from);
         let share = first + time * (last - first);

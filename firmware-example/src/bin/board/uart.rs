@@ -12,7 +12,6 @@ const RECEIVE_INTERRUPT: u32 = 1 << 1;
 /// 25 MHz / 16, the highest rate. An emulated UART ignores it.
 const DIVISOR: u32 = 16;
 
-/// One of the board's UARTs.
 pub struct Uart {
     data: Register,
     state: Register,

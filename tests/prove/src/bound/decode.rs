@@ -30,7 +30,6 @@ pub struct Instruction {
     pub flow: Flow,
 }
 
-/// Decodes the instruction at an address.
 pub fn decode(at: u32, first: u32, second: u32) -> Instruction {
     if first >> 11 >= 0b11101 {
         Instruction { bytes: 4, flow: wide(at, first, second) }

@@ -6,7 +6,6 @@ use std::ops::Range;
 use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
-/// A function's symbol.
 pub struct Symbol {
     /// Demangled, without its hash.
     pub name: String,
@@ -22,7 +21,6 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads an ELF file.
     pub fn read(bytes: &[u8]) -> Result<Self> {
         let file = object::File::parse(bytes)?;
         let mut sections = Vec::new();

@@ -44,7 +44,6 @@ impl Walk {
         }
     }
 
-    /// The gain at these prices.
     fn gain(&self, prices: &[i128]) -> i128 {
         let paid = self.counts.iter().map(|(&fact, &count)| prices[fact] * i128::from(count));
         i128::from(self.instructions) * UNIT - paid.sum::<i128>()

@@ -87,7 +87,6 @@ impl Bus {
 /// A bus whose controller has not started yet.
 pub struct Opened {
     socket: Socket,
-    /// The controller's end.
     pub end: qemu::Bus,
 }
 

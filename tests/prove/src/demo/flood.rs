@@ -36,7 +36,6 @@ const STORM: usize = 150;
 pub const CALM_EVERY: u32 = 1_000;
 pub const CALM: u32 = 100;
 
-/// The sender's addresses.
 const SENDER: ([u8; 6], [u8; 4], u16) = ([2, 0, 0, 0, 0, 2], [10, 0, 2, 2], 5001);
 
 const BROADCAST: [u8; 6] = [0xFF; 6];

@@ -19,7 +19,6 @@ pub struct Forces {
     forces_pushing: usize,
     /// Ticks among these whose search a budget ended, so that the last tick's direction was used.
     forces_kept: usize,
-    /// Ticks with a wrong force.
     forces_wrong: usize,
     /// The first tick with a wrong force.
     #[serde(skip)]

@@ -61,7 +61,6 @@ impl Moment {
         self.push.outcome > 0
     }
 
-    /// The filter's reason.
     pub fn reason(&self) -> Option<&'static str> {
         let reason = REASONS.get(self.push.outcome as usize).copied();
         reason.filter(|_| self.is_commanded())

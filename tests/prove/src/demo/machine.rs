@@ -20,13 +20,11 @@ pub enum Machine {
     Board {
         /// The firmware.
         program: PathBuf,
-        /// Its log's file.
         log: &'static str,
         /// Its use of the board's memory.
         footprint: Footprint,
         /// The toolchains that built it.
         toolchain: String,
-        /// The emulator's version.
         emulator: String,
         bus: Bus,
         /// What moves its instrument.
@@ -107,7 +105,6 @@ impl Machine {
         Ok(Self::Host { program: folder.join("release").join("host"), reason, robot })
     }
 
-    /// The controller's bus.
     pub const fn bus(&self) -> Bus {
         match self {
             Self::Board { bus, .. } => *bus,

@@ -38,7 +38,6 @@ pub fn cells(text: &str) -> Result<Cells> {
 
 /// The moving surface, and the firmware's tree of it.
 pub struct Scene {
-    /// The surface's name.
     name: String,
     /// The input of the firmware's build script.
     pub surface: Surface,

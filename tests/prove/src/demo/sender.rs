@@ -36,7 +36,6 @@ pub struct Link {
     pub frames_sent: AtomicU32,
     /// Set when the controller has ended.
     pub over: AtomicBool,
-    /// The sent frames by epoch.
     frames: Mutex<HashMap<u32, Sent>>,
 }
 

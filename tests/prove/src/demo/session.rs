@@ -47,13 +47,11 @@ pub enum Harm {
 
 /// The results of a run.
 pub struct Outcome {
-    /// The controller's bus.
     pub bus: Bus,
     /// The record of every tick.
     pub ticks: Vec<Tick>,
     /// The network's figures, if the bus is Ethernet.
     pub network: Option<Network>,
-    /// The controller's summary.
     pub summary: Summary,
     /// The check of every answer.
     pub checked: Vec<Checked>,
@@ -75,7 +73,6 @@ pub struct Outcome {
     pub frames_sent: u32,
     /// Whether the controller ended with success.
     pub exited_well: bool,
-    /// The controller's command.
     pub command: String,
     /// Real time that the run took.
     pub took: Duration,
@@ -277,7 +274,6 @@ fn listen(
     }
 }
 
-/// The progress line of a tick.
 fn line(tick: &Tick) -> String {
     let instructions = u64::from(tick.query_counts) * u64::from(qemu::INSTRUCTIONS_A_COUNT);
     let epoch = tick.epoch;

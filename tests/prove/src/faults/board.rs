@@ -34,7 +34,6 @@ pub struct Board {
 }
 
 impl Board {
-    /// Boots the probe with this MAC.
     pub fn boot<M: Mac>(program: &Path, mac: &M) -> Result<Self> {
         let folder = tempfile::tempdir()?;
         let blob = TREE.blob();

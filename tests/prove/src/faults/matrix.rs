@@ -164,7 +164,6 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         (self.keyed_mac)(if M::TAGGED { u64::from(self.rng.u32(..)) } else { 0 })
     }
 
-    /// The next frame's packets.
     fn next_frame(&mut self, controller: &mut dyn Receiver) -> Vec<Vec<u8>> {
         // A hello is answered at once.
         for _ in 0..3 {

@@ -57,7 +57,6 @@ static MESH: LazyLock<Mesh> = LazyLock::new(|| {
     Mesh { positions, triangles, ..Mesh::default() }
 });
 
-/// The surface's tree.
 pub static TREE: LazyLock<BuiltTree> =
     LazyLock::new(|| Builder::new().stretch(STRETCH).build(&*MESH).expect("a tree"));
 
@@ -174,7 +173,6 @@ pub trait Receiver {
     /// Its present status.
     fn status(&mut self) -> Vec<u8>;
 
-    /// Receives a packet as one message.
     fn message(&mut self, packet: &[u8], log: &Log);
 
     /// Receives bytes of a stream.

@@ -39,7 +39,6 @@ pub struct Effort {
     pub fault_seconds: u32,
     /// The same on a flooded network.
     pub flood_seconds: u32,
-    /// Seconds of each fuzz target.
     pub fuzz_seconds: u32,
     /// Whether the records are written to the documents; not for a run of the tests.
     pub is_record: bool,

@@ -28,13 +28,11 @@ impl Script {
         Self { words, expected: Vec::new() }
     }
 
-    /// The script's bytes.
     pub fn bytes(&self) -> Vec<u8> {
         let end = [command::END];
         self.words.iter().chain(&end).flat_map(|word| word.to_le_bytes()).collect()
     }
 
-    /// The board's answers.
     pub fn read(&self, answers: &[u32]) -> Result<Vec<Tick>> {
         let (answers, rest) = answers.as_chunks::<ANSWER_WORDS>();
         ensure!(

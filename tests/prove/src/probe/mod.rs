@@ -110,7 +110,6 @@ pub fn run_on_board(program: &Path, script: &[u8], time: Time) -> Result<Vec<u32
     run_emulated(&mut qemu::alone(program, time, &[]), script)
 }
 
-/// Answers from another emulated machine.
 pub fn on_machine(emulator: &mut Command, script: &Script) -> Result<Answers> {
     Answers::new(run_emulated(emulator, &script.bytes())?, script)
 }

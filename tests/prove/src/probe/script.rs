@@ -288,7 +288,6 @@ impl Script {
         script
     }
 
-    /// The script's bytes.
     pub fn bytes(&self) -> Vec<u8> {
         self.words.iter().flat_map(|word| word.to_le_bytes()).collect()
     }

@@ -34,7 +34,6 @@ pub struct Variant {
     pub inner: Option<String>,
 }
 
-/// Enums with their variants.
 pub type Enums = BTreeMap<String, BTreeMap<String, Variant>>;
 
 /// Public functions, as `Type::name`, each with the errors that it returns.
@@ -104,7 +103,6 @@ pub fn functions() -> Functions {
     functions
 }
 
-/// The error types that a type mentions.
 fn errors_in(of: &syn::Type) -> BTreeSet<String> {
     struct Names(BTreeSet<String>);
     impl Names {

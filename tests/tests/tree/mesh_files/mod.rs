@@ -140,7 +140,6 @@ pub fn samples() -> Vec<(&'static str, Format, Vec<u8>)> {
     ]
 }
 
-/// A folder for mesh files.
 pub struct Folder(pub tempfile::TempDir);
 
 impl Folder {
