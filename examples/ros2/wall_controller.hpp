@@ -1,6 +1,6 @@
 /*
- * The control tick of a robot that keeps its instrument off a moving surface, as ros2_control calls it. README.md has the
-ten * lines around it; alone.cpp calls it without ROS.
+ * The control tick of a robot that keeps its instrument off a moving surface, as ros2_control calls it. README.md has
+ * the lines around it; alone.cpp calls it without ROS.
  *
  * `configure` is for on_configure, `receive` for a thread of its own, `update` for the real-time thread: it allocates
  * nothing, takes no lock and throws nothing. One thread each.
