@@ -8,6 +8,7 @@ use anyhow::{Context, Result};
 use crate::process::run;
 use crate::toolchain::Cross;
 
+/// The firmware's surface.
 pub struct Surface {
     /// A mesh file, or the generated heart.
     pub mesh: Option<PathBuf>,
@@ -40,6 +41,7 @@ pub fn build(cross: &Cross, surface: &Surface) -> Result<PathBuf> {
     Ok(cross.program("firmware", "board"))
 }
 
+/// The command that builds the firmware.
 pub fn command(cross: &Cross, surface: &Surface) -> Command {
     let mut cargo = cross.cargo("build");
     describe(&mut cargo, surface);

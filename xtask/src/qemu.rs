@@ -69,6 +69,7 @@ pub fn with_serial(program: &Path, socket: &Path) -> Command {
     command
 }
 
+/// The board's bus.
 pub enum Bus {
     /// UART 0, connected to this socket.
     Serial(PathBuf),

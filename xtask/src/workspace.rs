@@ -32,6 +32,7 @@ const BUILT: &str = "DIBS_BUILT";
 /// For the processes that run after [`build`].
 pub const IS_BUILT: (&str, &str) = (BUILT, "1");
 
+/// Whether [`build`] has run.
 pub fn is_built() -> bool {
     env::var_os(BUILT).is_some()
 }
