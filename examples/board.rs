@@ -1,4 +1,4 @@
-//! The emulated board (MPS2-AN500), as far as the examples need it: UART 0, `SysTick`, and the end of a run.
+//! The emulated board (MPS2-AN500), as far as the examples use it: UART 0, `SysTick`, and the end of a run.
 
 use core::ptr::{read_volatile, without_provenance_mut, write_volatile};
 
@@ -22,13 +22,13 @@ const RECEIVE_ENABLE: u32 = 1 << 1 | 1 << 3;
 #[allow(dead_code, reason = "only RTIC asks")]
 pub const NVIC_PRIO_BITS: u8 = 3;
 
-/// Time without a surface after which an example gives up.
+/// Time without a surface after which an example ends with an error.
 pub const PATIENCE: Millis = Millis(20_000);
 
 /// Counts of `SysTick` in a tick of 1 ms.
 const TICK: u32 = 25_000;
 
-/// Interrupts in use; the second stands for any that the part has to spare.
+/// Interrupts in use; the second stands for any unused one of the part.
 #[allow(dead_code, reason = "RTIC needs no spare one")]
 #[derive(Clone, Copy)]
 pub enum Interrupt {
@@ -77,12 +77,12 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
     end(false)
 }
 
-/// Acknowledges the interrupt; before `byte`, or interrupts are lost.
+/// Acknowledges the interrupt. Call it before `byte`: otherwise interrupts are lost.
 pub fn acknowledge() {
     write(ACKNOWLEDGE, RECEIVE_INTERRUPT);
 }
 
-/// The byte that has arrived, if any.
+/// The received byte, if any.
 pub fn byte() -> Option<u8> {
     (read(STATE) & RECEIVE_FULL != 0).then(|| read(DATA).to_le_bytes()[0])
 }

@@ -11,7 +11,7 @@ use dibs_build::{TreeScript, Volume, generate};
 fn main() -> Result<()> {
     let out = PathBuf::from(env::var("OUT_DIR")?);
     surface()?;
-    // A board that takes only the library has a memory map of its own.
+    // A program for another board that only uses this library has its own memory map.
     let has_program = ["CARGO_FEATURE_BOARD", "CARGO_FEATURE_CYCLES"].map(env::var_os);
     if env::var("CARGO_CFG_TARGET_OS")? == "none" && has_program.iter().any(Option::is_some) {
         link(&out)?;
@@ -19,9 +19,9 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The tree in flash: of the generated heart, or of the mesh file in `DIBS_MESH`; for a stretch of 1.5, that in
-/// `DIBS_STRETCH`, or the limits of the file in `DIBS_LIMITS`. With `DIBS_NODES`, the cells of a lattice as in `9,8,7`, its
-/// nodes carry the surface.
+/// The tree in flash: of the generated heart, or of the mesh file in `DIBS_MESH`; for a stretch limit of 1.5, or the
+/// one in `DIBS_STRETCH`, or the limits in the file `DIBS_LIMITS`. With `DIBS_NODES`, the cells of a lattice such as
+/// `9,8,7`, the lattice's nodes move the surface.
 fn surface() -> Result<()> {
     for variable in ["DIBS_MESH", "DIBS_STRETCH", "DIBS_LIMITS", "DIBS_NODES"] {
         println!("cargo::rerun-if-env-changed={variable}");
@@ -44,7 +44,7 @@ fn surface() -> Result<()> {
     Ok(())
 }
 
-/// The tree of a mesh that a lattice's nodes carry.
+/// The tree of a mesh that a lattice's nodes move.
 fn carried(path: PathBuf, cells: &str) -> Result<TreeScript> {
     let cells = cells.split(',').map(str::parse).collect::<Result<Vec<u32>, _>>();
     let cells = cells.ok().and_then(|cells| cells.try_into().ok());
@@ -53,11 +53,12 @@ fn carried(path: PathBuf, cells: &str) -> Result<TreeScript> {
     Ok(dibs_build::tree(path).with(|tree| tree.nodes(&volume).with_rest_shape(false)))
 }
 
-/// The linker scripts of the binaries `board` and `cycles`: `memory.x` at the top of the repository is the board.
+/// Passes the linker scripts of the binaries `board` and `cycles`: `memory.x` at the top of the repository is the
+/// board's memory map.
 fn link(out: &Path) -> Result<()> {
     println!("cargo:rerun-if-changed=../memory.x");
     fs::copy("../memory.x", out.join("memory.x")).context("memory.x at the repository's top")?;
-    // The interrupts have only the handlers of `vectors.rs`.
+    // There are no interrupt handlers except those of `vectors.rs`.
     fs::write(out.join("device.x"), "")?;
     println!("cargo:rustc-link-search={}", out.display());
     for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {

@@ -95,8 +95,8 @@ impl<'p> Builder<'p> {
 
     /// The largest stretch that the tree must cover: a factor of at least 1.
     ///
-    /// A limit that the controller's arithmetic cannot tell from the rest shape becomes the least that it can: 1.0006, and
-    /// up to 1.016 where triangles have corners sharper than 10 degrees. So a rigid tissue's limit is 1.
+    /// A limit that the controller's arithmetic cannot tell from the rest shape is raised to the least one that it can:
+    /// 1.0006, and up to 1.016 where triangles have corners sharper than 10 degrees. So for rigid tissue give 1.
     #[must_use]
     pub fn stretch(mut self, limit: f32) -> Self {
         self.stretch = limit;
@@ -108,27 +108,27 @@ impl<'p> Builder<'p> {
     ///
     /// Tissue stretches much in few places, so limits for each triangle make spheres smaller everywhere else.
     /// [`MotionStretch::limits`](crate::MotionStretch::limits) derives them from a recorded motion. Along-surface
-    /// distances are weighted by the limits, and the tree's own limit is the largest. The least limit is as
-    /// [`stretch`](Self::stretch) has it, for each triangle.
+    /// distances are weighted by the limits, and the tree's own limit is the largest. A limit that the controller
+    /// cannot tell from the rest shape is raised as in [`stretch`](Self::stretch).
     #[must_use]
     pub fn limits(mut self, limits: Vec<f32>) -> Self {
         self.limits = Some(limits);
         self
     }
 
-    /// A volume whose nodes move the surface: a frame is their positions then, and the stretch limit is that of each
-    /// tetrahedron. Radii are lengths of paths through it, [`construction`](Self::construction) and
-    /// [`paths`](Self::paths) have no effect but for the paper's leaves, and the tree carries no metric of triangles.
+    /// A volume whose nodes move the surface: a frame then holds the nodes' positions, and the stretch limit is that of
+    /// each tetrahedron. Radii are lengths of paths through the volume, and the tree carries no metric of triangles.
+    /// [`construction`](Self::construction) and [`paths`](Self::paths) have no effect, except for the leaves of the
+    /// paper's construction.
     ///
-    /// A vertex is bound to the tetrahedron around it by weights of 16 bits, and the tree's rest shape is the one that they
-    /// give. The distance from there to the mesh's, times the stretch limit, counts in the accuracy of every answer.
+    /// A vertex is bound to the tetrahedron around it by weights of 16 bits; the tree's rest shape is computed from
+    /// these. Its distance from the mesh, times the stretch limit, is added to the error of every answer.
     #[must_use]
     pub fn nodes(mut self, volume: &Volume) -> Self {
         self.nodes = Some(Arc::new(volume.clone()));
         self
     }
 
-    /// The volume whose nodes move the surface.
     pub(crate) fn volume(&self) -> Option<&Volume> {
         self.nodes.as_deref()
     }
@@ -142,22 +142,22 @@ impl<'p> Builder<'p> {
         self
     }
 
-    /// The unit of the mesh's file, which the tree keeps so that a frame in another one is refused. It scales nothing: a
-    /// mesh is in millimetres, and an [`Import`](crate::Import) brings the unit that it was read in.
+    /// The unit of the mesh's file, which the tree keeps so that a frame in another one is refused. It scales nothing:
+    /// a mesh is in millimetres. An [`Import`](crate::Import) states the unit of its file itself.
     #[must_use]
     pub fn unit(mut self, unit: Unit) -> Self {
         self.unit = Some(unit);
         self
     }
 
-    /// How sections are pinned, measured and split.
+    /// How sections are pinned and split, and their radii measured.
     #[must_use]
     pub fn construction(mut self, construction: Construction) -> Self {
         self.construction = construction;
         self
     }
 
-    /// How along-surface distances are measured, and so which stretch is limited.
+    /// The paths that along-surface distances are measured on, which also decide which stretch is limited.
     #[must_use]
     pub fn paths(mut self, paths: Paths) -> Self {
         self.paths = Some(paths);
@@ -192,8 +192,7 @@ impl<'p> Builder<'p> {
         self
     }
 
-    /// Whether the tree carries the triangles' rest metric (12 bytes a triangle), which the stretch
-    /// measurement needs.
+    /// Whether the tree has the triangles' rest metric (12 bytes a triangle), for the stretch measurement needs.
     #[must_use]
     pub fn with_metric(mut self, with: bool) -> Self {
         self.with_metric = with;
@@ -218,8 +217,8 @@ impl<'p> Builder<'p> {
         Builder { progress: report, ..self }
     }
 
-    /// Builds the tree of a [`Mesh`], or of an [`Import`](crate::Import) whose rounding to f32 then counts in the
-    /// accuracy of every answer. The same mesh and options give the same bytes with any number of threads.
+    /// Builds the tree of a [`Mesh`], or of an [`Import`](crate::Import), whose rounding to f32 is then added to the
+    /// error of every answer. The same mesh and options give the same bytes with any number of threads.
     ///
     /// Cost: `O(n log^2 n)` for `n` triangles, on all cores.
     ///
@@ -261,7 +260,7 @@ impl<'p> Builder<'p> {
             }
             None => (self.stretch, LimitRatios::default()),
         };
-        // Beyond this no rest shape needs more.
+        // A limit of 1.02 or more admits every rest shape.
         let stretch = if ratios.is_uniform() && stretch < 1.02 {
             let least = least_limits(mesh, paths.kind()).fold(1.0, f64::max) * SHARED;
             stretch.max(round_up(least))
@@ -296,7 +295,7 @@ impl<'p> Builder<'p> {
         let mesh = embedding.mesh(surface.mesh());
         let stretch = embedding.limit(self.stretch, self.limits.as_deref())?;
         let paths = embedding.paths();
-        // No path along the surface is searched.
+        // Paths along the surface are not needed: an empty graph.
         let none = Mesh::default();
         let ratios = LimitRatios::default();
         let graph = Graph::new(&none, &Topology::new(&none), Paths::Edges, &ratios);

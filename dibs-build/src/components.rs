@@ -6,8 +6,8 @@ use std::collections::HashMap;
 
 use petgraph::unionfind::UnionFind;
 
-/// The sets of triangles that shared vertices connect, as indices of `triangles`: the largest set first, of equal sets
-/// the one with the first triangle.
+/// The sets of triangles that shared vertices connect, as indices of `triangles`, the largest set first. Of equal sets
+/// the one with the first triangle comes first.
 ///
 /// Cost: nearly linear.
 pub(crate) fn connected_by_vertices(triangles: &[[u32; 3]]) -> Vec<Vec<usize>> {

@@ -8,7 +8,7 @@ use glam::DVec3;
 use crate::Mesh;
 use crate::components::connected_by_vertices;
 
-/// Most pairs of triangles compared. Those beyond count as apart: a warning is no proof.
+/// Most pairs of triangles compared. Pairs beyond that count as apart: this is a warning, not a proof.
 const MOST_COMPARED: usize = 4_000_000;
 
 /// A determinant below this, relative to the lengths in it, is zero.
@@ -35,9 +35,8 @@ impl fmt::Display for CrossingParts {
 }
 
 /// The pairs of parts that cross or touch at rest, with two triangles that meet.
-///
-/// Cost: linear in the triangles, but for those of two parts whose boxes overlap, sorted and compared along one axis, up to
-/// four million pairs. A mesh of more parts than a tree has roots is not looked at.
+/// Cost: linear in the triangles. Triangles of two parts whose boxes overlap are sorted along one axis and compared, up
+/// to four million pairs. A mesh with more parts than a tree has roots is not checked.
 #[must_use]
 pub fn crossing_parts(mesh: &Mesh) -> Vec<CrossingParts> {
     let parts = connected_by_vertices(&mesh.triangles);
@@ -72,7 +71,7 @@ fn first_crossing(
     other: &[(usize, Bounds)],
     left: &mut usize,
 ) -> Option<CrossingParts> {
-    // The widest triangle bounds how far back one may begin that reaches here.
+    // A triangle that reaches this one begins at most the widest triangle's width before it.
     let widest = other.iter().map(|(_, bounds)| bounds.high.x - bounds.low.x).fold(0.0, f64::max);
     for (triangle, bounds) in one {
         let from = other.partition_point(|(_, other)| other.low.x < bounds.low.x - widest);
@@ -91,8 +90,8 @@ fn first_crossing(
     None
 }
 
-/// Whether two triangles have a point in common: an edge of one and the other. Of two in one plane, a corner or the middle
-/// of one in the other.
+/// Whether two triangles have a point in common: whether an edge of one meets the other. Of coplanar triangles only the
+/// corners and one point inside are tested.
 fn meet([one, other]: [[DVec3; 3]; 2]) -> bool {
     let pierces = |[a, b, c]: [DVec3; 3], triangle: [DVec3; 3]| {
         [(a, b), (b, c), (c, a)].into_iter().any(|(from, to)| edge_meets(from, to, triangle))
@@ -101,8 +100,8 @@ fn meet([one, other]: [[DVec3; 3]; 2]) -> bool {
     pierces(one, other) || pierces(other, one)
 }
 
-/// Whether a segment and a triangle have a point in common; of a segment in the triangle's plane, whether its start is in
-/// the triangle.
+/// Whether a segment and a triangle have a point in common. For a segment in the triangle's plane: whether its start is
+/// in the triangle.
 fn edge_meets(from: DVec3, to: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
     let normal = (b - a).cross(c - a);
     let (before, after) = (normal.dot(from - a), normal.dot(to - a));

@@ -63,7 +63,7 @@ pub enum BuildError {
         /// The limit given.
         stretch: f32,
     },
-    /// The number of limits differs from that of triangles.
+    /// The number of limits differs from the number of triangles or tetrahedra.
     #[error(
         "{limits} stretch limits, and there are {elements} of {of}: there must be one for each"
     )]
@@ -72,10 +72,10 @@ pub enum BuildError {
         limits: usize,
         /// Triangles of the mesh, or tetrahedra of the volume.
         elements: usize,
-        /// Which of these, in the plural.
+        /// `triangles` or `tetrahedra`.
         of: &'static str,
     },
-    /// The number of labels differs from that of triangles.
+    /// The number of labels differs from the number of triangles.
     #[error("{labels} labels for a mesh of {triangles} triangles: there must be one for each")]
     Labels {
         /// Labels given.
@@ -90,7 +90,7 @@ pub enum BuildError {
     Limit {
         /// `triangle`, or `tetrahedron` of a volume.
         of: &'static str,
-        /// Its number.
+        /// Its index.
         element: usize,
         /// Its limit.
         limit: f32,
@@ -109,7 +109,7 @@ pub enum BuildError {
         /// Their number.
         components: usize,
     },
-    /// The triangles are connected in so many ways that paths between them take too long to find.
+    /// The triangles are connected in so many ways that a search for paths between them would take too long.
     #[error(
         "the {triangles} triangles are connected at random, or by edges of very many triangles, and not as a surface: check \
          the vertex numbers of its faces"
@@ -121,10 +121,10 @@ pub enum BuildError {
     /// The volume cannot carry the surface.
     #[error(transparent)]
     Volume(#[from] crate::VolumeError),
-    /// The nodes do not pass their own validation: a defect of the builder.
+    /// The nodes fail their validation: a defect of the builder.
     #[error("the builder made nodes that its own checker rejects ({0}); please report this mesh")]
     InvalidNodes(#[from] dibs_nostd::nodes::NodesError),
-    /// The tree does not pass its own validation: a defect of the builder.
+    /// The tree fails its validation: a defect of the builder.
     #[error("the builder made a tree that its own checker rejects ({0}); please report this mesh")]
     Invalid(#[from] dibs_nostd::FormatError),
     /// The tree would not fit the format's 32-bit offsets.

@@ -34,13 +34,13 @@ impl Format {
 }
 
 impl Mesh {
-    /// Writes the mesh, in the coordinates of the file that it was read from: from its [origin](Mesh::origin) if that
-    /// is zero, otherwise in double precision. Text holds the shortest digits that give the same numbers back; STL
-    /// holds positions but no vertex numbers.
+    /// Writes the mesh in the coordinates of the file that it was read from: in single precision if its
+    /// [origin](Mesh::origin) is zero, otherwise in double precision. Text holds the shortest digits that give the same
+    /// numbers back; STL holds positions but no vertex numbers.
     ///
     /// # Errors
-    /// [`WriteError`], also for a format that is only read, and for binary STL, of single precision, where the origin is
-    /// not zero; the file is complete or untouched.
+    /// [`WriteError`]. Also for a format that is only read, and for binary STL, which is of single precision, if the
+    /// origin is not zero. The file is complete or untouched.
     ///
     /// # Panics
     /// For STL, if a triangle names a vertex that the mesh does not have.
@@ -76,7 +76,7 @@ impl Mesh {
         self.origin != DVec3::ZERO
     }
 
-    /// A position as a text has it.
+    /// A position as text.
     fn text(&self, position: Vec3) -> String {
         if self.is_recentred() {
             let DVec3 { x, y, z } = self.origin + position.as_dvec3();
@@ -116,7 +116,7 @@ fn ply(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
 
 fn stl(mesh: &Mesh, out: &mut dyn Write) -> io::Result<()> {
     let count = u32::try_from(mesh.triangles.len()).map_err(io::Error::other)?;
-    // A header that does not begin with "solid", as text does.
+    // A header that does not begin with "solid", as text STL does.
     out.write_all(&[0; 80])?;
     out.write_all(&count.to_le_bytes())?;
     for &triangle in &mesh.triangles {

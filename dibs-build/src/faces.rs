@@ -1,9 +1,10 @@
-//! Whether faces have the triangles of a mesh.
+//! Checks whether triangles are parts of given faces.
 
 use std::collections::{HashMap, VecDeque};
 
-/// The first of these triangles that is no part of a face, by its place; `None` where each is. A face of `n` corners has at
-/// most `n - 2` of them, as many as its corners make: one face of all corners would have every mesh's.
+/// Index of the first triangle that is no part of a face; `None` if each is part of one. A face of `n` corners covers
+/// at most `n - 2` triangles, as many as its triangulation has: otherwise one face of all corners would cover every
+/// mesh.
 pub(crate) fn first_without_face(
     triangles: &[[u32; 3]],
     vertices: usize,
@@ -13,22 +14,22 @@ pub(crate) fn first_without_face(
     (0..triangles.len()).find(|&triangle| !faces.place(triangle, triangles))
 }
 
-/// Faces, and the triangles that each has been given.
+/// Faces, and the triangles assigned to each.
 struct Faces {
-    /// Each face's corners, each once and sorted, so that faces of many corners take no longer.
+    /// Each face's corners, sorted and without duplicates, so that faces of many corners take no longer.
     corners: Vec<Vec<u32>>,
-    /// Faces at each vertex, by number.
+    /// The faces at each vertex, by index.
     at: Vec<Vec<u32>>,
-    /// Triangles given to each face.
+    /// Triangles assigned to each face.
     given: Vec<Vec<usize>>,
-    /// The face that each triangle was given to.
+    /// The face that each triangle is assigned to.
     face_of: Vec<Option<usize>>,
-    /// Triangles that may still be looked at in chains.
+    /// Triangles that may still be visited in searches for augmenting paths.
     left: usize,
 }
 
-/// Triangles that are looked at in chains, at most so many times as there are triangles: a mesh has few faces that share three
-/// corners, and a peer must not send hours of work.
+/// Most visits of triangles in those searches, for each triangle: a mesh has few faces that share three corners, and a
+/// peer must not cause hours of work.
 const LOOKS: usize = 64;
 
 impl Faces {
@@ -54,7 +55,7 @@ impl Faces {
 
     /// Faces that have these three corners, the smallest first.
     fn around(&self, corners: [u32; 3]) -> Vec<usize> {
-        // At a hub of many faces another corner has few.
+        // Of the three corners, take the one with the fewest faces.
         let few = corners.iter().filter_map(|&corner| self.at.get(corner as usize));
         let few = few.min_by_key(|at| at.len()).map_or(&[][..], Vec::as_slice);
         let has = |&face: &usize| {
@@ -65,9 +66,9 @@ impl Faces {
         faces
     }
 
-    /// Gives a triangle to a face. Where two faces share three corners, the first may have been given the other's triangle:
-    /// triangles given before move on to another of their faces, by the shortest chain of moves (a matching's augmenting path,
-    /// found breadth first).
+    /// Assigns a triangle to a face. Where two faces share three corners, the first may have been assigned the other's
+    /// triangle: then triangles move to another of their faces along the shortest augmenting path of the matching,
+    /// found breadth first.
     fn place(&mut self, triangle: usize, triangles: &[[u32; 3]]) -> bool {
         let mut wanted_by: HashMap<usize, usize> = HashMap::new();
         let mut waiting = VecDeque::from([triangle]);
@@ -89,8 +90,8 @@ impl Faces {
         false
     }
 
-    /// Gives `room` to the triangle that wants it. That triangle leaves its old face, which the next one in the chain wants; the
-    /// chain ends at the triangle that had none.
+    /// Assigns face `room` to the triangle that wants it. That triangle leaves its old face, which the previous
+    /// triangle on the path wants; the path ends at the new triangle, which had no face.
     fn move_along(&mut self, room: usize, wanted_by: &HashMap<usize, usize>) {
         let mut free = Some(room);
         while let Some(face) = free {
@@ -109,7 +110,7 @@ mod tests {
     use super::first_without_face;
     use fastrand::Rng;
 
-    /// The vertex 3 has two faces: both quads have the corners 0, 1 and 2.
+    /// Vertex 3 belongs to the first quad alone; both quads have the corners 0, 1 and 2.
     const TWO_QUADS: [[u32; 4]; 2] = [[0, 1, 2, 3], [0, 1, 2, 4]];
 
     fn misses(triangles: &[[u32; 3]], faces: &[&[u32]]) -> Option<usize> {
@@ -134,16 +135,16 @@ mod tests {
 
     #[test]
     fn triangles_move_along_a_chain_of_faces() {
-        // Each face shares three corners with the next, and the last triangle is the first face's alone.
+        // Each face shares three corners with the next, and the triangle that is added last fits the first face alone.
         let chain: [&[u32]; 4] = [&[0, 1, 2, 3], &[1, 2, 3, 4], &[2, 3, 4, 5], &[3, 4, 5]];
         let taken = [[1, 2, 3], [0, 1, 2], [2, 3, 4], [1, 2, 4], [3, 4, 5], [2, 4, 5]];
         assert_eq!(misses(&taken, &chain), None);
-        // Seven places, of which the last triangle's are full.
+        // The faces have seven places, and both places of the first one are then taken.
         assert_eq!(misses(&[&taken[..], &[[0, 1, 3]]].concat(), &chain), None);
         assert_eq!(misses(&[&taken[..], &[[0, 1, 3], [0, 2, 3]]].concat(), &chain), Some(7));
     }
 
-    /// Small faces and triangles at random, against every way to give them.
+    /// Small random faces and triangles, compared with an exhaustive search for an assignment.
     #[test]
     fn what_fits_in_some_way_is_taken() {
         fn fits(triangles: &[[u32; 3]], faces: &[Vec<u32>], room: &mut [usize]) -> bool {
@@ -188,7 +189,7 @@ mod tests {
         let three = [[0, 1, 2], [0, 2, 3], [0, 3, 4]];
         assert_eq!(misses(&three, &[all]), None);
         assert_eq!(misses(&[three[0], three[1], three[2], [1, 2, 3]], &[all]), Some(3));
-        // A corner that is named twice makes none.
+        // A duplicate corner adds no place.
         assert_eq!(misses(&three[..2], &[&[0, 1, 2, 2]]), Some(1));
         assert_eq!(misses(&[[0, 1, 9]], &[all]), Some(0), "a vertex that no face has");
     }

@@ -12,7 +12,8 @@ impl FrameCheck {
     /// Reads a mesh file that is a frame: positions in the order of the tree's rows.
     ///
     /// # Errors
-    /// [`ReadError`], and for a file of other vertices, triangles or size, or that is inside out.
+    /// [`ReadError`]. Also for a file with other vertices, triangles or size than the tree's mesh, or one that is
+    /// inside out.
     pub fn read(
         &self,
         path: impl AsRef<Path>,
@@ -23,7 +24,7 @@ impl FrameCheck {
         let frame = || {
             let (positions, faces) = read::frame(path, 0, unit, origin)?;
             let rows = self.to_rows(&positions);
-            // Faces tell another mesh from another size.
+            // The faces tell a frame of another mesh from one in another unit.
             if !matches!(rows, Err(FrameError::Vertices { .. } | FrameError::Nodes { .. })) {
                 self.check_faces(&faces)?;
             }

@@ -1,4 +1,4 @@
-//! The one check of frames against a tree, wherever they come from: a file, an array, a live source.
+//! The one check of frames against a tree, for files, arrays and live sources.
 
 // Requirement: M-06
 
@@ -10,7 +10,7 @@ use glam::Vec3;
 use crate::Mesh;
 use crate::faces::first_without_face;
 
-/// Why positions are no frame of a tree's surface.
+/// Why positions are not a frame of a tree's surface.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
@@ -36,7 +36,7 @@ pub enum FrameError {
         /// Positions of the frame.
         found: usize,
     },
-    /// Its triangles are not the tree's.
+    /// Its triangles are not those of the tree.
     #[error(
         "has no face with the vertices {0}, {1} and {2} (counted from 0), which are a triangle of the tree: it is of another \
          mesh, or numbers its vertices otherwise, as STL does, which has no numbers", corners[0], corners[1], corners[2]
@@ -51,9 +51,9 @@ pub enum FrameError {
         of_unit(*unit)
     )]
     Size {
-        /// Length of its edges (root mean square) as a part of that at rest.
+        /// Length of its edges (root mean square) over their length at rest.
         ratio: f64,
-        /// The unit of the mesh's file, where it is known.
+        /// The unit of the mesh's file, if known.
         unit: Option<Unit>,
     },
     /// A closed surface is turned inside out, so that inside and outside are exchanged.
@@ -62,7 +62,7 @@ pub enum FrameError {
          in the frame: convert both in the same way"
     )]
     InsideOut {
-        /// The signed volume that it encloses, as a part of that at rest.
+        /// The signed volume that it encloses over the volume at rest.
         part: f64,
     },
 }
@@ -73,38 +73,39 @@ fn of_unit(unit: Option<Unit>) -> String {
     })
 }
 
-/// Edges of a frame are at least so long, as a part of those at rest: as a receiver's limit on shrinkage is by default.
+/// Least length of a frame's edges over their length at rest: the default of a receiver's limit on shrinkage.
 const LEAST: f64 = 0.25;
 
-/// And at most so many times as long, or twice the stretch limit.
+/// Largest such ratio, or twice the stretch limit if that is larger.
 const MOST: f64 = 4.0;
 
-/// And at most so many times where limits are learned from them: below the factor of every other unit.
+/// Largest such ratio for frames that limits are learned from: less than the factor between two units.
 const MOST_LEARNED: f64 = 8.0;
 
-/// A flat surface's volume has the other sign by rounding: by this part of the volume at rest it may, as for a receiver.
+/// Rounding may change the sign of a flat surface's volume: up to this fraction of the volume at rest, a receiver's
+/// tolerance, it may be negative.
 const FLAT: f64 = 1.0 / 64.0;
 
-/// The least volume at rest that has a sign, as a part of the sum of its terms' sizes.
+/// Least volume at rest whose sign is significant, as a fraction of the sum of its terms' magnitudes.
 const LEAST_VOLUME: f64 = 1.0 / 4096.0;
 
-/// Checks frames against a tree, and puts their positions into the order of its rows. Of a tree with
-/// [nodes](dibs_nostd::nodes) a frame is their positions, in the order of the volume's file.
+/// Checks frames against a tree, and reorders their positions into the tree's rows. For a tree with
+/// [nodes](dibs_nostd::nodes) a frame holds the nodes' positions, in the order of the volume's file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameCheck {
-    /// The mesh's vertex of each row.
+    /// The mesh vertex of each row.
     order: Vec<u32>,
-    /// Corners of the tree's triangles, by the mesh's numbers; of nodes, those of two faces of each element.
+    /// Corners of the tree's triangles, by the mesh's numbers; for nodes, corners of two faces of each tetrahedron.
     triangles: Vec<[u32; 3]>,
-    /// Whether frames are of nodes.
+    /// Whether frames hold nodes instead of vertices.
     is_of_nodes: bool,
     /// Vertices of the mesh's file.
     vertices: usize,
     unit: Option<Unit>,
-    /// The sum of the squares of all edges at rest, where the tree has its rest shape.
+    /// The sum of the squares of all edges at rest, if the tree has its rest shape.
     rest: Option<f64>,
     most: f64,
-    /// The volume at rest, where the surface is closed and has one.
+    /// The volume at rest, if the surface is closed and the volume's sign is significant.
     volume: Option<f64>,
 }
 
@@ -116,7 +117,7 @@ impl FrameCheck {
             return Self::of_nodes(&nodes, tree.unit());
         }
         let number = |row| tree.vertex_number(row).map_or(row, |number| number.0);
-        // Without the mesh's numbers, positions come in the order of the rows.
+        // Without the mesh's numbers, positions are expected in the order of the rows.
         let has_order = tree.vertex_number(0).is_some();
         let order: Vec<u32> = (0..tree.vertex_count()).map(number).collect();
         let rows = (0..tree.triangle_count()).filter_map(|row| tree.corners(TriangleRow(row)));
@@ -152,7 +153,7 @@ impl FrameCheck {
             vertices: nodes.count() as usize,
             unit,
             most: (2.0 * f64::from(nodes.stretch_limit())).max(MOST),
-            // Each element has a sign of its own.
+            // The check tests each tetrahedron's sign by itself.
             volume: None,
         }
     }
@@ -163,7 +164,7 @@ impl FrameCheck {
         &self.order
     }
 
-    /// Corners of the tree's triangles, by the mesh's numbers. None for frames of nodes.
+    /// Corners of the tree's triangles, by the mesh's numbers. Empty for frames of nodes.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         if self.is_of_nodes { &[] } else { &self.triangles }
@@ -175,10 +176,10 @@ impl FrameCheck {
         self.vertices
     }
 
-    /// Positions in the mesh's order (mm), in the order of the tree's rows.
+    /// Takes a frame's positions in the mesh's order (mm) and returns them in the order of the tree's rows.
     ///
     /// # Errors
-    /// [`FrameError`] for another number of vertices, for another size, and for a closed surface turned inside out.
+    /// [`FrameError`] for another number of vertices, another size, and a closed surface that is inside out.
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, FrameError> {
         let mut rows = Vec::new();
         self.to_rows_in(positions, &mut rows)?;
@@ -205,7 +206,7 @@ impl FrameCheck {
         }
         if let (Some(rest), Some((now, _))) = (self.volume, volume(&self.triangles, at)) {
             let part = now / rest;
-            // False for NaN: what is not finite has an error of its own.
+            // False for NaN, so that positions that are not finite are left to their own error.
             if part < -FLAT {
                 return Err(FrameError::InsideOut { part });
             }
@@ -255,7 +256,7 @@ pub(crate) fn check_mesh_size(mesh: &Mesh, frame: &[Vec3]) -> Result<(), FrameEr
 
 fn check_size(rest: f64, now: f64, most: f64, unit: Option<Unit>) -> Result<(), FrameError> {
     let ratio = (now / rest).sqrt();
-    // What is not finite has an error of its own.
+    // Positions that are not finite are left to their own error.
     if ratio < LEAST || ratio > most && ratio.is_finite() {
         return Err(FrameError::Size { ratio, unit });
     }
@@ -272,7 +273,7 @@ fn squares(triangles: &[[u32; 3]], at: impl Fn(u32) -> Option<Vec3>) -> Option<f
     Some(sum)
 }
 
-/// The signed volume that closed triangles enclose, and the sum of its terms' sizes; `None` where a position is missing.
+/// The signed volume within closed triangles, and the sum of its terms' magnitudes; `None` if a position is missing.
 fn volume(triangles: &[[u32; 3]], at: impl Fn(u32) -> Option<Vec3>) -> Option<(f64, f64)> {
     let near = at(triangles.first()?[0])?.as_dvec3();
     let (mut sum, mut terms) = (0.0, 0.0);

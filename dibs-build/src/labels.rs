@@ -1,4 +1,4 @@
-//! The file of labels that `dibs build --labels` reads: one for each face of a mesh's file, or each triangle of the mesh.
+//! The labels that `dibs build --labels` reads: one for each face of the file, or each triangle of the mesh.
 //!
 //! Text: lines that start with `#` and empty ones are skipped; then one number from 0 to 255 a line, in the file's order.
 
@@ -28,19 +28,19 @@ pub enum LabelsErrorKind {
     /// The operating system's error.
     #[error("cannot be read ({0})")]
     Io(#[from] std::io::Error),
-    /// The number of labels differs from that of triangles.
+    /// The number of labels differs from the number of triangles.
     #[error("has {found} labels for {expected} triangles{}: give one for each", of_faces(*.faces))]
     Count {
         /// Triangles of the mesh.
         expected: usize,
-        /// Faces of the mesh's file, if they are not these triangles.
+        /// Faces of the mesh's file, if they differ from the triangles.
         faces: Option<usize>,
         /// Labels in the file.
         found: usize,
     },
-    /// The file of the mesh has as many faces as the mesh has triangles, but not the same.
+    /// The mesh's file has as many faces as the mesh has triangles, but some faces were dropped and others cut up.
     #[error(
-        "has {found} labels, and the mesh's file has as many faces as triangles are left of others: mend the mesh, \
+        "has {found} labels, for the faces of the mesh's file or for the triangles left of it: mend the mesh, \
          so that none is dropped (--strict names them)"
     )]
     Ambiguous {
@@ -62,7 +62,7 @@ fn of_faces(faces: Option<usize>) -> String {
 }
 
 /// Reads the labels of a surface's triangles: text, one number from 0 to 255 a line, `#` before a comment. There is one
-/// for each face of the surface's file, of which those of dropped faces are passed over; or one for each triangle.
+/// for each face of the surface's file, where labels of dropped faces are ignored; or one for each triangle.
 ///
 /// # Errors
 /// [`LabelsError`] names the file and its defect.

@@ -6,11 +6,10 @@
 //! dibs_build::tree("heart.ply").stretch(1.5).emit("heart");
 //! ```
 //!
-//! The program then says `dibs_nostd::include_tree!("heart")`. [`tree`] is made of parts: [`read`]
-//! imports and checks a mesh, [`Builder`] makes the tree, [`BuiltTree`] is written as a
-//! Rust module or as a blob. [`Motion`] is a recorded deformation, [`modes`] make a
-//! few weights of it, and `generate` makes procedural hearts and brains. The library prints nothing; the program `dibs` of
-//! the crate `dibs-cli` does.
+//! The program then says `dibs_nostd::include_tree!("heart")`. [`tree`] is made of parts: [`read`] imports and checks a
+//! mesh, [`Builder`] makes the tree, and [`BuiltTree`] is written as a Rust module or as a blob. [`Motion`] is a
+//! recorded deformation, [`modes`] approximates it by a few weights, and `generate` makes procedural hearts and brains.
+//! The library prints nothing; the program `dibs` of the crate `dibs-cli` does.
 
 mod array;
 mod builder;
@@ -68,5 +67,5 @@ pub use surface_rows::SurfaceRows;
 pub use write::{WriteError, WriteErrorKind, write_atomically};
 
 pub use dibs_nostd::format::Unit;
-/// The vectors in this interface.
+/// The vector types in this interface.
 pub use glam;

@@ -5,12 +5,12 @@ use glam::{DVec3, Vec3};
 
 /// A triangle mesh: fixed connectivity, and the positions of one frame.
 ///
-/// Coordinates are in the mesh's own unit (mm in the examples), and f32 as on the controller: geodesics on other
-/// numbers would not bound its distances.
+/// Coordinates are in the mesh's own unit (mm in the examples), and f32 as on the controller: geodesics computed on
+/// more precise coordinates would not bound the controller's distances.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// The point of the mesh's file, in millimetres, that positions count from: zero unless the file's coordinates are so
-    /// far from their own origin that f32 would lose them. A tree stores it.
+    /// The point of the mesh's file, in millimetres, that positions are relative to. It is zero unless the file's
+    /// coordinates are so far from their own origin that f32 would lose the shape. A tree stores it.
     pub origin: DVec3,
     /// One position a vertex.
     pub positions: Vec<Vec3>,
@@ -19,8 +19,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Positions of the mesh's file, or of a frame in its coordinates (mm), as this mesh has them: less the
-    /// [origin](Mesh::origin), and rounded to f32 only then.
+    /// Converts positions in the file's coordinates (mm) to this mesh's: relative to its [origin](Mesh::origin), then
+    /// rounded to f32.
     #[must_use]
     pub fn local(&self, positions: &[DVec3]) -> Vec<Vec3> {
         positions.iter().map(|&position| (position - self.origin).as_vec3()).collect()
@@ -37,21 +37,21 @@ pub trait RestSurface {
     /// Its positions and triangles.
     fn mesh(&self) -> &Mesh;
 
-    /// Largest error of a vertex (in the mesh's unit, not negative).
+    /// Largest error of a vertex position (in the mesh's unit, not negative).
     fn position_error(&self) -> f32;
 
-    /// The unit of its file, whose lengths became millimetres; `None` where it has no file.
+    /// The unit of its file, whose lengths were converted to millimetres; `None` if it has no file.
     fn unit(&self) -> Option<Unit> {
         None
     }
 
-    /// Triangles of its file, those too that were dropped.
+    /// Triangles of its file, including those that were dropped.
     fn file_triangles(&self) -> usize {
         self.mesh().triangles.len()
     }
 
-    /// The face of its file, counted from 0, that each triangle comes from, and the number of these faces; `None` where it
-    /// has no file.
+    /// The face of its file, counted from 0, that each triangle comes from, and the number of faces in the file; `None`
+    /// if it has no file.
     fn file_faces(&self) -> Option<(&[u32], usize)> {
         None
     }
@@ -92,12 +92,12 @@ impl<S: RestSurface> RestSurface for &S {
 /// A recorded or generated deformation of a mesh: every frame holds one position a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// The frames, in order of time. Positions count from the origin.
+    /// The frames, in order of time. Positions are relative to the origin.
     pub frames: Vec<Vec<Vec3>>,
-    /// Frames a second; 0 if the file does not say it.
+    /// Frames a second; 0 if the file does not state it.
     pub rate: f32,
     /// The [origin](Mesh::origin) of the mesh.
     pub origin: DVec3,
-    /// The faces that all files of a series have, by the vertices of each; none of other motions.
+    /// The faces that all files of a series have, by the vertices of each; empty for other motions.
     pub faces: Vec<Vec<u32>>,
 }

@@ -1,4 +1,4 @@
-//! Winding: checks that a surface has an outer side, and turns triangles until it has.
+//! Winding: checks that a surface has an outer side, and flips triangles until it has one.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -45,7 +45,7 @@ pub enum WindingError {
         /// The other end.
         to: u32,
     },
-    /// Two triangles disagree whichever way they are turned.
+    /// Two triangles disagree whichever way they are wound.
     #[error(
         "the surface has only one side, like a Moebius strip: triangles {triangle} and {other} disagree however they \
          are turned, so distances to it have no sign"
@@ -56,10 +56,10 @@ pub enum WindingError {
         /// The other one.
         other: usize,
     },
-    /// So many closed parts that the test which lies in which would take too long.
+    /// Too many closed parts to test which of them contain others.
     #[error(
-        "the surface has {parts} closed parts, and whether they lie in each other is tested for at most {most}: build a \
-         tree for each few of them"
+        "the surface has {parts} closed parts, and which of them contain others is tested for at most {most}: build \
+         several trees, each of some of them"
     )]
     Parts {
         /// Closed parts.
@@ -67,7 +67,7 @@ pub enum WindingError {
         /// Most that are tested.
         most: usize,
     },
-    /// A closed part of the surface, in no other closed part, has normals that point inwards.
+    /// A closed part of the surface, which no other closed part contains, has normals that point inwards.
     #[error(
         "the closed surface with triangle {triangle} faces inwards, so what it encloses counts as outside: turn it with \
          --orient, unless the tool works inside"
@@ -78,8 +78,8 @@ pub enum WindingError {
     },
 }
 
-/// Checks that a surface has an outer side, and that its closed parts face outwards. One inside another may face either
-/// way: it may be a cavity, or an organ inside an organ.
+/// Checks that a surface has an outer side, and that its closed parts face outwards. A part inside another may face
+/// either way: it may be a cavity, or an organ inside an organ.
 ///
 /// Cost: linear in the triangles, times the closed parts that face inwards.
 ///
@@ -110,13 +110,14 @@ pub fn check_winding(mesh: &Mesh) -> Result<(), WindingError> {
     }
 }
 
-/// Turns triangles until the surface has an outer side. Parts end at edges of more than two triangles. Open parts turn as few triangles as possible; closed parts face
-/// outwards, or inwards for a cavity in another part. Returns the number of turned triangles.
+/// Flips triangles until the surface has an outer side. Parts end at edges of more than two triangles. In open parts as
+/// few triangles as possible are flipped; closed parts face outwards, or inwards for a cavity in another part. Returns
+/// the number of flipped triangles.
 ///
 /// Cost: linear in the triangles, times the closed parts of the surface.
 ///
 /// # Errors
-/// [`WindingError`] if no turning helps; the mesh is then unchanged.
+/// [`WindingError`] if no flipping helps; the mesh is then unchanged.
 pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
     let edges = Edges::of(mesh);
     let count = mesh.triangles.len();
@@ -125,7 +126,7 @@ pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
         around[pair.triangle].push((pair.other, pair.agrees));
         around[pair.other].push((pair.triangle, pair.agrees));
     }
-    // Whether to turn each triangle, if the first of its part stays.
+    // Whether to flip each triangle, if the first of its part stays as it is.
     let mut turned: Vec<Option<bool>> = vec![None; count];
     let mut parts: Vec<Vec<usize>> = Vec::new();
     for first in 0..count {
@@ -189,8 +190,8 @@ pub fn orient(mesh: &mut Mesh) -> Result<usize, WindingError> {
     Ok(changed)
 }
 
-/// Most closed parts that are tested, each against all triangles. A tree has 64 roots; parts that only share vertices or
-/// edges are one root's.
+/// Most closed parts that are tested, each against all triangles. A tree has 64 roots; parts that share vertices or
+/// edges belong to one root.
 const MOST_PARTS: usize = 256;
 
 fn check_parts(parts: usize) -> Result<(), WindingError> {
@@ -201,21 +202,21 @@ fn check_parts(parts: usize) -> Result<(), WindingError> {
 struct Pair {
     triangle: usize,
     other: usize,
-    /// Whether they run along it in opposite directions.
+    /// Whether they run along their common edge in opposite directions.
     agrees: bool,
 }
 
 struct Edges {
     pairs: Vec<Pair>,
-    /// Edges of each triangle that are no border.
+    /// For each triangle the number of its edges that are no border.
     neighbours: Vec<u8>,
-    /// The first edge of more than two triangles that are not as many in one direction as in the other.
+    /// The first edge of more than two triangles that does not have equally many in either direction.
     crowded: Option<WindingError>,
 }
 
 impl Edges {
     fn of(mesh: &Mesh) -> Self {
-        // The triangles of each edge, and whether they run along it from the lower number to the higher.
+        // The triangles of each edge, and whether they run along it from the lower vertex number to the higher.
         let mut users: HashMap<(u32, u32), Vec<(usize, bool)>> = HashMap::new();
         for (triangle, &[a, b, c]) in mesh.triangles.iter().enumerate() {
             for (from, to) in [(a, b), (b, c), (c, a)] {
@@ -250,7 +251,7 @@ impl Edges {
             from,
             to,
         });
-        // The map's order is not deterministic.
+        // A hash map's order is not deterministic.
         edges.pairs.sort_unstable_by_key(|pair| (pair.triangle, pair.other));
         edges
     }
@@ -271,7 +272,7 @@ impl Edges {
     }
 }
 
-/// The volume that triangles enclose, negative if they face inwards. Computed relative to one of their vertices.
+/// The volume that triangles enclose, negative if they face inwards. Computed relative to the mesh's first vertex.
 pub(crate) fn volume(mesh: &Mesh, triangles: impl IntoIterator<Item = usize>) -> f64 {
     let origin = mesh.positions.first().copied().unwrap_or_default().as_dvec3();
     let of = |triangle: usize| {
@@ -282,7 +283,7 @@ pub(crate) fn volume(mesh: &Mesh, triangles: impl IntoIterator<Item = usize>) ->
     triangles.into_iter().map(of).sum()
 }
 
-/// Whether a closed part of a surface winds around a point: by the solid angle of its triangles.
+/// Whether a closed part of a surface encloses a point: by the solid angle of its triangles.
 pub(crate) fn winds(mesh: &Mesh, part: &[usize], point: DVec3) -> bool {
     let solid_angle = |&triangle: &usize| {
         let [a, b, c] =
@@ -291,7 +292,7 @@ pub(crate) fn winds(mesh: &Mesh, part: &[usize], point: DVec3) -> bool {
         let volume = a.dot(b.cross(c));
         2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
     };
-    // Half of once around, which is 4 pi.
+    // Half of the full solid angle of 4 pi.
     part.iter().map(solid_angle).sum::<f64>().abs() > 2.0 * std::f64::consts::PI
 }
 

@@ -1,10 +1,11 @@
-//! The other files that reading one file reads.
+//! The files that a mesh or motion file refers to.
 
 use crate::motion::series_files;
 use std::path::{Path, PathBuf};
 
-/// The files that reading a mesh or motion file reads: itself, or the files of a series (`heart_%03d.vtp`), and those that
-/// a glTF document names beside it. For programs that must not overwrite an input. What cannot be read names no others.
+/// The files that reading a mesh or motion file reads: the file itself or the files of a series (`heart_%03d.vtp`), and
+/// those that a glTF document refers to. Meant for programs that must not overwrite an input. A file that cannot be
+/// read refers to no others.
 #[must_use]
 pub fn files_of(path: impl AsRef<Path>) -> Vec<PathBuf> {
     let path = path.as_ref();
@@ -15,7 +16,7 @@ pub fn files_of(path: impl AsRef<Path>) -> Vec<PathBuf> {
     [path.to_path_buf()].into_iter().chain(others).collect()
 }
 
-/// The buffers that a glTF document names.
+/// The buffer files that a glTF document refers to.
 #[cfg(feature = "formats")]
 fn buffers(path: &Path) -> Option<Vec<PathBuf>> {
     use std::io::Read;
@@ -31,7 +32,7 @@ fn buffers(path: &Path) -> Option<Vec<PathBuf>> {
         return None;
     }
     let bytes = std::fs::read(path).ok()?;
-    // In a binary file the document is the first chunk.
+    // In a binary file (GLB) the document is the first chunk.
     let document = if bytes.starts_with(b"glTF") {
         let length = bytes.get(12..16)?.try_into().ok().map(u32::from_le_bytes)?;
         bytes.get(20..20_usize.checked_add(length as usize)?)?
@@ -45,13 +46,12 @@ fn buffers(path: &Path) -> Option<Vec<PathBuf>> {
     Some(uris.flat_map(|uri| [beside(uri), beside(&decoded(uri))]).collect())
 }
 
-/// Without glTF.
 #[cfg(not(feature = "formats"))]
 fn buffers(_path: &Path) -> Option<Vec<PathBuf>> {
     None
 }
 
-/// The text with its percent-encoded bytes.
+/// The text after percent-decoding.
 #[cfg(feature = "formats")]
 fn decoded(uri: &str) -> String {
     let mut bytes = Vec::with_capacity(uri.len());

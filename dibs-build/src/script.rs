@@ -1,11 +1,11 @@
-//! A tree in one line of a build script.
+//! A tree from one line of a build script.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
 use crate::{Builder, BuiltTree, Mesh, ReadOptions, RestSurface, Unit, read_labels, read_limits};
 
-/// Begins the tree of a build script, from a mesh file or a [`Mesh`]; [`TreeScript::emit`] builds it.
+/// Starts the tree of a build script, from a mesh file or a [`Mesh`]; [`TreeScript::emit`] builds it.
 ///
 /// The `main` of a `build.rs`:
 ///
@@ -27,11 +27,11 @@ pub fn tree(mesh: impl Into<MeshSource>) -> TreeScript {
     }
 }
 
-/// The source of a build script's mesh.
+/// Where the mesh of a build script comes from.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum MeshSource {
-    /// A file, as [`read`](crate::read()) takes it.
+    /// A file in one of the formats of [`read`](crate::read()).
     File(PathBuf),
     /// A mesh made by the script.
     Mesh(Mesh),
@@ -75,13 +75,13 @@ impl TreeScript {
         self
     }
 
-    /// A label for each triangle, from a file of one number from 0 to 255 a line.
+    /// A label for each triangle, from a file with one number from 0 to 255 a line.
     pub fn labels(mut self, file: impl Into<PathBuf>) -> Self {
         self.labels = Some(file.into());
         self
     }
 
-    /// Labels of the mesh file's own groups: [`ReadOptions::groups`].
+    /// Uses the mesh file's own groups as labels: [`ReadOptions::groups`].
     pub fn labels_from_groups(mut self) -> Self {
         self.reading.groups = true;
         self
@@ -93,14 +93,14 @@ impl TreeScript {
         self
     }
 
-    /// Adds displacement modes fitted to a recorded motion, as [`Motion::read`](crate::Motion::read) takes it.
+    /// Adds displacement modes fitted to a recorded motion in a format of [`Motion::read`](crate::Motion::read).
     #[cfg(feature = "modes")]
     pub fn modes(mut self, motion: impl Into<PathBuf>, count: usize) -> Self {
         self.modes = Some((motion.into(), count));
         self
     }
 
-    /// The unit of the lengths in the mesh file, which become millimetres: [`ReadOptions::unit`].
+    /// The unit of the lengths in the mesh file, which are converted to millimetres: [`ReadOptions::unit`].
     ///
     /// ```no_run
     /// dibs_build::tree("heart.stl").unit(dibs_build::Unit::Metre).emit("heart");
@@ -127,7 +127,7 @@ impl TreeScript {
     /// Builds the tree and writes it where `dibs_nostd::include_tree!(name)` finds it.
     ///
     /// Cargo then runs the script again only when the script or a file that it read has changed. The import's warnings
-    /// become cargo's. If anything fails, the script ends with one sentence as cargo's error: the file, the element,
+    /// become cargo's warnings. On failure the script ends with one sentence as cargo's error: the file, the element,
     /// the remedy.
     pub fn emit(self, name: &str) {
         if let Err(error) = self.try_emit(name) {
@@ -156,7 +156,7 @@ impl TreeScript {
         Ok(built)
     }
 
-    /// Every file that is read.
+    /// Every file that the script reads.
     fn files(&self) -> impl Iterator<Item = &Path> {
         let mesh = match &self.mesh {
             MeshSource::File(path) => Some(path.as_path()),
@@ -251,7 +251,7 @@ mod tests {
         let grouped = with([Some(0), Some(1), Some(1), Some(1)]);
         assert_eq!(labels(tree(&path).labels_from_groups()), grouped);
         assert_eq!(labels(tree(&path)), with([None; 4]));
-        // Reading options that come later keep the switch.
+        // Reading options that are set later do not clear this switch.
         let options = ReadOptions { weld_tolerance: Some(0.0), ..ReadOptions::default() };
         assert_eq!(labels(tree(&path).labels_from_groups().reading(options)), grouped);
     }

@@ -1,4 +1,4 @@
-//! The surface's vertices in one frame: the frame's own, or computed from its nodes.
+//! The surface's vertices in one frame: those of the frame itself, or computed from its nodes.
 
 use dibs_nostd::nodes::{Nodes, NodesError};
 use dibs_nostd::{
@@ -6,18 +6,18 @@ use dibs_nostd::{
 };
 use glam::Vec3;
 
-/// The vertices of a tree's surface in one frame, in the order of its rows, and how far it is stretched. Of a tree with
-/// [nodes](dibs_nostd::nodes) the frame is theirs, and every vertex is computed.
+/// The vertices of a tree's surface in one frame, in the order of its rows, and how far it is stretched. For a tree
+/// with [nodes](dibs_nostd::nodes) a frame holds the nodes' positions, and every vertex is computed from them.
 #[derive(Clone, Debug)]
 pub struct SurfaceRows {
     positions: Vec<Vec3>,
     error: f32,
-    /// The measured stretch, or why there is none.
+    /// The measured stretch, or why it cannot be measured.
     pub stretch: Result<MeasuredStretch, StretchError>,
 }
 
 impl SurfaceRows {
-    /// The surface of a frame, in the order in which [`FrameCheck`](crate::FrameCheck) puts it.
+    /// The surface of a frame whose rows are in the order that [`FrameCheck`](crate::FrameCheck) returns.
     ///
     /// # Errors
     /// [`NodesError`] where the tree's nodes are damaged.
@@ -33,7 +33,7 @@ impl SurfaceRows {
         Ok(Self { positions, error, stretch: nodes.measure(frame.as_slice()) })
     }
 
-    /// The rest shape as a frame; `None` where the tree has none.
+    /// The rest shape as a frame; `None` if the tree has none.
     #[must_use]
     pub fn rest_frame<I: Index>(tree: &Tree<'_, I>) -> Option<Vec<Vec3>> {
         match Nodes::of(tree) {

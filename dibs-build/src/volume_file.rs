@@ -1,4 +1,4 @@
-//! A volume's file.
+//! Reads the file of a volume.
 
 use std::path::Path;
 
@@ -8,8 +8,9 @@ use crate::nodes::Volume;
 use crate::read::{self, ReadError};
 
 impl Volume {
-    /// Reads a volume of tetrahedra from a Gmsh (.msh) or VTK file (.vtk, .vtu), whose lengths are in `unit`: the nodes
-    /// become millimetres, in the order of the file. `None` means millimetres, or the unit that the file states.
+    /// Reads a volume of tetrahedra from a Gmsh (.msh) or VTK file (.vtk, .vtu) with lengths in `unit`: the nodes are
+    /// converted to millimetres and keep the order of the file. `None` means millimetres, or the unit that the file
+    /// states.
     ///
     /// # Errors
     /// [`ReadError`], one sentence that names the file, the offending element and the remedy.

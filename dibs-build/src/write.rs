@@ -1,11 +1,11 @@
-//! Output files appear complete or not at all.
+//! Writes output files so that they appear complete or not at all.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// A file that could not be written. An older file there is untouched.
+/// A file that could not be written. An older file of that name is untouched.
 #[derive(Debug, Error)]
 #[error("{}: {kind}", path.display())]
 pub struct WriteError {
@@ -32,10 +32,10 @@ pub enum WriteErrorKind {
         /// Vertices of this one.
         found: usize,
     },
-    /// A name without the extension of a format that can be written.
+    /// A name whose extension is of no format that can be written.
     #[error("a mesh is written as what its name ends in: .ply, .stl, .obj or .off")]
     UnknownFormat,
-    /// A format of single precision, for a mesh that f32 does not hold where it lies.
+    /// A format of single precision, but f32 cannot represent the mesh at its position.
     #[error(
         "the mesh lies too far from the origin for the numbers of binary STL; write it as .ply"
     )]
@@ -55,10 +55,10 @@ pub enum WriteErrorKind {
     },
 }
 
-/// Writes a file through `contents` into a temporary file in its folder, which takes the name once it is complete and
-/// synced. So a failure of the program leaves no half-written output, and a power failure none under the file's name, if
-/// disk and file system honour `fsync`. On Linux the temporary file has no name where the file system can do that, so a
-/// killed program leaves none behind. A path that is not a regular file (`/dev/stdout`) is written directly.
+/// Writes a file through `contents` into a temporary file in the same folder, which takes the name once it is complete
+/// and synced. So a failure of the program leaves no half-written output, and a power failure none under the file's
+/// name, if disk and file system honour `fsync`. On Linux the temporary file has no name if the file system supports
+/// that, so a killed program leaves none behind. A path that is not a regular file (`/dev/stdout`) is written directly.
 ///
 /// # Errors
 /// [`WriteErrorKind::Io`], also for an error of `contents`.
@@ -71,7 +71,7 @@ pub fn write_atomically(
 }
 
 fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    // A link stays a link: its target is replaced.
+    // A symbolic link stays a link: its target is replaced.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     if target.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
         return fill(&File::create(&target)?, contents);
@@ -93,7 +93,8 @@ fn write(path: &Path, contents: impl FnOnce(&mut dyn Write) -> io::Result<()>) -
             temporary.persist(&target)?;
         }
     }
-    // The folder holds the name: without this sync the old file may come back. Not every system can open a folder.
+    // The name is stored in the folder: without this sync the old file may come back. Not every system can open a
+    // folder.
     #[cfg(unix)]
     File::open(folder)?.sync_all()?;
     Ok(())
@@ -103,7 +104,7 @@ fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     {
-        // The mode of any new file, less the process's umask.
+        // The mode that any new file gets: without the bits of the process's umask.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
@@ -111,7 +112,7 @@ fn builder() -> tempfile::Builder<'static, 'static> {
     builder
 }
 
-/// A temporary file without a name, of which nothing is left once its program has ended, however it ends.
+/// A temporary file without a name: nothing is left of it once its program has ended, in whatever way.
 #[cfg(target_os = "linux")]
 mod nameless {
     use rustix::fs::{AtFlags, CWD, Mode, OFlags};
@@ -120,7 +121,7 @@ mod nameless {
     use std::os::fd::AsRawFd;
     use std::path::{Path, PathBuf};
 
-    /// `None` where the file system has no such files, or where they cannot be given a name.
+    /// `None` if the file system does not support such files, or cannot give them a name.
     pub fn file(folder: &Path) -> Option<File> {
         let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
         let file = File::from(rustix::fs::open(folder, flags, Mode::from(0o666)).ok()?);
@@ -131,7 +132,7 @@ mod nameless {
     pub fn persist(file: &File, folder: &Path, target: &Path) -> io::Result<()> {
         match link(file, target) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                // A link replaces nothing, so the file has another name for a moment.
+                // A link cannot replace a file, so the file first gets a temporary name.
                 super::builder().make_in(folder, |path| link(file, path))?.persist(target)?;
                 Ok(())
             }
@@ -143,13 +144,13 @@ mod nameless {
         Ok(rustix::fs::linkat(CWD, name(file), CWD, path, AtFlags::SYMLINK_FOLLOW)?)
     }
 
-    /// The kernel's name for an open file.
+    /// The path of an open file in `/proc`.
     fn name(file: &File) -> PathBuf {
         PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
     }
 }
 
-/// No such files elsewhere.
+/// Other systems have no such files.
 #[cfg(not(target_os = "linux"))]
 mod nameless {
     use std::fs::File;
@@ -193,7 +194,7 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
     }
 
-    /// While a file is written its folder shows no other, so a killed program leaves none.
+    /// While a file is written its folder shows no other file, so a killed program leaves none.
     #[cfg(target_os = "linux")]
     #[test]
     fn nothing_is_seen_of_a_file_until_it_is_complete() {

@@ -35,11 +35,11 @@ pub struct Args {
     /// The largest stretch that the tree must cover: a factor of at least 1
     #[arg(long, default_value_t = 1.5)]
     stretch: f32,
-    /// A limit for each triangle or tetrahedron instead, as `dibs stretch` writes them
+    /// A limit for each triangle or tetrahedron instead, from a file that `dibs stretch` wrote
     #[arg(long, value_name = "LIMITS", conflicts_with = "stretch")]
     limits: Option<PathBuf>,
-    /// A volume whose nodes move the surface: a file of tetrahedra around it (.msh, .vtk, .vtu), or lattice:NX,NY,NZ, a box
-    /// of so many cells. Frames are the nodes then, and --stretch limits each tetrahedron
+    /// A volume whose nodes move the surface: a file of tetrahedra around it (.msh, .vtk, .vtu), or lattice:NX,NY,NZ, a
+    /// box of so many cells. Frames then hold the nodes' positions, and --stretch limits each tetrahedron
     #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with = "modes")]
     nodes: Option<VolumeSpec>,
     /// Bind vertices outside of the volume to the nearest tetrahedron, within this distance (mm)
@@ -49,8 +49,8 @@ pub struct Args {
     /// line, in the file's order
     #[arg(long, value_name = "LABELS")]
     labels: Option<PathBuf>,
-    /// Labels from the file's own groups: OBJ's g and usemtl, numbered from 0; Gmsh's physical groups by their numbers; VTK's
-    /// cell data `label`, `labels` or `RegionId`
+    /// Take labels from the file's own groups: OBJ's g and usemtl, numbered from 0; Gmsh's physical groups by their
+    /// numbers; VTK's cell data `label`, `labels` or `RegionId`
     #[arg(long, conflicts_with = "labels")]
     labels_from_groups: bool,
     #[command(flatten)]
@@ -63,14 +63,14 @@ pub struct Args {
     name: Option<String>,
     #[command(flatten)]
     reading: MeshArgs,
-    /// Turn triangles until the surface has an outer side, outwards where it is closed
+    /// Flip triangles until the surface has an outer side, and closed parts face outwards
     #[arg(long)]
     orient: bool,
     /// Add displacement modes fitted to the motion, so that as many weights drive the surface
     #[arg(long, value_name = "COUNT", requires = "motion")]
     modes: Option<usize>,
-    /// A recorded motion of the surface, or of the nodes that move it (.pc2, .npy or a series heart_%03d.vtp): fail if it
-    /// stretches the surface beyond the limits
+    /// A recorded motion of the surface, or of the nodes that move it (.pc2, .npy or a series heart_%03d.vtp): fail if
+    /// it stretches the surface beyond the limits
     #[arg(long)]
     motion: Option<PathBuf>,
     /// Print a JSON object
@@ -87,7 +87,7 @@ enum Bits {
 }
 
 pub fn run(args: &Args) -> Result<()> {
-    // Checked before the work, not after it.
+    // Checked before the work starts.
     let is_source = match args.output.extension().and_then(|e| e.to_str()) {
         Some("rs") => true,
         Some("dibs") => false,
@@ -132,7 +132,7 @@ pub fn run(args: &Args) -> Result<()> {
         let uniform = || vec![args.stretch; mesh.triangles.len()];
         check_covered(args, mesh, path, &limits.clone().unwrap_or_else(uniform))?;
     }
-    // A motion that does not fit fails before the work, too.
+    // A motion that does not fit the mesh fails before the work as well.
     let fit = match (&args.motion, args.modes) {
         (Some(path), Some(_)) => Some(modes::fit(mesh, path, &args.reading.lengths)?),
         _ => None,

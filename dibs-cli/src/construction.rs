@@ -1,4 +1,4 @@
-//! How a tree is built, in the same words for every command.
+//! How a tree is built, with the same options for every command.
 
 use clap::ValueEnum;
 use dibs_build::{Construction, Paths};
@@ -6,14 +6,14 @@ use dibs_build::{Construction, Paths};
 /// How a tree is built.
 #[derive(clap::Args)]
 pub struct ConstructionArgs {
-    /// How sections are pinned, measured and split
+    /// How sections are pinned and split, and their radii measured
     #[arg(long, value_enum, default_value = "default")]
     construction: Name,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Name {
-    /// Geodesic split
+    /// Split by distance along the surface
     Default,
     /// As published: mid-range pin, section-restricted paths along edges, split by a plane
     Paper,
@@ -27,7 +27,7 @@ impl ConstructionArgs {
         }
     }
 
-    /// The paths whose stretch counts.
+    /// The paths whose stretch is limited.
     pub fn paths(&self) -> Paths {
         match self.construction {
             Name::Default => Paths::default(),

@@ -1,4 +1,4 @@
-//! `dibs filter`: the motions that a filter admits, of a tool that is commanded along a path.
+//! `dibs filter`: filters a tool's commanded path, and shows the motions that are admitted.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -17,16 +17,16 @@ use crate::{output, overwrite};
 /// Opened nodes that are remembered: more than any tool needs.
 const OPENED: usize = 4_096;
 
-/// Bytes that are printed at once.
+/// Bytes of output that are buffered.
 const BUFFER: usize = 1 << 16;
 
-/// Least default (mm/s) of the robot's speed.
+/// Least default of the robot's speed (mm/s).
 const ROBOT: f64 = 1_000.0;
 
-/// Rounding of commanded lengths, as a share of a length.
+/// Allowed rounding of commanded lengths, relative to the length.
 const ROUNDING: f64 = 1e-3;
 
-/// Rounding (mm) of an admitted pose.
+/// Allowed rounding (mm) of an admitted pose.
 const ROUNDED: f64 = 1e-4;
 
 #[derive(clap::Args)]
@@ -43,32 +43,33 @@ certain.")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
-    /// The tool's pose commanded for the end of each tick: a line is what `dibs query --tool` takes; `-` is standard input
+    /// The tool's pose commanded for the end of each tick, a line each, as for `dibs query --tool`; `-` is standard
+    /// input
     #[arg(long, value_name = "TOOLS")]
     path: PathBuf,
     /// Least separation of tool and tissue
     #[arg(long, value_name = "MM")]
     stand_off: f32,
-    /// Largest speed of the tissue; by default the largest of the motion
+    /// Largest speed of the tissue; by default its largest speed in the motion
     #[arg(long, value_name = "MM/S")]
     tissue_speed: Option<f32>,
-    /// Largest speed of the robot; by default 1,000, or the fastest command's if that is more
+    /// Largest speed of the robot; by default 1,000, or the speed of the fastest command if that is larger
     #[arg(long, value_name = "MM/S")]
     robot_speed: Option<f32>,
-    /// Most by which the surface is behind the tissue; by default a tick
+    /// Largest age of the surface; by default a tick
     #[arg(long, value_name = "MS")]
     age: Option<f64>,
-    /// Error of the registration of robot and surface
+    /// Error of the registration between robot and surface
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
     registration: f32,
-    /// Time in which the tool may use up its distance from the stand-off, for an approach without jumps; 0 for none
+    /// Time constant of the approach to the stand-off, which avoids jumps; 0 for none
     #[arg(long, value_name = "MS", default_value_t = 0.0)]
     approach: f32,
-    /// Instructions of a Cortex-M7 that the queries of a tick may take, by the fit of plain queries: deep in the tissue they
-    /// take up to twice as many
+    /// Instructions of a Cortex-M7 that the queries of a tick may take, as estimated for plain queries: deep in the
+    /// tissue they take up to twice as many
     #[arg(long, value_name = "N", default_value_t = 200_000)]
     budget: u32,
-    /// Print a JSON object a line, and another one of the sums on standard error
+    /// Print a JSON object a line, and one with the totals on standard error
     #[arg(long)]
     json: bool,
 }
@@ -83,7 +84,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// A rigid tool's axis, in the tree's coordinates.
+/// The axis of a rigid tool, in the tree's coordinates.
 #[derive(Clone, Copy)]
 struct Axis {
     start: DVec3,
@@ -106,12 +107,12 @@ impl Axis {
         self.start.distance(self.end)
     }
 
-    /// The motion that leads to another pose: the shortest turn of the axis, about its start.
+    /// The motion to another pose: the smallest rotation of the axis, about its start.
     fn motion_to(&self, to: &Self) -> Motion {
         let (from, onto) = (self.end - self.start, to.end - to.start);
         let across = from.cross(onto);
         let angle = across.length().atan2(from.dot(onto));
-        // Half a turn has no axis of its own.
+        // The axis of a half turn is not unique.
         let axis = across.try_normalize().unwrap_or_else(|| {
             from.try_normalize().map_or(DVec3::ZERO, DVec3::any_orthonormal_vector)
         });
@@ -119,7 +120,7 @@ impl Axis {
         Motion::new(self.start.as_vec3(), translation, (axis * angle).as_vec3())
     }
 
-    /// The pose after a motion, as long as before.
+    /// The pose after a motion; its length is kept.
     fn after(&self, motion: &Motion) -> Self {
         let moved = |point: DVec3| motion.apply(point.as_vec3()).as_dvec3();
         let (start, end) = (moved(self.start), moved(self.end));
@@ -127,13 +128,13 @@ impl Axis {
         Self { start, end: start + direction * self.length() }
     }
 
-    /// Most that a point of the axis moves to another pose.
+    /// The largest displacement of a point of the axis to another pose.
     fn moved(&self, to: &Self) -> f64 {
         self.start.distance(to.start).max(self.end.distance(to.end))
     }
 }
 
-/// The commanded poses, of one rigid tool.
+/// The commanded poses of one rigid tool.
 struct Commands {
     axes: Vec<Axis>,
     radius: f32,
@@ -160,13 +161,13 @@ impl Commands {
         Ok(Self { axes, radius, is_sphere })
     }
 
-    /// The fastest command (mm/s).
+    /// The speed of the fastest command (mm/s).
     fn speed(&self, rate: f64) -> f64 {
         let steps = self.axes.iter().zip(self.axes.iter().skip(1));
         steps.map(|(from, to)| from.moved(to)).fold(0.0, f64::max) * rate
     }
 
-    /// A pose in words, in the coordinates of the mesh's file.
+    /// A pose as text, in the coordinates of the mesh's file.
     fn words(&self, axis: &Axis, origin: DVec3) -> String {
         let DVec3 { x, y, z } = axis.start + origin;
         let end = axis.end + origin;
@@ -227,10 +228,10 @@ fn filter<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let mut last = 0;
     let mut ticks = (0..).zip(&commands.axes).peekable();
     while let Some(&(first, _)) = ticks.peek() {
-        // The ticks from one frame to the next.
+        // The ticks between this frame and the next.
         let (number, _) = recorded.at(first as f64 / rate);
         let [current, next] = [number, number + 1].map(|at| at % recorded.frames.len());
-        // The motion is measured through all frames.
+        // The odometer must see every frame.
         let _ =
             odometer.step(recorded.frames[last].as_slice(), recorded.frames[current].as_slice());
         let [from, to] = [current, next].map(|at| recorded.frames[at].as_slice());
@@ -323,7 +324,7 @@ impl<I: Index> Session<'_, I> {
         let mut pairs = [(&mut self.tracker, surface, &tool)];
         let admitted = filter.admit(&mut pairs, &motion, self.period, &self.uncertainty, &[])?;
         let after = self.at.after(&admitted.motion);
-        // Up to the rounding of a motion.
+        // Equal up to the rounding of a motion.
         let is_whole = admitted.reason == Reason::Commanded && after.moved(command) < ROUNDED;
         self.at = if is_whole { *command } else { after };
         self.sums.ticks += 1;

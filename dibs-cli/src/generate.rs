@@ -48,7 +48,7 @@ enum Surface {
 
 pub fn run(args: &Args) -> Result<()> {
     let (Surface::Heart { output, .. } | Surface::Brain { output, .. }) = &args.surface;
-    // Checked before the work, not after it.
+    // Checked before the work starts.
     let format = Format::from_name(output)?;
     let motion = match &args.surface {
         Surface::Heart { motion, .. } => motion.as_ref(),

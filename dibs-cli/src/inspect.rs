@@ -1,4 +1,4 @@
-//! `dibs inspect`: a tree file's sizes and facts, and whether it is intact.
+//! `dibs inspect`: the size, cost and properties of a tree file, and whether it is intact.
 
 use crate::overwrite;
 use crate::tree_file::{self, AnyTree};

@@ -44,17 +44,17 @@ enum Command {
     Build(build::Args),
     /// Find the stretch limits that a recorded motion needs
     Stretch(stretch::Args),
-    /// Validate a tree file and show what it is and costs
+    /// Validate a tree file and show its properties and costs
     Inspect(inspect::Args),
     /// Find the surface point closest to a tool
     Query(query::Args),
-    /// Follow a tool about a moving surface, tick by tick
+    /// Follow a tool near a moving surface, tick by tick
     Track(track::Args),
-    /// Filter the commands of a tool about a moving surface, tick by tick
+    /// Filter the commands of a tool near a moving surface, tick by tick
     Filter(filter::Args),
-    /// Write a page in which the surface moves and the query runs
+    /// Write a web page in which the surface moves and the query runs
     View(view::Args),
-    /// Send a motion, recorded or as it comes, to a controller, over a serial line or a socket
+    /// Send a motion, recorded or live, to a controller, over a serial line or a socket
     #[command(visible_alias = "bridge")]
     Stream(stream::Args),
     /// Generate a procedural heart or brain
@@ -80,7 +80,7 @@ standard output; --json makes them one JSON object. Bad input ends with exit cod
 
 /// The command line.
 fn command() -> clap::Command {
-    // `--margin -0.1` is a wrong number, which the command names, and no option.
+    // `--margin -0.1` is a wrong number, which the command reports, and not an option.
     let with_value = |arg: Arg| match arg.get_action() {
         ArgAction::Set | ArgAction::Append => arg.allow_negative_numbers(true),
         _ => arg,

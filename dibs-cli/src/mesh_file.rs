@@ -14,25 +14,25 @@ pub struct MeshArgs {
     /// Fail on degenerate and duplicate triangles, instead of dropping them
     #[arg(long)]
     strict: bool,
-    /// Weld vertices at most this far apart (0: equal ones); by default only soup is welded, exactly
+    /// Weld vertices at most this far apart (0: equal ones); by default only triangle soup is welded, exactly
     #[arg(long, value_name = "TOLERANCE")]
     weld: Option<f32>,
     /// Keep only the largest of several separate surfaces
     #[arg(long)]
     largest_component: bool,
-    /// The point of the mesh's file, in millimetres, that the tree's coordinates count from; by default 0,0,0, or the
-    /// mesh's centre where f32 would lose digits so far from the file's own origin
+    /// The point of the mesh's file, in millimetres, that the tree's coordinates are relative to; by default 0,0,0, or
+    /// the mesh's centre where f32 would lose digits so far from the file's own origin
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_point, allow_hyphen_values = true)]
     origin: Option<DVec3>,
     #[command(flatten)]
     pub lengths: Lengths,
 }
 
-/// The unit of files.
+/// The unit of files of meshes and motions.
 #[derive(clap::Args)]
 pub struct Lengths {
-    /// Unit of the lengths in files of meshes and motions, which become millimetres; by default the one that the file
-    /// states (glTF: metres; 3MF), else mm
+    /// Unit of the lengths in files of meshes and motions, which are converted to millimetres; by default the one that
+    /// the file states (glTF: metres; 3MF), else mm
     #[arg(long, value_enum)]
     unit: Option<UnitName>,
 }
@@ -47,7 +47,7 @@ enum UnitName {
 }
 
 impl Lengths {
-    /// The unit that is given.
+    /// The given unit.
     pub fn unit(&self) -> Option<Unit> {
         self.unit.map(|unit| match unit {
             UnitName::Mm => Unit::Millimetre,
@@ -71,7 +71,7 @@ impl Lengths {
     }
 }
 
-/// `X,Y,Z`.
+/// Parses `X,Y,Z`.
 fn parse_point(text: &str) -> Result<DVec3> {
     let numbers = text.split(',').map(|number| number.trim().parse::<f64>());
     match numbers.collect::<std::result::Result<Vec<_>, _>>().as_deref() {
@@ -80,7 +80,7 @@ fn parse_point(text: &str) -> Result<DVec3> {
     }
 }
 
-/// Reads a mesh, with labels of its file's groups if asked for, and prints its warnings on standard error.
+/// Reads a mesh, with labels of its file's groups if `groups` is set, and prints its warnings on standard error.
 pub fn read(path: &Path, args: &MeshArgs, groups: bool) -> Result<Import> {
     let options = ReadOptions {
         weld_tolerance: args.weld,
@@ -107,7 +107,7 @@ pub fn progress_bar(doing: &str, triangles: usize) -> ProgressBar {
     bar
 }
 
-/// A sign of life during work without a measure.
+/// A sign of activity during work whose progress is unknown.
 pub fn spinner(doing: &'static str) -> ProgressBar {
     let spinner = ProgressBar::new_spinner().with_message(doing);
     spinner.enable_steady_tick(Duration::from_millis(100));

@@ -9,7 +9,7 @@ use dibs_nostd::modes::Modes;
 use dibs_stream::SurfaceOrder;
 use std::path::{Path, PathBuf};
 
-/// The modes of a motion file.
+/// The modes fitted to a motion file.
 pub struct Fit {
     path: PathBuf,
     fit: ModalFit,
@@ -26,7 +26,7 @@ pub fn fit(mesh: &Mesh, path: &Path, lengths: &Lengths) -> Result<Fit> {
 }
 
 impl Fit {
-    /// Adds modes to a tree, and warns of frames that a controller would reject.
+    /// Adds modes to a tree, and warns about frames that a controller would reject.
     pub fn add(&self, tree: &BuiltTree, count: usize) -> Result<BuiltTree> {
         let name = self.path.display();
         let tree = tree.with_modes(&self.fit, count).map_err(|error| anyhow!("{name}: {error}"))?;
@@ -49,7 +49,7 @@ impl Fit {
         self.fit.errors()
     }
 
-    /// The errors with other numbers of modes.
+    /// Prints the errors for each number of modes.
     pub fn print(&self, chosen: usize) {
         println!("motion   {}: modes against its largest and RMS error", self.path.display());
         for error in self.errors() {

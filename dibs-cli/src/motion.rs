@@ -1,4 +1,4 @@
-//! A motion and its rate, in the same words for every command.
+//! A motion and its rate, with the same options for every command.
 
 use anyhow::{Context, Result, bail};
 use dibs_build::Motion;
@@ -11,7 +11,7 @@ pub struct MotionFile {
     /// the nodes that move it
     #[arg(long)]
     motion: Option<PathBuf>,
-    /// The same without its name, as it was given before it had one
+    /// The motion's file without an option's name, as in earlier versions
     #[arg(hide = true, value_name = "MOTION", conflicts_with = "motion")]
     unnamed_motion: Option<PathBuf>,
 }
@@ -22,7 +22,7 @@ impl MotionFile {
         self.motion.as_ref().or(self.unnamed_motion.as_ref())
     }
 
-    /// The file, of a command that requires it.
+    /// The file, for a command that requires it.
     pub fn required(&self) -> Result<&PathBuf> {
         self.given().context("no motion; give --motion")
     }
@@ -37,7 +37,7 @@ pub struct MotionRate {
 }
 
 impl MotionRate {
-    /// Frames a second of a motion that has a frame.
+    /// Frames a second of a motion that has at least one frame.
     pub fn of(&self, motion: &Motion, path: &Path) -> Result<f64> {
         let name = path.display();
         if motion.frames.is_empty() {
@@ -56,7 +56,7 @@ impl MotionRate {
         Ok(rate)
     }
 
-    /// Frames a second, where they are given.
+    /// The given frames a second, if any.
     pub fn given(&self) -> Result<Option<f64>> {
         match self.motion_rate {
             Some(rate) if !is_possible(rate) => bail!("{rate} {WRONG}"),

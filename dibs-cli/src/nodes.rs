@@ -8,14 +8,14 @@ use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree};
 use std::path::{Path, PathBuf};
 
-/// `VOLUME`, a file, or `lattice:NX,NY,NZ`.
+/// The argument `VOLUME`: a file, or `lattice:NX,NY,NZ`.
 #[derive(Clone, Debug)]
 pub enum VolumeSpec {
     File(PathBuf),
     Lattice([u32; 3]),
 }
 
-/// Reads what `--nodes` takes.
+/// Parses the argument of `--nodes`.
 pub fn parse(text: &str) -> Result<VolumeSpec> {
     let Some(cells) = text.strip_prefix("lattice:") else {
         return Ok(VolumeSpec::File(text.into()));
@@ -28,7 +28,7 @@ pub fn parse(text: &str) -> Result<VolumeSpec> {
 }
 
 impl VolumeSpec {
-    /// Its file.
+    /// The file, if it is one.
     pub fn file(&self) -> Option<&PathBuf> {
         match self {
             Self::File(path) => Some(path),
@@ -36,7 +36,7 @@ impl VolumeSpec {
         }
     }
 
-    /// The volume for a mesh.
+    /// Reads or makes the volume for a mesh.
     pub fn volume(&self, mesh: &Mesh, lengths: &Lengths) -> Result<Volume> {
         match self {
             Self::File(path) => Ok(Volume::read(path, lengths.unit())?),

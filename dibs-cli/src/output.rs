@@ -1,6 +1,6 @@
 //! Printing to standard output and standard error, which may be a full disk or a closed pipe.
 //!
-//! The `println!` and `eprintln!` of this program: unlike the standard ones they do not panic.
+//! Unlike the standard macros, `println!` and `eprintln!` of this program do not panic.
 
 use clap::builder::Styles;
 use std::fmt;
@@ -26,12 +26,12 @@ pub fn print(line: fmt::Arguments<'_>) {
     if FAILURE.get().is_none()
         && let Err(error) = writeln!(io::stdout(), "{line}")
     {
-        // An error that another thread has set came first.
+        // An error that another thread has recorded came first.
         let _ = FAILURE.set(error);
     }
 }
 
-/// Prints bytes of results. Returns whether more are wanted: not after a failure.
+/// Prints bytes of results. Returns whether printing can continue: false after a failure.
 pub fn write(bytes: &[u8]) -> bool {
     if FAILURE.get().is_none()
         && let Err(error) = io::stdout().write_all(bytes).and_then(|()| io::stdout().flush())
@@ -41,7 +41,7 @@ pub fn write(bytes: &[u8]) -> bool {
     FAILURE.get().is_none()
 }
 
-/// Prints what clap answers in place of a command: an error of usage, or the help or version that was asked for.
+/// Prints clap's answer instead of running a command: a usage error, or the requested help or version.
 pub fn answer(error: &clap::Error) -> ExitCode {
     let printed = error.print();
     if let Err(error) = printed
@@ -53,7 +53,7 @@ pub fn answer(error: &clap::Error) -> ExitCode {
     u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from)
 }
 
-/// Prints a line on standard error; on a terminal the word that it begins with is coloured, as in clap's own errors.
+/// Prints a line on standard error; on a terminal its first word is coloured, as in clap's own errors.
 pub fn warn(line: fmt::Arguments<'_>) {
     let styles = Styles::styled();
     let line = line.to_string();
@@ -64,7 +64,7 @@ pub fn warn(line: fmt::Arguments<'_>) {
     let _ = writeln!(anstream::stderr(), "{}", painted.unwrap_or(line));
 }
 
-/// An error unless all results were printed. A reader that closes the pipe (`dibs inspect --json | head -1`) is no
+/// Fails unless all results were printed. A reader that closes the pipe (`dibs inspect --json | head -1`) is not an
 /// error.
 pub fn finish() -> anyhow::Result<()> {
     let flushed = io::stdout().flush();

@@ -1,4 +1,4 @@
-//! No output replaces an input, or another output.
+//! No output may replace an input or another output.
 
 // Requirement: P-08
 
@@ -7,19 +7,19 @@ use dibs_build::files_of;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
-/// The file behind a path, whatever the path's spelling, links and hard links.
+/// The file that a path refers to, whatever the path's spelling, links and hard links.
 #[derive(PartialEq, Eq)]
 enum Identity {
     #[cfg(unix)]
     File { device: u64, inode: u64 },
     #[cfg(not(unix))]
     File(PathBuf),
-    /// One that is not there yet: its folder, and its name.
+    /// A file that does not exist yet: its folder, and its name.
     New(PathBuf, std::ffi::OsString),
 }
 
 impl Identity {
-    /// `None` where there is nothing to lose: a device, or a path that cannot be written.
+    /// `None` if nothing can be lost: for a device, or a path that cannot be written.
     fn of(path: &Path) -> Option<Self> {
         match path.metadata() {
             Ok(metadata) => metadata.is_file().then(|| Self::of_file(path, &metadata)).flatten(),
@@ -45,8 +45,8 @@ impl Identity {
     }
 }
 
-/// An error if an output is an input, also as a part of one, or another output. `-` is standard input and output, and
-/// results may be redirected to a file, too.
+/// Fails if an output is an input, or a file that an input consists of, or another output. `-` is standard input or
+/// output; results may be redirected to a file as well.
 pub fn check<'a>(
     inputs: impl IntoIterator<Item = &'a PathBuf>,
     outputs: impl IntoIterator<Item = &'a PathBuf>,
@@ -59,7 +59,7 @@ pub fn check<'a>(
                 if is_stream(path) { vec![PathBuf::from("/dev/stdin")] } else { files_of(path) }
             })
             .collect();
-    // An input that is not there is the reader's error.
+    // A missing input is reported by its reader.
     let inputs = inputs.iter().filter(|path| path.exists());
     let inputs: Vec<_> = inputs.map(|path| (path, Identity::of(path))).collect();
     let printed = PathBuf::from("/dev/stdout");
@@ -82,7 +82,7 @@ pub fn check<'a>(
                 other.display()
             );
         }
-        // Lines of results beside an output are no loss: it replaces its file.
+        // Results that are printed to the same file lose nothing: the output replaces the file.
         if output != printed {
             before.push((output, identity));
         }

@@ -1,4 +1,4 @@
-//! A recorded motion in a tree's rows, played over and over.
+//! A recorded motion in a tree's rows, which is repeated.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +11,7 @@ use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
 use crate::query::rows;
 
-/// The surface in its motion, and the ticks of a loop.
+/// The options for a moving surface, and for the ticks of a control loop.
 #[derive(clap::Args)]
 #[command(mut_arg("motion", |motion| motion.required(true)))]
 pub struct Moving {
@@ -29,7 +29,7 @@ pub struct Moving {
 }
 
 impl Moving {
-    /// Ticks a second: a rate that a clock can have.
+    /// Ticks a second: above 0 and finite.
     pub fn rate(&self) -> Result<f64> {
         let rate = self.rate;
         if !(rate > 0.0 && rate.is_finite()) {
@@ -56,7 +56,7 @@ impl Moving {
 pub struct Recorded {
     /// Positions of the tree's vertices.
     pub frames: Vec<Vec<Vec3>>,
-    /// Positions of the nodes, of a tree with nodes.
+    /// Positions of the nodes, for a tree with nodes.
     nodes: Option<Vec<Vec<Vec3>>>,
     pub stretches: Vec<MeasuredStretch>,
     /// Frames a second.
@@ -86,7 +86,7 @@ impl Recorded {
         Ok(Self { frames: rows, nodes, stretches, rate })
     }
 
-    /// The stretch of the surface after a frame, if it goes on as it came from another one; an error beyond the limit.
+    /// The stretch after a frame if the motion from the previous frame continues; an error beyond the limit.
     pub fn stretch_beyond<I: Index>(
         &self,
         tree: &Tree<'_, I>,
@@ -100,7 +100,7 @@ impl Recorded {
         Ok(SurfaceRows::of(tree, beyond)?.stretch?)
     }
 
-    /// The frame that a time (s) falls behind, counted on over all rounds, and the share of the way to the next.
+    /// The frame before a time (s), counted over all repetitions, and the fraction of the interval to the next frame.
     pub fn at(&self, time: f64) -> (usize, f64) {
         let place = time * self.rate;
         (place as usize, place.fract())

@@ -24,25 +24,26 @@ A triangle's stretch is the largest singular value of its deformation gradient a
 with --construction paper the longest of its edges over that edge's length there; a tetrahedron's is the same. Give the same options for reading
 the mesh as to `dibs build`.")]
 pub struct Args {
-    /// The rest shape, a mesh file as for `dibs build`
+    /// The rest shape: a mesh file, as for `dibs build`
     mesh: PathBuf,
-    /// The volume whose nodes move the surface, as for `dibs build`: the motion is theirs, and each tetrahedron has a limit
+    /// The volume whose nodes move the surface, as for `dibs build`: the motion holds the nodes' positions, and each
+    /// tetrahedron has a limit
     #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with = "construction")]
     nodes: Option<VolumeSpec>,
     #[command(flatten)]
     motion: MotionFile,
-    /// What limits leave above the recorded stretch (0.1: a tenth of it)
+    /// Margin of the limits above the recorded stretch (0.1: a tenth of it)
     #[arg(long, default_value_t = 0.1)]
     margin: f32,
     /// Write a limit for each triangle or tetrahedron, for `dibs build --limits`
     #[arg(long, value_name = "LIMITS")]
     limits: Option<PathBuf>,
-    /// Draw how many of them stretch how far, SVG
+    /// Draw an SVG of how many of them stretch how far
     #[arg(long)]
     picture: Option<PathBuf>,
     #[command(flatten)]
     construction: ConstructionArgs,
-    /// `--construction paper`, as it was given before
+    /// `--construction paper` in earlier versions
     #[arg(long, hide = true, conflicts_with = "construction")]
     edges: bool,
     #[command(flatten)]
@@ -52,10 +53,10 @@ pub struct Args {
     json: bool,
 }
 
-/// Shares of the triangles, in per cent, whose largest stretch is reported.
+/// Percentages of the triangles whose largest stretch is reported.
 const PERCENTILES: [f64; 6] = [50.0, 90.0, 99.0, 99.9, 99.99, 100.0];
 
-/// Most stretched triangles that are listed.
+/// Number of most stretched triangles that are listed.
 const NAMED: usize = 5;
 
 pub fn run(args: &Args) -> Result<()> {
@@ -137,7 +138,7 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// Measures a motion, behind a progress bar.
+/// Measures a motion, with a progress bar.
 pub fn measure(mesh: &Mesh, motion: &Motion, path: &Path, paths: Paths) -> Result<MotionStretch> {
     let bar = mesh_file::progress_bar("measuring", mesh.triangles.len());
     let needed = MotionStretch::new(mesh, motion, paths, &|done| bar.set_position(done as u64));
@@ -145,13 +146,13 @@ pub fn measure(mesh: &Mesh, motion: &Motion, path: &Path, paths: Paths) -> Resul
     needed.map_err(|error| anyhow!("{}: {error}", path.display()))
 }
 
-/// The stretch that this share of the triangles, in per cent, does not exceed.
+/// The stretch that this percentage of the triangles does not exceed.
 fn percentile(ranked: &[Needed], share: f64) -> f64 {
     let beyond = ((1.0 - share / 100.0) * ranked.len() as f64).floor() as usize;
     ranked[beyond.min(ranked.len() - 1)].stretch
 }
 
-/// What is stretched.
+/// The elements whose stretch is measured.
 #[derive(Clone, Copy)]
 enum Elements<'m> {
     Triangles(&'m Mesh),
@@ -159,7 +160,7 @@ enum Elements<'m> {
 }
 
 impl Elements<'_> {
-    /// One of them, and all.
+    /// Their name in singular and plural.
     const fn names(&self) -> (&'static str, &'static str) {
         match self {
             Self::Triangles(_) => ("triangle", "triangles"),
@@ -167,7 +168,7 @@ impl Elements<'_> {
         }
     }
 
-    /// The vertices or nodes of one.
+    /// The vertices or nodes of an element.
     fn corners(&self, number: usize) -> Vec<u32> {
         match self {
             Self::Triangles(mesh) => mesh.triangles[number].to_vec(),
@@ -188,7 +189,7 @@ impl Elements<'_> {
     }
 }
 
-/// The share of the triangles that stretch beyond each value, as SVG.
+/// Draws the fraction of the triangles that stretch beyond each value, as SVG.
 fn draw(ranked: &[Needed], all: &str) -> Result<String> {
     let mut picture = String::new();
     {

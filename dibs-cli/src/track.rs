@@ -1,4 +1,4 @@
-//! `dibs track`: a tool on its path about a moving surface, tick by tick.
+//! `dibs track`: a tool on its path near a moving surface, tick by tick.
 
 use crate::query::{ContactRecord, STACK, Touch, side_name, vector};
 use crate::recorded::{Moving, Recorded};
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// Opened nodes that are remembered: more than any tool needs.
 const OPENED: usize = 4_096;
 
-/// Bytes that are printed at once.
+/// Bytes of output that are buffered.
 const BUFFER: usize = 1 << 16;
 
 #[derive(clap::Args)]
@@ -39,22 +39,22 @@ tissue: there a tick took up to twice as many instructions.")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
-    /// The tool at each tick: a line is what `dibs query --tool` takes; `-` is standard input
+    /// The tool at each tick, a line each, as for `dibs query --tool`; `-` is standard input
     #[arg(long, value_name = "TOOLS")]
     path: PathBuf,
     /// The surface between frames
     #[arg(long, value_enum, default_value_t = Surface::Interpolated)]
     surface: Surface,
-    /// Ask every tick anew, remembering nothing
+    /// Search anew at every tick, without memory of earlier ticks
     #[arg(long)]
     full: bool,
-    /// Instructions of a Cortex-M7 that a tick may take; by default as many as it needs
+    /// Instructions of a Cortex-M7 that a tick may take; unlimited by default
     #[arg(long, value_name = "N")]
     budget: Option<u32>,
-    /// List all locally closest pairs whose separation is at most this, too: at most 64
+    /// Also list all locally closest pairs with a separation of at most this: up to 64
     #[arg(long, value_name = "MM")]
     contacts: Option<f32>,
-    /// Print a JSON object a line, and another one of the means on standard error
+    /// Print a JSON object a line, and one with the means on standard error
     #[arg(long)]
     json: bool,
 }
@@ -106,7 +106,7 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let mut ticks = (0..).zip(&tools).peekable();
     let mut last = 0;
     while let Some(&(first, _)) = ticks.peek() {
-        // The ticks from one frame to the next.
+        // The ticks between this frame and the next.
         let (number, _) = frame_at(first);
         let current = number % frames.len();
         let step = odometer.step(frames[last].as_slice(), frames[current].as_slice());
@@ -127,7 +127,7 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     session.finish(tools.len())
 }
 
-/// The answer of a tick, tracked or not.
+/// The answer of a tick, with or without a tracker.
 struct Answer {
     closest: Proximity,
     is_kept: bool,
@@ -141,18 +141,18 @@ struct Session<'t, I> {
     tracker: Option<Tracker<'t, I, STACK, OPENED, OPENED>>,
     /// With `--contacts`: the margin and the list.
     near: Option<(f32, Box<Contacts<64>>)>,
-    /// Instructions.
+    /// Limit on instructions.
     budget: Option<u32>,
     origin: DVec3,
     /// The tree's file.
     name: String,
-    /// Lines that are not printed yet.
+    /// Lines that are not written yet.
     out: Vec<u8>,
     json: bool,
-    /// Node and triangle tests.
+    /// Sums of node and triangle tests.
     sums: [u64; 2],
     fallbacks: usize,
-    /// Of these, those for want of places.
+    /// Number of these because the tracker was full.
     full: usize,
 }
 
@@ -162,7 +162,7 @@ struct Line<'a> {
     tick: usize,
     separation: f64,
     lower: f64,
-    /// Certified: the ends include the accuracy. The first is null where the tool may be inside at any depth.
+    /// Certified: the bounds include the accuracy. The first is null if the tool may be inside to any depth.
     interval: [f64; 2],
     side: &'static str,
     direction: [f64; 3],
@@ -170,7 +170,7 @@ struct Line<'a> {
     is_kept: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     contacts: Option<Vec<ContactRecord<'a>>>,
-    /// Every contact whose separation is below is listed.
+    /// Every contact with a separation below this is listed.
     #[serde(skip_serializing_if = "Option::is_none")]
     contacts_bound: Option<f64>,
     node_tests: u32,
@@ -191,7 +191,8 @@ impl<I: Index> Session<'_, I> {
         let answer = match surface {
             Surface::Held => self.ask(&step.after(), stretch, tool)?,
             Surface::Interpolated => self.ask(&step.at(share), stretch, tool)?,
-            // An extrapolated surface beyond the tree's stretch limit is not searched: the last frame is held.
+            // An extrapolated surface beyond the tree's stretch limit is not searched: the latest frame is used
+            // unchanged.
             Surface::Extrapolated => match beyond() {
                 Some(stretch) => self.ask(&step.beyond(share), stretch, tool)?,
                 None => self.ask(&step.after(), stretch, tool)?,
@@ -296,7 +297,7 @@ impl<I: Index> Session<'_, I> {
         Ok(Answer { closest: found.closest, is_kept: found.is_kept, fallback: found.fallback })
     }
 
-    /// Prints the lines that wait. Returns whether more are wanted.
+    /// Writes the buffered lines. Returns whether writing can continue.
     fn print(&mut self) -> bool {
         let wants_more = output::write(&self.out);
         self.out.clear();
@@ -330,7 +331,7 @@ impl<I: Index> Session<'_, I> {
     }
 }
 
-/// Whether a budget ended before the answer was as certain as without one.
+/// Whether a budget ended the search before the answer was as certain as without a budget.
 fn is_cut(closest: &Proximity, tool: &LocalTool) -> bool {
     let length = match tool {
         LocalTool::Sphere(_) => 0.0,
@@ -339,7 +340,7 @@ fn is_cut(closest: &Proximity, tool: &LocalTool) -> bool {
     let width = closest.separation - closest.lower;
     match closest.side {
         Side::Undefined(NoSide::CutShort) => true,
-        // As exact as a depth is by default.
+        // The default accuracy of a depth.
         Side::Inside | Side::Crossing => width > (length / 512.0).max(33.0 * closest.accuracy),
         _ => !(width <= 0.0),
     }

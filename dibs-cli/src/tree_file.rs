@@ -13,7 +13,7 @@ pub enum AnyTree<'a> {
 }
 
 impl AnyTree<'_> {
-    /// The point that the tree's coordinates count from.
+    /// The point that the tree's coordinates are relative to.
     pub fn origin(&self) -> DVec3 {
         match self {
             Self::Narrow(tree) => tree.origin(),
@@ -22,7 +22,7 @@ impl AnyTree<'_> {
         .into()
     }
 
-    /// The label of a triangle, where the tree has labels.
+    /// The label of a triangle, if the tree has labels.
     pub fn label(&self, triangle: TriangleRow) -> Option<u8> {
         match self {
             Self::Narrow(tree) => tree.label(triangle),

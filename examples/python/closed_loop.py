@@ -1,8 +1,8 @@
-"""A hand pushes an instrument against a beating heart, and a filter of commands does not let it in.
+"""A hand pushes an instrument against a beating heart, and a filter of commands keeps it out.
 
-Everything is simulated: the heart, a hand that pulls the instrument to a point inside it and back, imaging that is some
-milliseconds late, and a robot that executes what the filter admits. At the end of every tick the separation from the heart
-as it is then is measured by a whole query. bindings/python/tests/test_filter.py runs it.
+Everything is simulated: the heart, a hand that pulls the instrument to a point inside it and back, imaging with a delay
+of some milliseconds, and a robot that executes the admitted motion. At the end of every tick a whole query measures the
+separation from the true heart at that time. bindings/python/tests/test_filter.py runs it.
 """
 
 from collections import Counter
@@ -14,14 +14,14 @@ import dibs
 TICK = 0.001  # s
 TICKS = 1_500
 STAND_OFF = 1.0  # mm
-LATE = 4  # ticks by which imaging is behind the heart
+LATE = 4  # delay of the imaging, in ticks
 ROBOT = 300.0  # mm/s
 PULL = 20.0  # 1/s: the hand's stiffness, as a part of the robot's damping
 HAND = 200.0  # mm/s
 
 
 class Heart:
-    """A heart that beats, played over and over."""
+    """A beating heart, in a loop."""
 
     def __init__(self, triangles=1_000):
         mesh, motion = dibs.generate("heart", triangles)
@@ -40,14 +40,14 @@ class Heart:
 
 
 def hand(target, tool, tick):
-    """The motion that the hand wants: a pull to the target, and a turn of the wrist."""
+    """The motion that the hand commands: a pull to the target, and a rotation of the wrist."""
     pull = (target - tool[:3]) * PULL * TICK
     pull *= min(1.0, HAND * TICK / np.linalg.norm(pull))
     return dibs.RigidMotion(tool[:3], pull, [0.0, 0.0, 0.0005 * np.sin(0.01 * tick)])
 
 
 def simulate(ticks=TICKS):
-    """Returns the least separation, that of a robot without a filter, the reasons, and the most instructions of a tick."""
+    """Returns the least separation with and without the filter, the reasons, and the most instructions of a tick."""
     heart = Heart()
     guard = dibs.Filter(heart.tree, STAND_OFF, ROBOT)
     inside, outside = heart.centre, heart.centre + [95.0, 3.0, 30.0]

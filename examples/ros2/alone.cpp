@@ -1,6 +1,6 @@
 /*
  * Runs WallController without ROS: 1,000 ticks a second of simulated time, a tool that approaches the surface, and a stream
- * that falls silent. bindings/c/tests/ros2.rs runs it.
+ * that stops. bindings/c/tests/ros2.rs runs it.
  *
  *     alone TREE PACKETS
  *

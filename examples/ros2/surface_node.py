@@ -2,10 +2,10 @@
 
     python3 surface_node.py heart.ply heart.dibs udp:192.168.1.20:5000
 
-`/surface`, a PointCloud2, has the vertices of the tree's mesh in the order of its file, in metres (REP 103), and the time of
-the capture. `/surface_mesh`, a shape_msgs/Mesh, has the triangles too, which are compared with the tree's, and no time. Axes
-are those of the mesh's file: turn them before. A cloud that does not fit is refused by its cause, and the receiver's surface
-ages. bindings/python/tests/test_ros2.py runs it where rclpy is installed.
+`/surface`, a PointCloud2, has the vertices of the tree's mesh in the order of its file, in metres (REP 103), and the
+time of capture. `/surface_mesh`, a shape_msgs/Mesh, has triangles as well, which are compared with the tree's, but no
+time. Axes must be those of the mesh's file: convert them first. A cloud that does not fit is refused with the cause,
+and the receiver's surface ages. bindings/python/tests/test_ros2.py runs this if rclpy is installed.
 """
 
 import sys
@@ -36,7 +36,7 @@ def positions(cloud):
 
 
 class SurfaceNode(Node):
-    """Sends each surface as it comes."""
+    """Sends each surface as it arrives."""
 
     def __init__(self, tree, triangles, to, **choices):
         super().__init__("dibs_surface")
@@ -47,19 +47,19 @@ class SurfaceNode(Node):
         self.create_timer(0.01, self.beat)
 
     def beat(self):
-        """Heartbeats there, statuses back."""
+        """Sends heartbeats, and receives statuses."""
         try:
             self.sender.poll()
         except ConnectionError as error:
             self.get_logger().error(str(error), throttle_duration_sec=1.0)
 
     def cloud(self, cloud):
-        """A surface with the time of its capture."""
+        """Sends a surface that has a time of capture."""
         age = (self.get_clock().now() - Time.from_msg(cloud.header.stamp)).nanoseconds * 1e-9
         self.send(lambda: positions(cloud), max(age, 0.0))
 
     def mesh(self, mesh):
-        """A surface with its triangles. One that stands still grows old."""
+        """Sends a surface that has triangles, but no time of capture: if it stops moving, it ages."""
         if not self.triangles <= {tuple(sorted(triangle.vertex_indices)) for triangle in mesh.triangles}:
             self.get_logger().error("another mesh: its triangles are not the tree's", throttle_duration_sec=1.0)
             return

@@ -1,6 +1,6 @@
 /*
- * The control tick of a robot whose instrument keeps off a moving surface, as ros2_control calls it. README.md has the ten
- * lines around it; alone.cpp calls it without ROS.
+ * The control tick of a robot that keeps its instrument off a moving surface, as ros2_control calls it. README.md has
+ * the lines around it; alone.cpp calls it without ROS.
  *
  * `configure` is for on_configure, `receive` for a thread of its own, `update` for the real-time thread: it allocates
  * nothing, takes no lock and throws nothing. One thread each.
@@ -22,9 +22,9 @@ public:
         return loop.init(bytes, limits);
     }
 
-    /** A datagram of `dibs stream` or of surface_node.py, at a time in ms. Returns the status to send back, which may be empty. */
+    /** Receives a datagram of `dibs stream` or surface_node.py, at a time in ms. Returns the status to send, if any. */
     dibs::Span<const std::uint8_t> receive(dibs::Span<const std::uint8_t> packet, std::uint32_t now) {
-        /* What is wrong with a packet or a frame is counted, and the surface published last stays. */
+        /* Errors of packets and frames are counted, and the latest published surface stays. */
         loop.bus.packet(packet, now);
         dibs_advance advance = DIBS_ADVANCE_PENDING;
         while (loop.bus.work(1000, &advance) == DIBS_CODE_OK && advance == DIBS_ADVANCE_PENDING) {}
@@ -47,7 +47,7 @@ public:
     /** Whether only an acknowledgement is missing to leave the safe state. */
     bool waits() const { return answer.trust.waits_for_acknowledgement != 0; }
 
-    /** An operator's acknowledgement: between two ticks, of the same thread. */
+    /** An operator's acknowledgement: call it between two ticks, in the same thread. */
     dibs::Code acknowledge() { return loop.guard.acknowledge(); }
 
 private:

@@ -9,7 +9,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
         let out = PathBuf::from(env::var("OUT_DIR")?);
         println!("cargo:rerun-if-changed=../../memory.x");
         fs::copy("../../memory.x", out.join("memory.x"))?;
-        // The interrupts have only the handlers of `main.rs`.
+        // There are no interrupt handlers except those of `main.rs`.
         fs::write(out.join("device.x"), "")?;
         println!("cargo:rustc-link-search={}", out.display());
         println!("cargo:rustc-link-arg=-Tlink.x");

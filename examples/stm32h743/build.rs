@@ -1,4 +1,4 @@
-//! Passes the memory map to the linker, and to the controller the places of its parts in it.
+//! Passes the linker the memory map, and the script that places the controller's parts in it.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         fs::copy(script, out.join(script))?;
     }
     println!("cargo:rustc-link-search={}", out.display());
-    // Before link.x, whose patterns would take all sections.
+    // Before link.x, whose patterns would match all sections.
     println!("cargo:rustc-link-arg-bin=stm32h743=-Tplaces.x");
     println!("cargo:rustc-link-arg-bins=--nmagic");
     println!("cargo:rustc-link-arg-bins=-Tlink.x");

@@ -13,12 +13,12 @@ use crate::surface;
 use crate::telemetry::{Push, Tick, cause_code, fallback_code};
 use crate::{BusStatus, Receiver, Robot, TICK_RATE, Trust, time_of};
 
-/// The budget of a tick's closest pair, side and depth. On frames chosen to be dear the whole tick keeps to 120,000
-/// instructions (docs/evidence/guarantees.md). What is cut short stays certain by the last tick.
+/// The budget for a tick's closest pair, side and depth. On frames chosen to be expensive the whole tick stays below
+/// 120,000 instructions (docs/evidence/guarantees.md). If the budget ends a search, the last tick's bounds stay valid.
 pub const BUDGET: Budget = Budget::new(300);
 
-/// How exactly the depth of a crossing axis is found, in mm: the spring tells a quarter of a newton apart, and few depths
-/// take more than the budget.
+/// How exactly the depth of a crossing axis is found, in mm: this changes the spring's force by a quarter of a newton,
+/// and few depths exceed the budget.
 const DEPTH_TOLERANCE: f32 = 0.25;
 
 /// The deadline of a tick in instructions: 1 ms at 480 MHz, with one cycle for each.
@@ -30,32 +30,33 @@ const _: () = assert!(Cost::M7_CAPSULE.instructions_within(BUDGET) < TICK_INSTRU
 /// Stiffness of the constraint, in N/mm.
 pub const STIFFNESS: f32 = 1.0;
 
-/// Its damping, in N s/mm.
+/// Damping of the constraint, in N s/mm.
 pub const DAMPING: f32 = 0.002;
 
-/// Its largest force, in N.
+/// Largest force of the constraint, in N.
 pub const MAX_FORCE: f32 = 5.0;
 
-/// How far it reaches from the surface, in mm.
+/// Distance from the surface at which the constraint begins, in mm.
 pub const MARGIN: f32 = 5.0;
 
-/// How far a filter keeps a commanded instrument from the surface, in mm.
+/// Distance that a filter keeps a commanded instrument from the surface, in mm.
 pub const STAND_OFF: f32 = 0.5;
 
 /// The robot's largest speed, in mm/s.
 const ROBOT_SPEED: f32 = 300.0;
 
-/// Time constant, in s, with which the instrument nears its stand-off: about a frame's, so that none makes it jump.
+/// Time constant, in s, of the approach to the stand-off: about a frame's period, so that a new frame does not make the
+/// instrument jump.
 const APPROACH: f32 = 0.02;
 
-/// Limit on a vertex's speed, in mm/s: twice the generated heart's top speed in real time, 1.57 mm in a thirtieth of a
-/// second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
+/// Limit on a vertex's speed, in mm/s: twice the generated heart's largest speed in real time, 1.57 mm in a thirtieth
+/// of a second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
 const SPEED: f32 = 100.0;
 
-/// The controller's two ends of a surface, on a bus that is trusted so far.
+/// The controller's two ends of a surface, on a bus with these limits of trust.
 ///
 /// # Errors
-/// [`Error`] when the tree is damaged, a constant above out of range, or the surface was started before.
+/// [`Error`] if the tree is damaged, a constant above is out of range, or the surface was started before.
 #[inline(always)]
 pub fn start<R: Robot>(
     surface: &'static surface::Surface,
@@ -74,7 +75,7 @@ pub fn start<R: Robot>(
     Ok((Receiver::new(receiver, bus), control))
 }
 
-/// The controller's state from tick to tick.
+/// The state of the control tick.
 pub struct Control<R> {
     guard: surface::Guard,
     wall: ForbiddenRegion,
@@ -102,14 +103,14 @@ impl<R: Robot> Control<R> {
         self.tick = self.tick.after(ticks);
     }
 
-    /// The demo's record of a hand that pushed in the last tick.
+    /// The record of a simulated hand that pushed in the last tick.
     #[must_use]
     pub fn push(&self) -> Option<Push> {
         let tick = (self.tick.0 as u32).wrapping_sub(1);
         Some(Push { tick, ..self.robot.push()? })
     }
 
-    /// Runs one tick. `clock` is any free-running counter; it only measures the answer.
+    /// Runs one tick. `clock` is any free-running counter; it only measures the time of the answer.
     pub fn tick(&mut self, clock: impl Fn() -> u32) -> Tick {
         let (tick, now) = (self.tick.0 as u32, time_of(self.tick));
         let tool = self.robot.instrument(tick);

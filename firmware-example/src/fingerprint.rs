@@ -1,4 +1,4 @@
-//! A checksum of the whole published surface, to compare it with the one sent.
+//! A checksum of the whole published surface, to be compared with that of the sent one.
 
 use dibs_nostd::VertexTable;
 use dibs_nostd::format::CRC;
@@ -10,7 +10,7 @@ use crate::BusStatus;
 pub struct Fingerprint {
     epoch: u32,
     digest: crc::Digest<'static, u32>,
-    /// The next row; `None` once all have been read.
+    /// The next row; `None` once all rows have been read.
     next: Option<u32>,
 }
 
@@ -19,12 +19,12 @@ impl Fingerprint {
         Self { epoch: 0, digest: CRC.digest(), next: None }
     }
 
-    /// Starts anew with a frame just published.
+    /// Starts with the latest published frame.
     pub fn begin(&mut self, epoch: u32) {
         *self = Self { epoch, digest: CRC.digest(), next: Some(0) };
     }
 
-    /// Reads up to `rows` rows, and after the last one reports the checksum.
+    /// Reads up to `rows` rows, and after the last row reports the checksum.
     pub fn step(&mut self, surface: &impl VertexTable, rows: u32, status: &BusStatus) {
         let Some(first) = self.next else { return };
         for row in first..first.saturating_add(rows) {

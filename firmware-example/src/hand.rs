@@ -1,8 +1,8 @@
-//! The demo's hand: a mass with a damper, for any surface.
+//! A simulated hand: a mass with a damper, for any surface.
 
 use dibs_nostd::glam::Vec3;
 
-/// A surgeon's hand with the instrument in it: 200 g, damped by 20 N s/m.
+/// A surgeon's hand that holds the instrument: 200 g, damped by 20 N s/m.
 #[derive(Clone, Copy, Debug)]
 pub struct Hand {
     /// The instrument's tip (mm).
@@ -12,13 +12,13 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// The most that it pushes with (N): nine tenths of the wall's largest force.
+    /// Largest force of its push (N): nine tenths of the wall's largest force.
     pub const PUSH: f32 = 0.9 * crate::MAX_FORCE;
 
-    /// N s^2/mm.
+    /// Its mass (N s^2/mm).
     const MASS: f32 = 2e-4;
 
-    /// N s/mm.
+    /// Its damping (N s/mm).
     const DAMPER: f32 = 0.02;
 
     /// A hand at rest.
@@ -27,7 +27,7 @@ impl Hand {
         Self { at, velocity: Vec3::ZERO }
     }
 
-    /// The velocity (mm/s) that a push (N) leads to where nothing resists.
+    /// The final velocity (mm/s) of a push (N) without resistance.
     #[must_use]
     pub fn free(push: Vec3) -> Vec3 {
         push * (1.0 / Self::DAMPER)

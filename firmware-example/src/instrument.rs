@@ -1,4 +1,4 @@
-//! The instrument's pose by a script.
+//! The instrument's pose from a script.
 
 use core::f32::consts::TAU;
 
@@ -12,14 +12,14 @@ pub const LENGTH: f32 = 60.0;
 /// Its radius, in mm.
 pub const RADIUS: f32 = 2.5;
 
-/// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery,
-/// while its tip sweeps around the surface and, every seven seconds, through the middle of it.
+/// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery, while its tip moves
+/// around the surface and, every seven seconds, through its middle.
 ///
 /// The motion is the sum of a few slow sines, like a surgeon's hand, and of a physiological tremor (9 Hz, 0.1 mm). It
-/// depends on the tick alone, so that runs repeat.
+/// depends only on the tick, so that runs are reproducible.
 ///
 /// # Errors
-/// [`ToolError`] names a coordinate out of range, which no surface of ordinary size has.
+/// [`ToolError`] names a coordinate out of range; a surface of ordinary size has none.
 pub fn instrument(tick: u32) -> Result<Capsule, ToolError> {
     let wave = |period: u32, phase: f32| {
         libm::sinf(TAU * ((tick % period) as f32 / period as f32 + phase))

@@ -3,14 +3,15 @@
 //! It compiles for board and host: `no_std`, no allocation, no panic, and no access to hardware. Three contexts share
 //! it:
 //!
-//! - the control tick, 1 kHz, highest priority: [`Control::tick`] reads the instrument's pose, asks the guard, and gives
-//!   the robot a force, or of a commanded motion as much as a filter admits;
-//! - bus reception, any lower priority: [`Receiver::bytes`] takes vertices as they come over a serial line,
-//!   [`Receiver::packet`] those that [`network`] finds in Ethernet frames;
+//! - the control tick, 1 kHz, highest priority: [`Control::tick`] reads the instrument's pose, asks the guard, and
+//! gives
+//!   the robot a force, or the part of a commanded motion that a filter admits;
+//! - bus reception, any lower priority: [`Receiver::bytes`] receives bytes from a serial line,
+//!   [`Receiver::packet`] packets that [`network`] finds in Ethernet frames;
 //! - the background: [`Receiver::work`] checks complete frames and the tree in flash in slices, and
-//!   [`Receiver::report`] makes statuses for the sender.
+//!   [`Receiver::report`] writes statuses for the sender.
 //!
-//! They share a [`Surface`](dibs_nostd::guard::Surface), where one atomic operation publishes a frame, and
+//! They share a [`Surface`](dibs_nostd::guard::Surface), in which one atomic operation publishes a frame, and
 //! [`BusStatus`], counters for the records. [`telemetry`] is the tick's record for the host. A [`Robot`] moves the
 //! instrument: a script, or a simulated hand.
 #![cfg_attr(not(test), no_std)]
@@ -44,16 +45,16 @@ pub use robot::{Either, Robot, Script};
 pub use status::BusStatus;
 pub use trust::{DWELL, Trust};
 
-// The surface: `build.rs` emitted its tree.
+// The surface: `build.rs` has written its tree.
 dibs_nostd::include_tree!("surface");
 
 /// Control ticks a second.
 pub const TICK_RATE: u32 = 1_000;
 
-/// Seconds of a control tick.
+/// Duration of a control tick (s).
 pub const PERIOD: f32 = 1.0 / TICK_RATE as f32;
 
-/// The receiver's clock at so many control ticks after the start.
+/// The receiver's clock at this many control ticks after the start.
 #[must_use]
 pub const fn time_of(ticks: Ticks) -> Millis {
     const RATE: NonZeroU32 = NonZeroU32::new(TICK_RATE).unwrap();

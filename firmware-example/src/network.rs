@@ -1,7 +1,7 @@
-//! The network end of the bus: packets in Ethernet frames, by ARP, IPv4 and UDP.
+//! The network end of the bus: packets in Ethernet frames, with ARP, IPv4 and UDP.
 //!
-//! It is as small as the bus: one address, one port, no fragments, no options, and one peer, the sender of the last good
-//! packet. `docs/decisions.md` says why it is not a whole network stack.
+//! It is as small as the bus allows: one address, one port, no fragments, no options, and one peer, the sender of the
+//! last good packet. `docs/decisions.md` says why it is not a whole network stack.
 
 // Requirement: P-05
 
@@ -16,13 +16,13 @@ use crate::STATUS_MTU;
 /// The controller's hardware address, locally administered.
 pub const HARDWARE: [u8; 6] = [0x02, 0, 0, 0, 0, 0x15];
 
-/// The controller's address: QEMU's user network gives this one to its first guest.
+/// The controller's address: the one that QEMU's user network gives to its first guest.
 pub const ADDRESS: [u8; 4] = [10, 0, 2, 15];
 
 /// The controller's port.
 pub const PORT: u16 = 5000;
 
-/// Largest Ethernet frame in bytes, with its checksum, in whole words.
+/// Largest Ethernet frame in bytes, with its checksum, rounded up to whole words.
 pub const MAX_FRAME: usize = 1520;
 
 /// Bytes of the headers before a packet: Ethernet, IPv4 without options, UDP.
@@ -31,15 +31,15 @@ const HEADERS: usize = 14 + 20 + 8;
 /// Largest frame that the controller sends, in bytes.
 pub const MAX_REPLY: usize = HEADERS + STATUS_MTU;
 
-/// Bytes of a frame of ARP.
+/// Size of an ARP frame, in bytes.
 pub const ARP_FRAME: usize = 14 + 28;
 
-/// Hops that a status survives.
+/// Time to live of a status.
 const TIME_TO_LIVE: u8 = 64;
 
 const BROADCAST: [u8; 6] = [0xFF; 6];
 
-/// A host that packets came from.
+/// A host that has sent packets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Peer {
     hardware: [u8; 6],
@@ -52,13 +52,13 @@ pub struct Peer {
 pub enum Content<'f> {
     /// A packet for the controller's port, not yet checked.
     Packet(&'f [u8], Peer),
-    /// A question for the controller's hardware address, and the answer.
+    /// An ARP request for the controller's hardware address, and the reply.
     Question([u8; ARP_FRAME]),
     /// Anything else.
     Other,
 }
 
-/// Reads a frame, which has passed its Ethernet checksum and is without it.
+/// Parses a frame that has passed its Ethernet checksum and is without it.
 #[must_use]
 pub fn read(frame: &[u8]) -> Content<'_> {
     let content = Ethernet2Slice::from_slice_without_fcs(frame).ok().and_then(|frame| {
@@ -75,7 +75,7 @@ pub fn read(frame: &[u8]) -> Content<'_> {
 fn packet<'f>(frame: &Ethernet2Slice<'f>) -> Option<Content<'f>> {
     let datagram = Ipv4Slice::from_slice(frame.payload_slice()).ok()?;
     let header = datagram.header();
-    // The sum of an intact header, its checksum included, has no complement.
+    // The complement of the sum of an intact header, including its checksum, is zero.
     let is_intact = Sum16BitWords::new().add_slice(header.slice()).ones_complement() == 0;
     let is_ours = header.destination() == ADDRESS
         && datagram.payload_ip_number() == IpNumber::UDP
@@ -83,7 +83,7 @@ fn packet<'f>(frame: &Ethernet2Slice<'f>) -> Option<Content<'f>> {
     if !is_intact || !is_ours {
         return None;
     }
-    // A packet has a CRC-32 of its own, which finds more than UDP's checksum does.
+    // UDP's checksum is not needed: a packet has its own CRC-32, which detects more.
     let udp = UdpSlice::from_slice(datagram.payload().payload).ok()?;
     let (hardware, address) = (frame.source(), header.source());
     let peer = Peer { hardware, address, port: udp.source_port() };
@@ -109,19 +109,19 @@ fn arp(
     let (sender_mac, sender_ipv4) = (HARDWARE, ADDRESS);
     let content = ArpEthIpv4Packet { operation, sender_mac, sender_ipv4, target_mac, target_ipv4 };
     let mut frame = [0; ARP_FRAME];
-    // The sizes fit, so nothing is left out.
+    // The sizes fit, so nothing is cut off.
     let _ = join(&mut frame, &[&head(destination, EtherType::ARP), &content.to_bytes()]);
     frame
 }
 
-/// The frame that announces the controller's addresses to all, at its start: a network that asked before gets no other
-/// answer.
+/// A frame that announces the controller's addresses to all (gratuitous ARP), sent at the start: requests before that
+/// were not answered.
 #[must_use]
 pub fn announcement() -> [u8; ARP_FRAME] {
     arp(ArpOperation::REQUEST, BROADCAST, [0; 6], ADDRESS)
 }
 
-/// A frame that takes a status to a peer; `None` only if the status is larger than any.
+/// A frame that carries a status to a peer; `None` only if the status is too large.
 #[must_use]
 pub fn seal<'b>(status: &[u8], to: &Peer, frame: &'b mut [u8; MAX_REPLY]) -> Option<&'b [u8]> {
     let length = u16::try_from(UdpHeader::LEN + status.len()).ok()?;
@@ -137,7 +137,7 @@ fn head(destination: [u8; 6], ether_type: EtherType) -> [u8; 14] {
     Ethernet2Header { source: HARDWARE, destination, ether_type }.to_bytes()
 }
 
-/// Writes the parts one behind the other, and returns the bytes they take; `None` if `out` is too small.
+/// Writes the parts one after another, and returns their total size; `None` if `out` is too small.
 fn join(out: &mut [u8], parts: &[&[u8]]) -> Option<usize> {
     let mut rest = out.iter_mut();
     let mut bytes = 0;

@@ -1,5 +1,6 @@
-//! An instrument that a simulated hand pushes against the surface, now against the wall's force, now by commands that a
-//! filter admits. It runs with the controller, so that the loop is closed in every tick and a run repeats to the bit.
+//! An instrument that a simulated hand pushes against the surface: alternately against the wall's force, and by
+//! commands that a filter admits. It runs with the controller, so that the loop is closed in every tick and a run is
+//! reproducible bit for bit.
 
 use bytemuck::Zeroable;
 use dibs_nostd::constraint::{ConstraintForce, EnergyAccount};
@@ -16,39 +17,40 @@ use crate::surface::{CENTRE, REACH};
 use crate::telemetry::Push;
 use crate::{PERIOD, STIFFNESS};
 
-/// The account of the wall's energy: the most (mJ) that it gives to the hand, and the largest step of its force (N) from
+/// Limits of the wall: the largest energy (mJ) that it returns to the hand, and the largest step of its force (N) from
 /// tick to tick.
 const ACCOUNT: EnergyAccount = match EnergyAccount::new(1.0, 0.5, STIFFNESS) {
     Ok(account) => account,
     Err(_) => panic!("a constant is out of range"),
 };
 
-/// Ticks from one push to the next, and those of them in which the hand pushes; then it draws back.
+/// Ticks from one push to the next, and ticks of these in which the hand pushes; in the others it draws back.
 const CYCLE: u32 = 1_000;
 const INTO: u32 = 700;
 
-/// Stiffness of the hand's arm (N/mm): it pushes towards a place, up to [`Hand::PUSH`].
+/// Stiffness of the hand's arm (N/mm): it pushes towards a point, with at most [`Hand::PUSH`].
 const ARM: f32 = 1.0;
 
-/// Angle between two places, in radians: the golden one, so that they never repeat.
+/// Angle between two starting points, in radians: about the golden angle, so that they never repeat.
 const ANGLE: f32 = 2.4;
 
 /// The instrument and the hand.
 pub struct Pushed {
     hand: Hand,
-    /// From the tip to the other end (mm).
+    /// Vector from the tip to the other end (mm).
     shaft: Vec3,
-    /// Ticks in which the surface was trusted, and whether it was in the last one: otherwise the hand lets go.
+    /// Number of ticks in which the surface was trusted, and whether it was in the last one: otherwise the hand lets
+    /// go.
     ticks: u32,
     is_trusted: bool,
-    /// Where this push comes from.
+    /// Starting point of this push.
     place: Vec3,
     account: EnergyAccount,
     record: Push,
 }
 
 impl Pushed {
-    /// The instrument outside the surface, in a hand that waits for it.
+    /// The instrument outside the surface, in a hand that waits for the surface.
     #[must_use]
     #[expect(clippy::new_without_default, reason = "there is no usual robot")]
     pub fn new() -> Self {
@@ -64,7 +66,7 @@ impl Pushed {
         }
     }
 
-    /// The hand's push (N).
+    /// The force of the hand's push (N).
     fn wanted(&self) -> Vec3 {
         if !self.is_trusted {
             return Vec3::ZERO;
@@ -93,7 +95,7 @@ impl Pushed {
     }
 }
 
-/// A place from which the hand pushes: above the surface, one and a half times as far as its surface is.
+/// A starting point of a push: one and a half times as far from the centre as the surface.
 fn place(number: u32) -> Vec3 {
     let angle = ANGLE * (number % 1_000) as f32;
     CENTRE + Vec3::new(0.9 * libm::cosf(angle), 0.9 * libm::sinf(angle), 1.2) * REACH
@@ -104,7 +106,7 @@ impl Robot for Pushed {
         Capsule::new(self.hand.at, self.hand.at + self.shaft, RADIUS)
     }
 
-    /// In every other cycle.
+    /// The commanded motion, in every other cycle.
     fn command(&self) -> Option<Motion> {
         let velocity = Hand::free(self.wanted());
         let motion = Motion::new(self.hand.at, velocity * PERIOD, Vec3::ZERO);

@@ -1,4 +1,4 @@
-//! Bus reception: bytes in, published frames and statuses out.
+//! Bus reception: from bytes to published frames and statuses.
 
 use dibs_nostd::wire::{Counters, framed_bytes};
 use dibs_nostd::{Advance, Millis};
@@ -19,10 +19,10 @@ pub const STATUS_FRAMED: usize = framed_bytes(STATUS_MTU);
 /// Rows and triangles checked, or rows copied, in one slice.
 const WORK: u32 = 32;
 
-/// Rows of the published frame read through in one slice.
+/// Rows of the published frame that are read in one slice.
 const ROWS: u32 = 32;
 
-/// The receiving end of the bus, with the notes that the demo's records need.
+/// The receiving end of the bus, with the data that the demo's records need.
 ///
 /// Two contexts use it, one at a time. A serial line's interrupt calls [`bytes`](Self::bytes); a network's driver calls
 /// [`packet`](Self::packet). The idle loop calls [`work`](Self::work), and [`report`](Self::report). Both are below the
@@ -38,14 +38,16 @@ impl Receiver {
         Self { bus, fingerprint: Fingerprint::new(), status }
     }
 
-    /// Takes bytes of the serial line. `now` is the time of the present control tick, from which a surface's age counts.
+    /// Receives bytes of the serial line. `now` is the time of the present control tick, from which a surface's age is
+    /// counted.
     pub fn bytes(&mut self, bytes: &[u8], now: Millis) {
         self.status.count_bytes(bytes.len());
         self.bus.receive(bytes, now);
         self.status.set(self.bus.counters());
     }
 
-    /// Takes one packet, from a bus that keeps packets apart. Returns whether it was a good one of this surface.
+    /// Receives one packet, from a bus that preserves packet boundaries. Returns whether it was a good packet of this
+    /// surface.
     pub fn packet(&mut self, packet: &[u8], now: Millis) -> bool {
         self.status.count_bytes(packet.len());
         let outcome = self.bus.packet(packet, now);
@@ -54,14 +56,14 @@ impl Receiver {
     }
 
     /// Does one slice of checking, copying and publishing. Returns whether more work is due at once.
-    // Not inlined: in a large loop its branches would become jumps through a register, whose targets the binary check
-    // cannot see.
+    // Not inlined: in a large loop its branches would become jumps through a register, whose targets the check of the
+    // binary cannot determine.
     #[inline(never)]
     pub fn work(&mut self) -> bool {
         match self.bus.work(WORK) {
             Ok(Advance::Pending) => return true,
             Ok(Advance::Published { epoch }) => self.fingerprint.begin(epoch),
-            // The published frame is read in full while the next one arrives.
+            // The published frame is read completely while the next one arrives.
             Ok(_) => {
                 if let Some(surface) = self.bus.surface() {
                     self.fingerprint.step(&surface, ROWS, self.status);
@@ -73,7 +75,8 @@ impl Receiver {
         false
     }
 
-    /// Registers the surface anew: the next whole frame may be anywhere within reach. Only an operator decides that.
+    /// Registers the surface again: the next whole frame may be anywhere within reach. Only an operator may decide
+    /// this.
     pub const fn register(&mut self) {
         self.bus.register();
     }
@@ -84,13 +87,13 @@ impl Receiver {
         self.bus.counters()
     }
 
-    /// Whole rounds of the check of the tree in flash; wraps.
+    /// Completed rounds of the check of the tree in flash; wraps.
     #[must_use]
     pub const fn rounds(&self) -> u32 {
         self.bus.rounds()
     }
 
-    /// The status for the sender; `None` unless due. `now` is the time of the present control tick.
+    /// The status for the sender; `None` unless one is due. `now` is the time of the present control tick.
     pub fn status<'b, const N: usize>(
         &mut self,
         now: Millis,

@@ -1,4 +1,5 @@
-//! What moves the instrument: on a robot its encoders and drives, here a script or a simulated hand.
+//! Interface to the robot that moves the instrument: encoders and drives on a real robot, here a script or a simulated
+//! hand.
 
 use dibs_nostd::constraint::ConstraintForce;
 use dibs_nostd::filter::{Admitted, FilterError, Motion};
@@ -18,20 +19,20 @@ pub trait Robot {
     /// [`ToolError`] if the pose is not finite.
     fn instrument(&self, tick: u32) -> Result<Capsule, ToolError>;
 
-    /// The motion that is commanded until the next tick; `None` for a robot that a hand moves against a force.
+    /// The motion commanded until the next tick; `None` for a robot that a hand moves against a force.
     fn command(&self) -> Option<Motion>;
 
-    /// Applies the force of a wall, within what the drives may give. Returns the force applied, in N.
+    /// Applies the force of a wall, within the limits of the drives. Returns the applied force, in N.
     fn apply(&mut self, answer: &Answer, force: &ConstraintForce) -> Vec3;
 
-    /// Executes the admitted motion. After an error the instrument rests.
+    /// Executes the admitted motion. After an error the instrument must rest.
     fn execute(&mut self, answer: &Answer, admitted: &Result<Admitted, FilterError>);
 
-    /// The demo's record of a hand that pushes.
+    /// The record of a simulated hand that pushes.
     fn push(&self) -> Option<Push>;
 }
 
-/// The script of [`instrument`]: nothing stops it, so that the wall is seen from inside, too.
+/// The script of [`instrument`]: nothing stops it, so that the wall is tested from inside as well.
 pub struct Script;
 
 impl Robot for Script {

@@ -4,7 +4,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use dibs_nostd::wire::{Counters, Event};
 
-/// Counters since the start, written by the bus side. Each is exact, but two of them may be of different moments.
+/// Counters since the start, written by the bus side. Each is exact, but two of them may have been read at different
+/// times.
 #[derive(Debug, Default)]
 pub struct BusStatus {
     bytes: AtomicU32,
@@ -28,7 +29,7 @@ impl BusStatus {
         }
     }
 
-    /// Bytes that came over the bus; wraps.
+    /// Number of bytes received from the bus; wraps.
     #[must_use]
     pub fn bytes(&self) -> u32 {
         self.bytes.load(Ordering::Relaxed)
@@ -46,7 +47,8 @@ impl BusStatus {
         self.rejected.load(Ordering::Relaxed)
     }
 
-    /// Epoch of the frame last read in full, and the CRC-32 of its positions in memory; epoch 0 while there is none.
+    /// Epoch of the frame that was last read completely, and the CRC-32 of its positions in memory; epoch 0 if there is
+    /// none.
     #[must_use]
     pub fn fingerprint(&self) -> (u32, u32) {
         let epoch = self.epoch.load(Ordering::Acquire);

@@ -30,12 +30,12 @@ pub struct Tick {
     pub tick: u32,
     /// The trust in the surface: `dibs_nostd::failsafe::State` as a number.
     pub state: u32,
-    /// Why it is not nominal: [`cause_code`]; 0 if it is.
+    /// Why the state is not nominal: [`cause_code`]; 0 if it is.
     pub cause: u32,
     /// 1 if there was an answer, else 0.
     pub answered: u32,
-    /// How far the tissue may have moved, in mm: by its speed in the time by which the surface lags, and in that which
-    /// its frame was on its way. The constraint's answer has it added to its accuracy.
+    /// Largest motion of the tissue, in mm: its speed times the surface's lag and its frame's transit time. It is part
+    /// of the accuracy of the constraint's answer.
     pub margin: f32,
     /// The frame that was searched, if there was an answer.
     pub epoch: u32,
@@ -43,9 +43,9 @@ pub struct Tick {
     pub age: u32,
     /// Largest distance of the surface's vertices from the sender's, in mm: the bus's quantisation.
     pub position_error: f32,
-    /// The instrument's tip, exactly as in the query, in mm.
+    /// The start of the instrument's axis, its tip, exactly as in the query, in mm.
     pub tool_start: [f32; 3],
-    /// Its other end, in mm.
+    /// The end of its axis, in mm.
     pub tool_end: [f32; 3],
     /// Its radius, in mm.
     pub tool_radius: f32,
@@ -53,15 +53,15 @@ pub struct Tick {
     pub separation: f32,
     /// Lower end of the certified interval, in mm.
     pub lower: f32,
-    /// Stated accuracy of both, in mm: the position error and the rounding of the query.
+    /// Stated accuracy of both, in mm: the position error plus the rounding of the query.
     pub accuracy: f32,
     /// The surface's point of the closest pair, in mm.
     pub point_on_surface: [f32; 3],
-    /// The pair's parameter along the instrument's axis: 0 at its start, 1 at its end.
+    /// The pair's position along the instrument's axis: 0 at its start, 1 at its end.
     pub axis_parameter: f32,
-    /// The direction that leads out: `dibs_nostd::Proximity::direction`.
+    /// The direction out of the tissue: `dibs_nostd::Proximity::direction`.
     pub direction: [f32; 3],
-    /// Its triangle's row in the tree; `u32::MAX` where there is none.
+    /// The row of the pair's triangle in the tree; `u32::MAX` if there is none.
     pub triangle: u32,
     /// Tests of spheres and planes.
     pub node_tests: u32,
@@ -69,9 +69,9 @@ pub struct Tick {
     pub triangle_tests: u32,
     /// The force on the instrument, in N.
     pub force: [f32; 3],
-    /// Clock counts that the guard's answer took; 0 without a clock.
+    /// Clock counts of the guard's answer; 0 without a clock.
     pub query_counts: u32,
-    /// Bytes that the bus had brought; wraps.
+    /// Bytes received from the bus; wraps.
     pub bytes: u32,
     /// Ticks since the last good packet; `u32::MAX` before the first.
     pub silence: u32,
@@ -79,19 +79,19 @@ pub struct Tick {
     pub frames_published: u32,
     /// Packets and frames rejected so far.
     pub rejected: u32,
-    /// Epoch of the frame that the background last read in full; 0 while there is none.
+    /// Epoch of the frame that the background last read completely; 0 if there is none.
     pub read_epoch: u32,
     /// The CRC-32 of its positions: [`fingerprint`](crate::fingerprint).
     pub read_digest: u32,
-    /// Nodes that the tracker's front had open after the tick.
+    /// Nodes that the tracker had open after the tick.
     pub front: u32,
-    /// Why the front did not serve: [`fallback_code`]; 0 if it did.
+    /// Why the tick was a whole query: [`fallback_code`]; 0 if it was not.
     pub fallback: u32,
-    /// The frame before the one that was searched, from which the surface moved on; the same where it was held.
+    /// The frame before the searched one, from which the surface was extrapolated; the same frame if it was held.
     pub epoch_before: u32,
-    /// The surface's time in steps: `dibs_nostd::SurfaceBlend::t`.
+    /// The surface's time in frame intervals: `dibs_nostd::SurfaceBlend::t`.
     pub blend: f32,
-    /// The error of the last extrapolations, in mm: `dibs_nostd::SurfaceBlend::residual`; -1 if unknown.
+    /// The error of recent extrapolations, in mm: `dibs_nostd::SurfaceBlend::residual`; -1 if unknown.
     pub residual: f32,
     /// The surface's velocity at the pair, in mm/s.
     pub surface_velocity: [f32; 3],
@@ -170,11 +170,11 @@ pub struct Summary {
     pub ticks: u32,
     /// Ticks that ended later than the next one was due, and ticks that never ran.
     pub deadline_misses: u32,
-    /// Longest time from the moment a tick was due to its first instruction, in clock counts.
+    /// Longest time from a tick's due time to its first instruction, in clock counts.
     pub latency_counts: u32,
-    /// Longest time from the moment a tick was due to its end, in clock counts.
+    /// Longest time from a tick's due time to its end, in clock counts.
     pub tick_counts: u32,
-    /// Records that found the queue full.
+    /// Records that were dropped because the queue was full.
     pub records_dropped: u32,
     /// 1 if the bus ever lost a byte because it was not read in time, else 0.
     pub bus_overrun: u32,
@@ -182,12 +182,11 @@ pub struct Summary {
     pub stack_bytes: u32,
     /// Longest section with all interrupts disabled, in clock counts.
     pub masked_counts: u32,
-    /// Longest section with the bus interrupt disabled, without the control ticks in it, in clock
-    /// counts.
+    /// Longest section with the bus interrupt disabled, without the control ticks during it, in clock counts.
     pub bus_masked_counts: u32,
-    /// Rounds of the background check of the tree.
+    /// Completed rounds of the background check of the tree.
     pub scrub_rounds: u32,
-    /// Counters of the bus: `dibs_nostd::wire::Event::ALL`, in that order.
+    /// Counters of the bus, in the order of `dibs_nostd::wire::Event::ALL`.
     pub events: [u32; Event::ALL.len()],
 }
 
@@ -196,7 +195,7 @@ impl Summary {
     pub const KIND: u32 = 2;
 }
 
-/// A hand that pushes, in one control tick; a scripted instrument has none.
+/// The record of a hand that pushes, for one control tick; a scripted instrument has none.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Push {
@@ -204,26 +203,25 @@ pub struct Push {
     pub kind: u32,
     /// Number of the tick.
     pub tick: u32,
-    /// 0 while the hand moves the instrument against the wall's force; by commands the filter's reason as
-    /// [`reason_code`].
+    /// 0 while the hand moves the instrument against the wall's force; with a filter its reason, as [`reason_code`].
     pub outcome: u32,
-    /// 1 while the hand pushes inwards, else 0: it draws back.
+    /// 1 while the hand pushes inwards, 0 while it draws back.
     pub is_inwards: u32,
     /// The hand's push, in N.
     pub push: [f32; 3],
-    /// The velocity that it leads to where nothing resists, in mm/s: by commands, the commanded one.
+    /// The velocity of this push without resistance, in mm/s; with a filter the commanded velocity.
     pub commanded: [f32; 3],
-    /// The instrument's velocity until the next tick, in mm/s: by commands, the admitted one.
+    /// The instrument's velocity until the next tick, in mm/s; with a filter the admitted velocity.
     pub moved: [f32; 3],
     /// The instrument's velocity relative to the surface's until this tick, in mm/s.
     pub velocity: [f32; 3],
-    /// Of an admitted motion: no separation is less at any instant until the next tick, in mm.
+    /// With a filter: lower bound on the separation until the next tick, in mm.
     pub least_separation: f32,
-    /// Of an admitted motion: the filter's queries, and their instructions by the cost model.
+    /// With a filter: the number of its queries.
     pub queries: u32,
-    /// Instructions of these.
+    /// With a filter: instructions of these queries, by the cost model.
     pub instructions: u32,
-    /// The energy that the wall may still give to the hand, in mJ.
+    /// The energy that the wall may still return to the hand, in mJ.
     pub balance: f32,
 }
 
@@ -231,7 +229,7 @@ impl Push {
     /// First field.
     pub const KIND: u32 = 4;
 
-    /// Notes a filter's answer.
+    /// Records a filter's answer.
     pub(crate) fn filtered(&mut self, admitted: &Result<Admitted, FilterError>) {
         self.outcome = reason_code(admitted.as_ref().ok().map(|admitted| admitted.reason));
         let (least, queries, instructions) = match admitted {
@@ -242,7 +240,7 @@ impl Push {
     }
 }
 
-/// A filter's reason as a number; `None` where it admitted nothing.
+/// A filter's reason as a number; for `None` it admitted nothing.
 #[must_use]
 pub const fn reason_code(reason: Option<Reason>) -> u32 {
     match reason {
@@ -256,23 +254,23 @@ pub const fn reason_code(reason: Option<Reason>) -> u32 {
     }
 }
 
-/// The network in the whole run; a run over a serial line has none.
+/// The record of the network for the whole run; a run over a serial line has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Network {
     /// [`Network::KIND`].
     pub kind: u32,
-    /// Ethernet frames taken.
+    /// Ethernet frames received.
     pub frames: u32,
-    /// Of these, the ones with a packet for the controller's port.
+    /// Frames with a packet for the controller's port.
     pub packets: u32,
-    /// Of these, the good ones of its surface.
+    /// Good packets of its surface.
     pub good: u32,
-    /// Questions for its hardware address, answered.
+    /// ARP requests for its hardware address, which were answered.
     pub questions: u32,
-    /// Clock counts of the network's driver and of reading the frames, without the control ticks in their midst.
+    /// Clock counts of the network's driver and of parsing frames, without the control ticks during them.
     pub driver_counts: u32,
-    /// Clock counts of taking the packets.
+    /// Clock counts of receiving the packets.
     pub packet_counts: u32,
 }
 
@@ -281,12 +279,12 @@ impl Network {
     pub const KIND: u32 = 3;
 }
 
-/// A record from the line.
+/// A decoded record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Record {
     /// One control tick.
     Tick(Tick),
-    /// The hand in that tick.
+    /// The hand during that tick.
     Push(Push),
     /// The network.
     Network(Network),
@@ -308,7 +306,7 @@ pub fn frame<'b, T: NoUninit>(record: &T, out: &'b mut [u8; MAX_FRAMED]) -> Opti
 }
 
 impl Record {
-    /// Decodes a record of [`frame`], without its COBS framing; `None` if damaged.
+    /// Decodes a record of [`frame`], without its COBS framing; `None` if it is damaged.
     #[must_use]
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let (fields, stated) = bytes.split_last_chunk::<CHECKSUM>()?;

@@ -1,49 +1,47 @@
-//! How far a surface is trusted, by the bus that brings it.
+//! Limits of the trust in a surface, which depend on its bus.
 
 use dibs_nostd::Millis;
 use dibs_nostd::failsafe::{LimitError, Limits, Watch};
 
 use crate::TICK_RATE;
 
-/// Frames refused or abandoned in a row after which the state is degraded, and after which it is safe.
+/// Consecutive refused or abandoned frames after which the state is degraded, and after which it is safe.
 const REJECTIONS: (u32, u32) = (10, 30);
 
-/// Forged packets, of which ten are forgotten each second. This bus has no tags and so no forgeries; a receiver with a
-/// key watches the same number.
+/// Limits on forged packets, minus ten for each second. This bus has no tags and so detects no forgeries; a receiver
+/// with a key has the same limits.
 const FORGERIES: (u32, u32) = (0, 100);
 
-/// Frames in a row that recover. Nobody acknowledges here; a real robot leaves `automatic` out.
+/// Consecutive good frames that recover. Nobody acknowledges here; for a real robot leave `automatic` out.
 const RECOVERY_FRAMES: u16 = 1;
 
-/// Ticks in a row that must be clear before the state improves.
+/// Consecutive ticks within the limits before the state improves.
 pub const DWELL: u32 = TICK_RATE / 5;
 
-/// The limits of one bus. A pair is the time in ms after which the state is degraded, and after which the output
-/// is safe.
+/// The limits of one bus. A pair is the time in ms after which the state is degraded, and after which it is safe.
 #[derive(Clone, Copy, Debug)]
 pub struct Trust {
-    /// Age of the surface, which counts from its frame's first packet.
+    /// Age of the surface, counted from its frame's first packet.
     pub age: (u32, u32),
     /// Time without any good packet.
     pub silence: (u32, u32),
     /// Time without a heartbeat.
     pub heartbeat: (u32, u32),
-    /// Time that a frame may have been on its way, by the status that it echoes.
+    /// Transit time of a frame, by the status that it echoes.
     pub transit: (u32, u32),
-    /// Age that a frame may have when its sender sends it: a source that stands still while its sender lives.
+    /// Age of a frame when it is sent: large if a source stops while its sender is alive.
     pub source_age: (u32, u32),
     /// Largest speed of the tissue, in mm a millisecond.
     pub tissue_speed: f32,
 }
 
 impl Trust {
-    /// The emulated serial line: it takes one to three seconds for a frame, and so brings a heart slowed down some fifty
-    /// times.
+    /// The emulated serial line: a frame takes one to three seconds, so the heart beats some fifty times slower.
     pub const SERIAL: Self = Self {
         age: (4_000, 6_000),
         silence: (1_000, 2_000),
         heartbeat: (1_000, 3_000),
-        // Statuses go out every 100 ms, and the line brings a begin packet in some milliseconds more.
+        // Statuses are sent every 100 ms, and the line takes some milliseconds more for a begin packet.
         transit: (500, 1_000),
         source_age: (1_000, 2_000),
         tissue_speed: 0.001,
@@ -60,7 +58,7 @@ impl Trust {
         tissue_speed: 0.05,
     };
 
-    /// The limits beyond which the surface is not trusted.
+    /// The limits of the fail-safe machine.
     pub(crate) const fn limits(&self) -> Result<Limits, LimitError> {
         macro_rules! tri {
             ($result:expr) => {

@@ -1,4 +1,4 @@
-//! The control logic on the host, against an in-process bus: the same bytes as on the board.
+//! The control logic on the host, with a bus in the same process: the same bytes as on the board.
 
 // Requirement: P-05
 
@@ -24,13 +24,12 @@ const SILENCE_LIMIT: u32 = Trust::SERIAL.silence.1;
 const SURFACE_AGE_WARNING: u32 = Trust::SERIAL.age.0;
 const SURFACE_AGE_LIMIT: u32 = Trust::SERIAL.age.1;
 
-/// The firmware's tree.
 fn firmware_tree() -> &'static surface::Tree {
     static TREE: OnceLock<surface::Tree> = OnceLock::new();
     TREE.get_or_init(|| surface::TREE.validate().expect("valid"))
 }
 
-/// A controller's two ends, and its notes.
+/// A controller's two ends, and its counters.
 fn controller() -> (Receiver, Control<Script>, &'static BusStatus) {
     let surface: &'static Surface = Box::leak(Box::new(Surface::new()));
     let bus: &'static BusStatus = Box::leak(Box::new(BusStatus::new()));
@@ -71,7 +70,7 @@ impl Sender {
         self.sent(epoch, Freshness { age_ms: 0, echo: Some(now.0) })
     }
 
-    /// A frame as the bytes of the bus, as fresh as it says.
+    /// A frame as the bytes of the bus, with this freshness.
     fn sent(&mut self, epoch: u32, freshness: Freshness) -> Vec<u8> {
         let exact = &self.frames[epoch as usize % self.frames.len()];
         let grid = QuantisedBox::covering(exact).expect("finite positions");
@@ -91,14 +90,14 @@ impl Sender {
         all
     }
 
-    /// Compares an answer with exhaustive search on its surface, between two frames or beyond them.
+    /// Compares an answer with an exhaustive search on its surface, which may be between two frames or extrapolated.
     fn check(&self, tick: &Tick) {
         let (start, end) = (Vec3::from(tick.tool_start), Vec3::from(tick.tool_end));
         let tool = Instrument::capsule(start, end, tick.tool_radius);
         let frames = self.decoded[&tick.epoch_before].iter().zip(&self.decoded[&tick.epoch]);
         let rows: Vec<Vec3> = frames.map(|(&a, &b)| a + (b - a) * tick.blend).collect();
         let truth = exhaustive(&rows, &self.triangles, &tool).unwrap();
-        // Both sides have the vertices as they were decoded: no error of their positions.
+        // Both sides use the vertices as decoded, so there is no position error.
         let accuracy = f64::from(tick.accuracy) - f64::from(tick.position_error);
         let (low, high) = sides::signed_separation(&rows, &self.triangles, &tool, &truth, accuracy);
         assert!(f64::from(tick.separation) >= low - accuracy, "tick {}: {low}", tick.tick);
@@ -122,7 +121,7 @@ fn every_answer_is_that_of_whole_frames() {
     let (mut answers, mut checked, mut acting, mut free) = (0, 0, 0, 0);
     let (mut last_epoch, mut moving) = (0, 0);
     for epoch in 1..=30 {
-        // A tick every 122 bytes, so that most ticks fall inside a packet, and a pause as long as the frame.
+        // A tick every 122 bytes, so that most ticks are inside a packet, and a pause as long as the frame.
         let bytes = sender.bytes(epoch, control.now());
         let chunks: Vec<&[u8]> = bytes.chunks(122).collect();
         for chunk in chunks.iter().copied().chain(chunks.iter().map(|_| &[][..])) {
@@ -133,7 +132,8 @@ fn every_answer_is_that_of_whole_frames() {
             let tick = control.tick(|| 0);
             if tick.is_answered() {
                 assert!(tick.epoch == epoch || tick.epoch + 1 == epoch);
-                // Exhaustive search takes as long as hundreds of ticks: each new frame's first answer, and every fifth.
+                // An exhaustive search takes as long as hundreds of ticks: only each new frame's first answer, and
+                // every fifth.
                 if tick.epoch != last_epoch || answers % 5 == 0 {
                     sender.check(&tick);
                     checked += 1;
@@ -173,9 +173,9 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     assert_eq!((tick.epoch, bus.published()), (1, 1), "the damaged frame is not acted on");
     assert!(bus.rejected() > 0);
 
-    // The line is cut: two seconds later, to the tick, the output is safe.
+    // The line is cut: two seconds later, exact to a tick, the output is safe.
     assert_eq!(tick.state, State::Nominal as u32);
-    // The damaged frame's other packets were the last good ones.
+    // The damaged frame's other packets were the last good packets.
     let (cut, age) = (tick.tick, tick.age);
     let mut before = tick;
     for silence in 1..SILENCE_LIMIT + 500 {
@@ -191,14 +191,14 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
         assert_eq!((tick.state, tick.cause), (expected.0 as u32, expected.1), "after {silence}");
         sender.check(&tick);
         if expected.0 == State::Safe {
-            // The hold: damping alone, against the motion of the instrument.
+            // The hold: pure damping, against the motion of the instrument.
             let moved = Vec3::from(tick.tool_start) - Vec3::from(before.tool_start);
             assert!(Vec3::from(tick.force).dot(moved) <= 0.0);
         }
         before = tick;
     }
 
-    // A fresh frame recovers, after the dwell.
+    // A new frame recovers, after the dwell time.
     feed(&sender.bytes(3, control.now()), control.now());
     for _ in 0..DWELL {
         assert_eq!(control.tick(|| 0).state, State::Safe as u32);
@@ -206,7 +206,7 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     let tick = control.tick(|| 0);
     assert_eq!((tick.epoch, tick.state), (3, State::Nominal as u32));
 
-    // Packets come, but never a whole frame: the surface grows old.
+    // Packets arrive, but never a whole frame: the surface ages.
     let (received, mut epoch) = (tick.tick - tick.age, 4);
     for age in tick.age + 1..SURFACE_AGE_LIMIT + 100 {
         if age % 500 == 0 {
@@ -225,8 +225,8 @@ fn a_damaged_frame_is_not_published_and_silence_or_age_make_the_output_safe() {
     }
 }
 
-/// The age alone does not show a frame that was long on its way, one that was old when it was sent, one without an echo,
-/// or a row of refused frames. Each makes the output safe, and a good frame recovers.
+/// The age alone does not reveal a frame with a long transit time, one that was old when it was sent, one without an
+/// echo, or a series of refused frames. Each makes the output safe, and a good frame recovers.
 #[test]
 fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
     let (mut receiver, mut control, _bus) = controller();
@@ -234,7 +234,7 @@ fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
     control.skip(Ticks(100_000));
     let mut epoch = 0;
     let mut after = |freshness: &dyn Fn(u32) -> Freshness, is_damaged: bool| {
-        // A good frame comes after so long that it is not too fast for the one before.
+        // The good frame comes late enough that it is not too fast relative to the previous one.
         control.skip(Ticks(if is_damaged { 100 } else { 4_000 }));
         epoch += 1;
         let mut bytes = sender.sent(epoch, freshness(control.now().0));
@@ -245,7 +245,7 @@ fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
             receiver.bytes(byte, control.now());
             while receiver.work() {}
         }
-        // The state gets worse at once, and better after the dwell.
+        // The state gets worse at once, and better after the dwell time.
         for _ in 0..if is_damaged { 0 } else { DWELL } {
             control.tick(|| 0);
         }
@@ -277,7 +277,7 @@ fn a_late_frame_an_old_one_and_a_row_of_refused_ones_make_the_output_safe() {
         }
     }
     assert_eq!(after(&echo(0), false), nominal);
-    // A damaged frame counts when the next one begins.
+    // A damaged frame is counted when the next one begins.
     for streak in 1..=32 {
         let expected = match streak {
             ..=11 => nominal,

@@ -1,4 +1,4 @@
-//! The controller's end of a network, against bytes put together by hand from RFC 826, 791 and 768.
+//! Tests the controller's network end with bytes assembled by hand from RFC 826, 791 and 768.
 
 // Requirement: P-05
 
@@ -11,11 +11,11 @@ const OTHER_PORT: u16 = 40_001;
 
 const BROADCAST: [u8; 6] = [0xFF; 6];
 
-/// Places in a frame with an IPv4 datagram, and in its UDP header.
+/// Offsets of the IPv4 datagram in a frame, and of its UDP header.
 const IP: usize = 14;
 const UDP: usize = 34;
 
-/// The Internet checksum of these bytes: 0 if they hold their own.
+/// The Internet checksum of these bytes: 0 if they include their own.
 fn checksum(parts: &[&[u8]]) -> u16 {
     let bytes: Vec<u8> = parts.concat();
     let words = bytes
@@ -48,7 +48,7 @@ fn datagram(packet: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// The frame with a field changed, and the IPv4 checksum made right again.
+/// The frame with a field changed, and a matching IPv4 checksum.
 fn changed(frame: &[u8], at: usize, value: &[u8]) -> Vec<u8> {
     let mut frame = frame.to_vec();
     frame[at..at + value.len()].copy_from_slice(value);
@@ -90,7 +90,7 @@ fn a_question_for_the_address_is_answered_and_no_other() {
 fn a_packet_is_taken_out_and_a_status_goes_back() {
     let packet: Vec<u8> = (0..200).collect();
     let frame = datagram(&packet);
-    // Trailing bytes that are not the datagram's are no part of the packet.
+    // Bytes after the datagram are not part of the packet.
     let padded = [&frame[..], &[0xEE; 4]].concat();
     for frame in [&frame, &padded] {
         let Content::Packet(found, _) = read(frame) else { panic!("no packet") };

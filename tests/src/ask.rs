@@ -24,7 +24,7 @@ pub fn closest<I: Index, const D: usize>(
     }
 }
 
-/// The same by the wide search.
+/// The same with the wide (batched) search.
 ///
 /// # Errors
 /// The query's.

@@ -1,4 +1,4 @@
-//! A small surface on a bus, for the bus tests.
+//! A small surface on a bus, for tests of the bus.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, Mac, QuantisedBox};
@@ -13,12 +13,12 @@ pub const N: usize = 40;
 /// An assembler without a gate, and the reader of its frames.
 pub type Bus = (Assembler<'static, NoGate>, FrameReader<'static>);
 
-/// A fresh bus without a gate.
+/// A new bus without a gate.
 pub fn bus() -> Bus {
     bus_with(NoGate)
 }
 
-/// A fresh bus with a gate.
+/// A new bus with a gate.
 ///
 /// # Panics
 /// Never: the frames are new.
@@ -28,7 +28,7 @@ pub fn bus_with<G: Gate>(gate: G) -> (Assembler<'static, G>, FrameReader<'static
     (Assembler::new(writer, gate, MESH, 100.0), reader)
 }
 
-/// A surface that differs from epoch to epoch.
+/// A surface that differs in every epoch.
 pub fn surface(epoch: u32) -> Vec<Vec3> {
     (0..N)
         .map(|i| {
@@ -79,14 +79,14 @@ pub const fn id(epoch: u32) -> FrameId {
     FrameId { mesh_id: MESH, session: 1, epoch }
 }
 
-/// The packets of an epoch of [`surface`], for CAN-FD.
+/// The packets of [`surface`] in an epoch, for CAN-FD.
 pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
     let positions = surface(epoch);
     packets::<64>(epoch, encoding(quantised, &positions), &positions)
 }
 
-/// Gives a packet to the assembler, and lets it do all work that is due, in slices. Returns the epoch of the frame
-/// that this publishes, if any.
+/// Gives a packet to the assembler, and lets it do all pending work, in slices. Returns the epoch of the frame that
+/// this publishes, if any.
 ///
 /// # Errors
 /// The assembler's rejection.
@@ -111,7 +111,7 @@ pub fn give_at<G: Gate, M: Mac>(
         match assembler.advance(7)? {
             Advance::Published { epoch } => return Ok(Some(epoch)),
             Advance::Pending => {}
-            // A few more slices, which copy rows ahead.
+            // A few more slices, which copy rows in advance.
             _ => {
                 let rows = assembler.surface().map_or(0, |surface| surface.len());
                 for _ in 0..rows / 7 + 1 {
@@ -124,7 +124,7 @@ pub fn give_at<G: Gate, M: Mac>(
     Ok(None)
 }
 
-/// A packet with padding and checksum, written by the specification alone.
+/// A packet with padding and checksum, written only by the specification.
 pub fn raw(
     kind: u8,
     session: u32,
@@ -147,7 +147,7 @@ pub fn raw(
     reseal(packet)
 }
 
-/// A begin packet of a float frame, written by the specification alone.
+/// A begin packet of a float frame, written only by the specification.
 pub fn raw_begin(session: u32, epoch: u32, content: u8, rows: u32, base: u32) -> Vec<u8> {
     let mut body = ((session >> 16) as u16).to_le_bytes().to_vec();
     let rows = &rows.to_le_bytes()[..3];
@@ -163,7 +163,7 @@ pub fn raw_begin(session: u32, epoch: u32, content: u8, rows: u32, base: u32) ->
 /// The checksum in a packet.
 ///
 /// # Panics
-/// For a packet without room for one.
+/// For a packet that is too short for a checksum.
 pub fn checksum(packet: &[u8]) -> u32 {
     u32::from_le_bytes(packet[packet.len() - CHECKSUM_BYTES..].try_into().unwrap())
 }
@@ -178,7 +178,7 @@ pub fn published(reader: &mut FrameReader<'_>) -> Option<(u32, Vec<[u32; 3]>)> {
     Some((frame.label().epoch, positions.collect()))
 }
 
-/// A packet's contribution to its frame's digest, computed by the specification alone.
+/// A packet's contribution to its frame's digest, computed only by the specification.
 pub fn contribution(packet: &[u8]) -> u32 {
     let mut contribution = checksum(packet);
     for (shift, factor) in [(16, 0x85EB_CA6B_u32), (13, 0xC2B2_AE35)] {
@@ -194,7 +194,7 @@ pub fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
-/// Puts the right checksum into a changed packet.
+/// Corrects the checksum of a changed packet.
 pub fn reseal(mut packet: Vec<u8>) -> Vec<u8> {
     packet.truncate(packet.len() - CHECKSUM_BYTES);
     let checksum = crc32(&packet);

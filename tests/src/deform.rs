@@ -1,4 +1,4 @@
-//! Deformations within a stretch limit: smooth ones like tissue's, and adversarial ones.
+//! Deformations within a stretch limit: smooth ones as in tissue, and adversarial ones.
 
 use std::f32::consts::TAU;
 
@@ -20,9 +20,9 @@ pub enum Deformation {
     Bump,
     /// Each axis scaled separately (the paper's axis scaling).
     Scale,
-    /// Each vertex moved separately.
+    /// Each vertex moved independently.
     Noise,
-    /// Mirrored at a plane through the middle: two layers in one place.
+    /// Reflected at a plane through the middle: two coincident layers.
     Fold,
     /// Folded many times, like a fan.
     Crumple,
@@ -46,15 +46,15 @@ impl Deformation {
         Self::Collapse,
     ];
 
-    /// Positions of the mesh's vertices after a random deformation of this kind, turned and moved as a whole. A
-    /// deformation that stretches beyond `limit` is weakened until it does not.
+    /// Positions of the mesh's vertices after a random deformation of this kind and a rigid motion. A deformation that
+    /// stretches beyond `limit` is weakened until it does not.
     #[must_use]
     pub fn apply(self, mesh: &Mesh, paths: PathKind, limit: f32, rng: &mut Rng) -> Vec<Vec3> {
         let most = f64::from(limit) * 0.999;
         self.apply_while(mesh, |moved| stretch::largest(mesh, moved, paths) <= most, rng)
     }
 
-    /// The same with a condition of the caller's: a deformation is weakened until its positions satisfy `is_fit`.
+    /// The same with the caller's condition: a deformation is weakened until its positions satisfy `is_fit`.
     #[must_use]
     pub fn apply_while(
         self,

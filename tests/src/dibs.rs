@@ -1,4 +1,4 @@
-//! The library under test as a method of the benchmark. It takes the wide search, which is the one for hosts.
+//! The library under test as a method of the benchmark. It uses the wide (batched) search, which is the one for hosts.
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::MAX_STACK;
@@ -13,12 +13,12 @@ use crate::method::{Found, Method, Probe};
 /// Entries of the traversal's stack: enough for every built tree.
 const STACK: usize = MAX_STACK;
 
-/// A query's prior knowledge besides the surface.
+/// What a query knows in addition to the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Knowledge {
-    /// The frame's stretch, measured in `update`.
+    /// Whether the frame's stretch is measured in `update`.
     pub measured: bool,
-    /// The triangle that the last query found.
+    /// Whether it starts from the triangle of the last answer.
     pub warm: bool,
 }
 
@@ -34,8 +34,7 @@ pub fn queries<'t>(built: &'t BuiltTree, knowledge: Knowledge) -> Box<dyn Method
     }
 }
 
-/// The same queries with vertices in the mesh's order, looked up through the tree's vertex order, to show the gain of
-/// that order.
+/// The same queries with vertices in the mesh's order, read through the tree's, to measure the benefit of that order.
 ///
 /// # Panics
 /// If the bytes are not those of a tree.

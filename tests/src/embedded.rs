@@ -1,4 +1,4 @@
-//! Surfaces that a volume carries: volumes, motions of their nodes, and their stretch in f64.
+//! Surfaces that a volume moves: volumes, motions of their nodes, and their stretch in f64.
 
 use dibs_build::{Mesh, Volume};
 use dibs_nostd::format::Link;
@@ -7,7 +7,7 @@ use dibs_nostd::{Tree, TriangleRow, VertexTable};
 use fastrand::Rng;
 use glam::{DMat3, DVec3, Mat3, Quat, Vec3};
 
-/// A volume around a mesh that is no box: the cells of a lattice with vertices in or beside them, their nodes shifted.
+/// A volume around a mesh that is not a box: the lattice cells with vertices in or beside them, with displaced nodes.
 #[must_use]
 pub fn hull(mesh: &Mesh, cells: [u32; 3], rng: &mut Rng) -> Volume {
     let lattice = Volume::lattice(mesh, cells).expect("a lattice");
@@ -32,7 +32,7 @@ pub fn hull(mesh: &Mesh, cells: [u32; 3], rng: &mut Rng) -> Volume {
                 if *row == u32::MAX {
                     *row = nodes.len() as u32;
                     let at = lattice.nodes()[node as usize];
-                    // The outermost stay, so that the hull holds the mesh.
+                    // The outermost nodes stay, so that the hull contains the mesh.
                     let is_inner = at.cmpgt(low) & at.cmplt(high);
                     let shift = [(); 3].map(|()| 0.1 * (rng.f64() - 0.5));
                     let shift = DVec3::from(shift) * size;
@@ -45,7 +45,7 @@ pub fn hull(mesh: &Mesh, cells: [u32; 3], rng: &mut Rng) -> Volume {
     Volume::new(nodes, tetrahedra).expect("cells that touch")
 }
 
-/// A volume made smaller around its middle, so that vertices are outside: bound within this distance (mm).
+/// A volume scaled down around its middle, so that vertices are outside: bound within this distance (mm).
 #[must_use]
 pub fn shrunk(volume: &Volume, part: f64, within: f64) -> Volume {
     let nodes = volume.nodes();
@@ -89,11 +89,11 @@ pub fn sections(tree: &Tree<'_, u16>) -> Vec<Section> {
     (0..tree.node_count()).map(section).collect()
 }
 
-/// Climbs, over the positions of the nodes that carry a section, towards a vertex beyond its sphere, and returns how much of
-/// the radius the farthest one took.
+/// Climbs, over the positions of the nodes that move a section, towards a vertex outside its sphere. Returns the
+/// distance of the farthest vertex from the pin, relative to the radius.
 ///
 /// # Panics
-/// If one is beyond.
+/// If a vertex is outside.
 #[must_use]
 pub fn climb(nodes: &Nodes<'_>, section: &Section, rest: &[Vec3], rng: &mut Rng) -> f64 {
     let Section { pin, radius, covered } = section;
@@ -122,15 +122,15 @@ pub fn climb(nodes: &Nodes<'_>, section: &Section, rest: &[Vec3], rng: &mut Rng)
 /// A motion of nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NodeMotion {
-    /// Stretched along one axis, by all of the limit.
+    /// Stretched along one axis up to the limit.
     Pulled,
     /// Long waves.
     Waves,
-    /// Each node moved separately.
+    /// Each node moved independently.
     Noise,
-    /// Bent around an axis, until ends may overlap.
+    /// Bent around an axis, until its ends may overlap.
     Bent,
-    /// One node alone.
+    /// Only one node moved.
     Needle,
     /// Pressed nearly flat.
     Pressed,
@@ -141,8 +141,7 @@ impl NodeMotion {
     pub const ALL: [Self; 6] =
         [Self::Pulled, Self::Waves, Self::Noise, Self::Bent, Self::Needle, Self::Pressed];
 
-    /// Nodes after a random motion of this kind, weakened until their measured stretch is within the limit, turned and
-    /// moved as a whole.
+    /// Nodes after a random motion of this kind, weakened until their stretch is within the limit, and a rigid motion.
     #[must_use]
     pub fn apply(self, nodes: &Nodes<'_>, rng: &mut Rng) -> Vec<Vec3> {
         let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
@@ -198,7 +197,7 @@ pub fn rows(surface: &(impl VertexTable + ?Sized)) -> Vec<Vec3> {
     (0..surface.len() as u32).filter_map(|row| surface.position(row)).collect()
 }
 
-/// A vertex in f64.
+/// A vertex computed in f64.
 #[must_use]
 pub fn exact(nodes: &Nodes<'_>, table: &[Vec3], vertex: u32) -> DVec3 {
     let weights = nodes.weights(vertex).expect("in the table");
@@ -228,7 +227,7 @@ pub fn largest_stretch(nodes: &Nodes<'_>, table: &[Vec3]) -> f64 {
     (0..nodes.element_count()).map(of).fold(0.0, f64::max)
 }
 
-/// By Jacobi's rotations.
+/// By Jacobi rotations.
 fn largest_eigenvalue(mut matrix: DMat3) -> f64 {
     for _ in 0..12 {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
@@ -250,7 +249,7 @@ fn largest_eigenvalue(mut matrix: DMat3) -> f64 {
     (0..3).map(|at| matrix.col(at)[at]).fold(0.0, f64::max)
 }
 
-/// A random gradient near a rotation.
+/// A random deformation gradient near a rotation.
 #[must_use]
 pub fn gradient(rng: &mut Rng, strain: f32) -> Mat3 {
     let mut random = || Vec3::from([(); 3].map(|()| strain * (rng.f32() - 0.5)));

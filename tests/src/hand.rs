@@ -1,4 +1,4 @@
-//! A simulated hand that pushes an instrument into something, at 1 kHz.
+//! A simulated hand that pushes an instrument against a surface, at 1 kHz.
 
 use std::ops::ControlFlow;
 
@@ -15,7 +15,7 @@ use crate::surfaces::{ball, sheet};
 /// Ticks of a push.
 const TICKS: u32 = 4_000;
 
-/// The account's tank (mJ) and largest step (N).
+/// The largest energy (mJ) and the largest step of the force (N) that the account allows.
 const TANK: f32 = 1.0;
 const STEP: f32 = 0.5;
 
@@ -25,7 +25,7 @@ const RADIUS: f32 = 1.0;
 /// Gain (1/s) of velocity rows.
 const GAIN: f32 = 100.0;
 
-/// The velocity nearest to a wanted one under rows (Hildreth 1957).
+/// The velocity closest to a wanted one that satisfies the rows (Hildreth 1957).
 fn allowed(rows: &[VelocityRow], wanted: Vec3) -> Vec3 {
     let (mut velocity, mut pushes) = (wanted, vec![0.0_f32; rows.len()]);
     for _ in 0..200 {
@@ -50,20 +50,20 @@ pub struct Scene {
     push: Vec3,
 }
 
-/// The outcome of a push.
+/// The result of a push.
 #[derive(Clone, Copy, Debug)]
 pub struct Pushed {
-    /// Least signed separation (mm). Below minus the radius, the instrument's centre went through the surface.
+    /// Least signed separation (mm). Below minus the radius, the instrument's centre has passed through the surface.
     pub least: f32,
     /// Largest change of the force from one tick to the next (N).
     pub step: f32,
-    /// The most energy (mJ) that the force had given to the hand at any time, beyond what the hand gave before, relative to
-    /// the wall.
+    /// Largest energy (mJ) that the force had given to the hand at any time, minus the energy that the hand had given
+    /// before, relative to the wall.
     pub given: f32,
 }
 
 impl Pushed {
-    /// Whether the instrument's centre went through the surface.
+    /// Whether the instrument's centre passed through the surface.
     #[must_use]
     pub fn is_through(&self) -> bool {
         self.least < -RADIUS
@@ -71,14 +71,14 @@ impl Pushed {
 }
 
 /// A flat wall; a corner of four slopes; a gap narrower than two margins; a groove whose walls are so steep that one
-/// alone cannot bear the hand; a ball; and a beating heart.
+/// wall alone cannot hold the hand; a ball; and a beating heart.
 ///
 /// # Panics
 /// Never: the sizes are valid.
 #[must_use]
 pub fn scenes() -> Vec<Scene> {
     let down = |name, mesh, from| Scene { name, mesh, motion: None, from, push: Vec3::NEG_Z };
-    // Two walls on a floor, less than two margins apart there and a little more at the top.
+    // Two walls on a floor, at the floor less than two margins apart, at the top a little more.
     let gap = sheet(60, 60.0, |x, _| 60.0 * ((x.abs() - 4.5) / 1.5).clamp(0.0, 1.0));
     let sideways = Vec3::new(-1.0, 0.1, 0.0).normalize();
     let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a valid size");
@@ -96,7 +96,7 @@ pub fn scenes() -> Vec<Scene> {
 }
 
 impl Scene {
-    /// Pushes against the force of all contacts through an account of its energy, or of the closest pair alone.
+    /// Pushes against the force of all contacts, limited by an energy account, or of the closest pair only.
     ///
     /// # Panics
     /// If a query fails.
@@ -146,8 +146,7 @@ impl Scene {
         pushed
     }
 
-    /// Commands the instrument's motion, as fast as the hand pushes it in free space: filtered, or held by velocity rows
-    /// alone.
+    /// Commands the instrument to move as the push would in free space: filtered, or limited by velocity rows only.
     ///
     /// # Panics
     /// If a query fails.
@@ -161,7 +160,7 @@ impl Scene {
         let mut contacts = Contacts::<8>::new();
         let command = Hand::free(self.push * Hand::PUSH);
         let most = 2.0 * command.length();
-        // The gap's slivers take long to tell sides apart; other checks are about budgets.
+        // The gap's slivers take long to tell sides apart; budgets are the subject of other checks.
         let filter = Filter::new(0.0, most).expect("in range").budget(2_000_000, Cost::M7_SPHERE);
         let uncertainty = Uncertainty::new(self.fastest());
         let mut at = self.from;

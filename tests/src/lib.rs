@@ -38,7 +38,8 @@ pub mod tree_bytes;
 #[cfg(feature = "builder")]
 pub mod wanderer;
 
-/// A sample of the cases of a slow test: a quarter. All of them where `DIBS_WHOLE` is set, as by `cargo xtask test --whole`.
+/// The number of cases of a slow test: a quarter of `whole`, or all if `DIBS_WHOLE` is set, as by `cargo xtask test
+/// --whole`.
 #[must_use]
 pub fn sample(whole: usize) -> usize {
     if is_whole() { whole } else { whole.div_ceil(4) }

@@ -17,7 +17,7 @@ pub enum Probe {
 /// A method's answer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Found {
-    /// Distance from the tool's surface to the mesh; 0 where they touch or overlap.
+    /// Distance from the tool's surface to the mesh; 0 if they touch or overlap.
     pub separation: f32,
     /// Tests of bounding volumes and of triangles; `None` if the method does not count them.
     pub tests: Option<[u32; 2]>,
@@ -25,7 +25,7 @@ pub struct Found {
 
 /// A method for closest-point queries on a surface that deforms.
 ///
-/// A step is `load`, `update`, then any number of `find`; between two of them the same frame may be loaded again. All
+/// A step is `load`, `update`, then any number of `find`; the same frame may be loaded again between two of them. All
 /// methods are single-threaded.
 pub trait Method {
     /// Copies the frame's positions (in the mesh's order) to the method's order and layout. Not timed, because every
@@ -39,7 +39,7 @@ pub trait Method {
     fn find(&mut self, tool: &Probe) -> Found;
 }
 
-/// A method whose positions another may write, in the method's own order and layout.
+/// A method whose positions others may write, in the method's own order and layout.
 pub trait Layout: Method {
     /// A position as the method stores it.
     type Position: Copy
@@ -47,9 +47,9 @@ pub trait Layout: Method {
         + Sub<Output = Self::Position>
         + Mul<f32, Output = Self::Position>;
 
-    /// The positions loaded last. A change counts from the next `update`.
+    /// The positions that were loaded last. A change is used from the next `update` on.
     fn positions_mut(&mut self) -> &mut [Self::Position];
 
-    /// The mesh's vertex that a position is of.
+    /// The mesh vertex of a row.
     fn vertex(&self, row: usize) -> u32;
 }

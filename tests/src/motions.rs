@@ -6,7 +6,7 @@ use dibs_build::{Mesh, Motion, generate};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A heart that beats while waves run over it: a motion of two modes a wave, and at least the beat's two.
+/// A heart that beats while waves travel over it: a motion with two modes a wave, plus at least the beat's two.
 ///
 /// # Panics
 /// If no heart has so many triangles.

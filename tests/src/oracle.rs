@@ -3,8 +3,8 @@
 //! It shares no code with the kernels under test. Two convex sets are closest at a pair of their faces, so all 21 pairs
 //! of faces are tried: {two ends, inside} of the segment with {three corners, three edges, inside} of the triangle.
 //! Each is a least-squares problem of at most three unknowns, solved by orthogonalisation. Its solution is clamped to
-//! the two sets, so no distance is below the true one. [`ClosestPair::lower`] certifies by duality that the least of
-//! them is not above it.
+//! the two sets, so no computed distance is below the true one. [`ClosestPair::lower`] certifies by duality that the
+//! least of them is not above it.
 
 use glam::{DVec3, Vec3};
 
@@ -36,7 +36,7 @@ impl Instrument {
 pub struct ClosestPair {
     /// Their distance.
     pub distance: f64,
-    /// A proven lower bound of the distance: along some direction, the axis' and the triangle's extents are this far
+    /// A proven lower bound on the distance: along some direction, the axis' and the triangle's extents are this far
     /// apart. Equal to `distance` up to rounding, unless `distance` is nearly 0.
     pub lower: f64,
     /// The axis' point.
@@ -50,13 +50,13 @@ pub struct ClosestPair {
 pub struct OraclePair {
     /// Distance from the tool's axis to the surface.
     pub axis_distance: f64,
-    /// Distance from the tool's surface to the mesh, as if the axis were outside: negative where they overlap.
+    /// Distance from the tool's surface to the mesh, as if the axis were outside: negative if they overlap.
     pub separation: f64,
     /// The axis' point.
     pub on_axis: DVec3,
     /// The surface's point.
     pub on_surface: DVec3,
-    /// The triangle's number, the lowest of equally close ones.
+    /// The triangle's index, the lowest of equally close ones.
     pub triangle: usize,
 }
 
@@ -83,7 +83,7 @@ fn closest_from_origin(end: DVec3, corners: [DVec3; 3]) -> ClosestPair {
         (a, &[b - a, c - a]),
     ];
     let all = [(DVec3::ZERO, None), (end, None), (DVec3::ZERO, Some(end))];
-    // All three faces of a segment of length zero are its one point.
+    // All three faces of a segment of length zero are the same point.
     let points = if end == DVec3::ZERO { &all[..1] } else { &all[..] };
     for (origin, spans) in faces {
         for &(point, span) in points {
@@ -155,8 +155,8 @@ fn point_distance(start: DVec3, end: DVec3, point: DVec3) -> f64 {
 
 /// The least distance from the segment from `start` to `end` to any of the triangles; infinite for none.
 ///
-/// A triangle is skipped only if its first corner is farther away than the nearest so far by more than the triangle's extent
-/// from that corner.
+/// A triangle is skipped only if the distance of its first corner exceeds the least distance so far by more than the
+/// triangle's extent from that corner.
 pub fn least_distance(
     start: DVec3,
     end: DVec3,
@@ -171,7 +171,7 @@ pub fn least_distance(
     least
 }
 
-/// Whether no point of a triangle is as near as `least`, by the distance of its first corner.
+/// Whether no point of a triangle is as near as `least`, judged by the distance of its first corner.
 fn is_beyond(least: f64, first: f64, [a, b, c]: [DVec3; 3]) -> bool {
     let reach = a.distance(b).max(a.distance(c));
     // The margin covers the rounding of this line.
@@ -180,7 +180,7 @@ fn is_beyond(least: f64, first: f64, [a, b, c]: [DVec3; 3]) -> bool {
 
 /// The closest pair of a tool and a surface, over all its triangles; `None` for no triangles.
 ///
-/// Exhaustive in effect: triangles are skipped as by [`least_distance`].
+/// Equivalent to an exhaustive search: triangles are only skipped as in [`least_distance`].
 ///
 /// # Panics
 /// If a triangle names a vertex that does not exist.

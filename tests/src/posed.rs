@@ -1,4 +1,4 @@
-//! Frames with a rigid pose each: the mesh in the world, in f64.
+//! Frames with rigid poses: the mesh in world coordinates, in f64.
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::{Interval, Proximity, Side};
@@ -8,7 +8,7 @@ use crate::oracle::closest_pair;
 use crate::sides::is_inside;
 use crate::surfaces;
 
-/// A heart somewhere.
+/// A heart at some position.
 pub struct Heart {
     /// Its mesh.
     pub mesh: Mesh,
@@ -21,7 +21,7 @@ pub struct Heart {
 }
 
 impl Heart {
-    /// That of 320 triangles, with its mesh's own frame so far away.
+    /// A heart of 320 triangles, displaced in its mesh's own coordinates by `shift`.
     ///
     /// # Panics
     /// Never: the mesh is valid.
@@ -36,7 +36,7 @@ impl Heart {
         Self { mesh, built, triangles, centre: (low + high) * 0.5 }
     }
 
-    /// The positions of its file, larger by a part.
+    /// The positions of its file, scaled up by this fraction.
     #[must_use]
     pub fn grown(&self, part: f32) -> Vec<Vec3> {
         let grown = |&at: &Vec3| self.centre + (at - self.centre) * (1.0 + part);
@@ -47,13 +47,13 @@ impl Heart {
 /// A pose as it is sent.
 pub type Sent = (Quat, Vec3);
 
-/// The exact pose.
+/// The exact pose in f64.
 #[must_use]
 pub fn exact((rotation, shift): &Sent) -> (DQuat, DVec3) {
     (rotation.as_dquat().normalize(), shift.as_dvec3())
 }
 
-/// The pose a part of the step from one to the next beyond that, about a centre that goes straight.
+/// The pose extrapolated beyond two poses, by a fraction of their step, about a centre that moves in a straight line.
 #[must_use]
 pub fn beyond(before: &Sent, after: &Sent, part: f64, centre: DVec3) -> (DQuat, DVec3) {
     let ((a, s), (b, t)) = (exact(before), exact(after));
@@ -64,14 +64,14 @@ pub fn beyond(before: &Sent, after: &Sent, part: f64, centre: DVec3) -> (DQuat, 
     (rotation, ends[1] + (ends[1] - ends[0]) * part - rotation * centre)
 }
 
-/// A pose that is so far along a steady motion about a heart's middle.
+/// A pose on a steady motion about a heart's middle, at this time.
 #[must_use]
 pub fn steady(heart: &Heart, start: &Sent, spin: Vec3, flow: Vec3, time: f64) -> Sent {
     let (rotation, shift) = steady_at(heart.centre, start, spin, flow, time);
     (rotation.as_quat(), shift.as_vec3())
 }
 
-/// The exact one, about any point.
+/// The exact pose, about any point.
 #[must_use]
 pub fn steady_at(centre: Vec3, start: &Sent, spin: Vec3, flow: Vec3, time: f64) -> (DQuat, DVec3) {
     let (rotation, shift) = exact(start);
@@ -81,15 +81,15 @@ pub fn steady_at(centre: Vec3, start: &Sent, spin: Vec3, flow: Vec3, time: f64) 
     (turned, middle - turned * centre)
 }
 
-/// The separation of a capsule from a surface in the world, in f64: for a sphere signed, else as if outside.
+/// The separation of a capsule from a surface in the world, in f64: signed for a sphere, otherwise as if outside.
 pub struct Truth {
-    /// That.
+    /// The separation (mm).
     pub separation: f64,
-    /// Whether a sphere's centre is inside; `None` on the surface, and of a capsule.
+    /// Whether a sphere's centre is inside; `None` on the surface, and for a capsule.
     pub is_inside: Option<bool>,
 }
 
-/// Of rows at a pose, and a capsule between two ends.
+/// For rows at a pose, and a capsule between two ends.
 #[must_use]
 pub fn truth(
     triangles: &[[u32; 3]],
@@ -111,16 +111,16 @@ pub fn truth(
     Truth { separation: signed - f64::from(radius), is_inside }
 }
 
-/// How far an answer is off, as a part of its accuracy; `None` where the axis may be inside and is no point.
+/// The error of an answer relative to its accuracy; `None` if the axis may be inside and is not a point.
 ///
 /// # Panics
-/// Where its interval does not hold the truth.
+/// If its interval does not contain the true separation.
 #[must_use]
 pub fn off(truth: &Truth, found: &Proximity) -> Option<f64> {
     match (found.side, truth.is_inside) {
         (Side::Outside, _) | (Side::Inside, Some(true)) => {
             let Interval { lower, upper } = found.interval();
-            // Rounded by the reference.
+            // The reference's own rounding.
             let slack = 1e-9;
             let is_held = f64::from(lower) - slack <= truth.separation
                 && truth.separation <= f64::from(upper) + slack;

@@ -1,5 +1,5 @@
-//! Judges sides and signed separations of poses in f64, by generalised winding numbers and exhaustive search. Where a
-//! surface is shown to cut itself, the pseudonormal of the nearest sheet decides.
+//! Checks sides and signed separations of poses in f64, by generalised winding numbers and exhaustive search. Where a
+//! surface is proven to intersect itself, the pseudonormal of the nearest sheet decides.
 
 use std::ops::AddAssign;
 
@@ -18,15 +18,15 @@ use crate::surfaces::{self, ball};
 pub struct Closed {
     /// Its name.
     pub name: &'static str,
-    /// At rest.
+    /// The mesh at rest.
     pub mesh: Mesh,
     /// Its tree.
     pub built: BuiltTree,
-    /// Its weight in the division of the poses among the surfaces.
+    /// Its weight when the poses are divided among the surfaces.
     pub share: usize,
 }
 
-/// Generated hearts and brains, a ball, and the real heart and brains where they are present.
+/// Generated hearts and brains, a ball, and the real heart and brains if they are present.
 ///
 /// # Panics
 /// Never: the sizes are valid.
@@ -52,7 +52,7 @@ pub fn closed() -> Vec<Closed> {
     all.into_iter().map(build).collect()
 }
 
-/// Bends all space, and a surface with it. Space does not fold: the bend's derivative stays below 1.
+/// Bends space, and a surface with it. Space does not fold, because the derivative of the bend stays below 1.
 #[must_use]
 pub fn bent(mesh: &Mesh, rng: &mut Rng) -> Vec<Vec3> {
     let mut number = |size: f32| (rng.f32() * 2.0 - 1.0) * size;
@@ -69,7 +69,7 @@ pub fn bent(mesh: &Mesh, rng: &mut Rng) -> Vec<Vec3> {
     mesh.positions.iter().map(bend).collect()
 }
 
-/// A random point: near a vertex, an edge or a face of a random triangle, at distances of many scales.
+/// A random point near a vertex, an edge or a face of a random triangle, at distances of many scales.
 ///
 /// # Panics
 /// If there is no triangle.
@@ -99,12 +99,12 @@ pub struct Tally {
     pub inside: usize,
     /// Poses whose side is undefined.
     pub undefined: usize,
-    /// Poses whose side is undefined, though the axis is more than a hundredth of a mm from the surface.
+    /// Poses whose side is undefined, although the axis is more than a hundredth of a mm from the surface.
     pub undefined_away: usize,
     /// Poses whose axis is that far from the surface.
     pub away: usize,
-    /// Poses where the surface is shown to cut itself: the side is that of the nearest sheet, and the depth jumps along
-    /// an axis inside.
+    /// Poses where the surface is proven to intersect itself: the side is that of the nearest sheet, and the depth
+    /// jumps along an axis inside.
     pub self_cut: usize,
     /// Poses whose side or separation is wrong.
     pub wrong: usize,
@@ -122,17 +122,17 @@ impl AddAssign for Tally {
     }
 }
 
-/// Poses judged together on one shape of a surface.
+/// Poses that are checked together on one shape of a surface.
 pub const POSES_OF_A_FRAME: usize = 100;
 
-/// Parts of an axis whose depth is sampled.
+/// Intervals of an axis at whose ends the depth is sampled.
 const POINTS: u32 = 16;
 
-/// Parts of an axis at whose ends the surface may be shown to cut itself: where a sheet lies behind another one for less
-/// than a sample's distance, the depth jumps between two samples.
+/// Intervals of an axis at whose ends self-intersection is tested: if a sheet lies behind another one for less than the
+/// distance between samples, the depth jumps between two samples.
 const CUTS: u32 = 8 * POINTS;
 
-/// Judges poses on one shape of a surface; prints the wrong ones.
+/// Checks poses on one shape of a surface; prints the wrong ones.
 ///
 /// # Panics
 /// If a query fails, or a side is undefined for another reason than the accuracy.
@@ -180,7 +180,7 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
             Side::Outside => false,
             Side::Inside => true,
             Side::Crossing => {
-                // Another test covers depths.
+                // Depths are the subject of another test.
                 tally.wrong += usize::from(pair.axis_distance > f64::from(found.accuracy));
                 continue;
             }
@@ -214,7 +214,7 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
     tally
 }
 
-/// How far an answer's interval is from the true separation of a tool on a known side.
+/// The distance of an answer's interval from the true separation of a tool on a known side.
 fn off(
     rows: &[Vec3],
     triangles: &[[u32; 3]],
@@ -225,7 +225,7 @@ fn off(
 ) -> f64 {
     let signed = if inside { -pair.axis_distance } else { pair.axis_distance };
     let high = signed - f64::from(tool.radius);
-    // An axis inside counts by its deepest point. Where the surface cuts itself, a point of the axis may have no depth.
+    // An axis inside is measured at its deepest point. If the surface intersects itself, a point may have no depth.
     let deepest = (inside && tool.start != tool.end)
         .then(|| sides::deepest_separation(rows, triangles, tool, POINTS));
     let (low, high) = match deepest {

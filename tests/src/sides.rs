@@ -18,8 +18,8 @@ pub fn winding_number(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) 
     triangles.iter().map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
-/// Whether a point is inside a closed surface; `None` where the winding number is neither 0 nor 1, because the
-/// surface cuts itself or the point lies on it.
+/// Whether a point is inside a closed surface; `None` if the winding number is neither 0 nor 1, because the surface
+/// intersects itself or the point lies on it.
 #[must_use]
 pub fn is_inside(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> Option<bool> {
     let winding = winding_number(positions, triangles, point);
@@ -32,7 +32,7 @@ pub fn is_inside(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> Op
     }
 }
 
-/// Depth of a point in a closed surface, negative outside; `None` where the winding number is ambiguous.
+/// Depth of a point in a closed surface, negative outside; `None` if the winding number is ambiguous.
 #[must_use]
 pub fn depth(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> Option<f64> {
     let nearest = exhaustive(positions, triangles, &Instrument::sphere(point, 0.0))?;
@@ -41,7 +41,7 @@ pub fn depth(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> Option<
 }
 
 /// The side of the nearest sheet: the sign of the angle-weighted pseudonormal at the closest point, over all triangles.
-/// It differs from [`is_inside`] only where the surface cuts itself.
+/// It differs from [`is_inside`] only where the surface intersects itself.
 #[must_use]
 pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
     let corners = |triangle: [u32; 3]| triangle.map(|v| positions[v as usize].as_dvec3());
@@ -71,11 +71,11 @@ pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -
     (pair.on_axis - pair.on_surface).dot(sum) < 0.0
 }
 
-/// Whether the sheet nearest to a point proves that the surface cuts itself there.
+/// Whether the sheet nearest to a point proves that the surface intersects itself there.
 ///
 /// A triangle separates a region of winding number `k` above it from one of `k + 1` below. On a closed surface that
-/// faces outwards and does not cut itself, `k` is 0. The tested points lie next to the closest point, above and below
-/// each triangle that touches it, so near that no fold is between them.
+/// faces outwards and does not intersect itself, `k` is 0. The tested points lie next to the closest point, above and
+/// below each triangle that touches it, so close that no fold is between them.
 #[must_use]
 pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
     let winds = |at: DVec3| winding_number(positions, triangles, at);
@@ -100,8 +100,8 @@ pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> 
         .any(|place| touching.iter().any(|triangle| proves(triangle, place)))
 }
 
-/// Whether a surface is shown to cut itself next to one of `points + 1` points of an axis, so that the depth along it
-/// jumps.
+/// Whether a surface is proven to intersect itself next to one of `points + 1` points of an axis, so that the depth
+/// jumps along the axis.
 #[must_use]
 pub fn is_cut_along(
     positions: &[Vec3],
@@ -116,12 +116,12 @@ pub fn is_cut_along(
     })
 }
 
-/// Parameter of the point on the segment from `a` (0) to `b` (1) nearest to a point.
+/// Parameter of the point on the segment from `a` (0) to `b` (1) that is nearest to a point.
 fn along(a: DVec3, b: DVec3, point: DVec3) -> f64 {
     ((point - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0)
 }
 
-/// An interval that holds the signed separation of a tool whose axis crosses a closed surface or is inside, from the
+/// An interval that contains the signed separation of a tool whose axis crosses a closed surface or is inside, from the
 /// depths of `points + 1` points of the axis.
 #[must_use]
 pub fn deepest_separation(
@@ -134,19 +134,19 @@ pub fn deepest_separation(
     for step in 0..=points {
         let at = tool.start.lerp(tool.end, step as f32 / points as f32);
         let nearest = exhaustive(positions, triangles, &Instrument::sphere(at, 0.0))?;
-        // Only a point farther from the surface than the deepest so far needs a side.
+        // The side is only needed for a point farther from the surface than the deepest so far.
         if nearest.axis_distance > deepest && is_inside(positions, triangles, at.as_dvec3())? {
             deepest = nearest.axis_distance;
         }
     }
-    // Depth changes by at most the length along the axis.
+    // The depth changes by at most the length along the axis.
     let between = f64::from(tool.start.distance(tool.end)) / f64::from(points) / 2.0;
     let radius = f64::from(tool.radius);
     Some((-radius - deepest - between, -radius - deepest))
 }
 
-/// An interval that holds the signed separation of any tool from a closed surface. If the axis is within `accuracy` of
-/// the surface, the interval covers crossing and not crossing; where the surface cuts itself, it covers both sides.
+/// An interval that contains the signed separation of any tool from a closed surface. If the axis is within `accuracy`
+/// of the surface, the interval covers crossing and not crossing; where it intersects itself, both sides.
 #[must_use]
 pub fn signed_separation(
     positions: &[Vec3],

@@ -1,5 +1,4 @@
-//! The benchmark's seeded streams: deformed surfaces with tools around them, a surface that pulses, and the beating
-//! heart.
+//! The benchmark's seeded streams: deformed surfaces with tools around them, one that pulses, and the beating heart.
 
 use std::f32::consts::TAU;
 
@@ -20,8 +19,8 @@ pub const CAPSULE_LENGTH: f32 = 60.0;
 
 /// Independent random deformations of one surface, each with a sphere and a capsule near it.
 ///
-/// A deformation is the paper's: every axis scaled on its own, long waves over the whole surface, one local bump, and a
-/// rotation. Its stretch is not bounded here: the user of a frame checks it.
+/// A deformation is the paper's: every axis scaled independently, long waves over the whole surface, one local bump,
+/// and a rotation. Its stretch is not limited here; the user of a frame checks it.
 ///
 /// A tool's distance from a random vertex is drawn so that separations on a brain are distributed as in the paper.
 pub struct Stream<'m> {
@@ -70,7 +69,7 @@ impl<'m> Stream<'m> {
         let scale = self.size / 240.0;
         let mut near = |nearest: f32, farthest: f32| {
             let from = positions[rng.usize(..positions.len())];
-            // Away from the surface's middle rather than into it.
+            // Away from the middle of the surface rather than into it.
             let outwards = unit(rng) + from.normalize_or_zero() * 0.8;
             from + outwards.normalize_or(Vec3::X)
                 * (nearest + (farthest - nearest) * rng.f32())
@@ -87,7 +86,7 @@ impl<'m> Stream<'m> {
     }
 }
 
-/// A surface with long waves that run over it, as the heartbeat and the breath move a brain.
+/// A surface with long waves that travel over it, as the heartbeat and breathing move a brain.
 ///
 /// The waves are as high and as long as those of a [`Stream`]'s frames.
 pub struct Pulse<'m> {
@@ -96,7 +95,7 @@ pub struct Pulse<'m> {
     waves: [Wave; 3],
 }
 
-/// Turns a second of each wave: heartbeat, breath, and one between them.
+/// Frequency (Hz) of each wave: heartbeat, breathing, and one between them.
 const PULSES: [f32; 3] = [1.0, 0.25, 0.6];
 
 impl<'m> Pulse<'m> {
@@ -110,7 +109,7 @@ impl<'m> Pulse<'m> {
         Self { rest, middle: (low + high) / 2.0, waves }
     }
 
-    /// The positions after so many seconds.
+    /// The positions at this time (s).
     pub fn deform(&self, seconds: f32, positions: &mut Vec<Vec3>) {
         positions.clear();
         positions.extend(self.rest.iter().map(|&rest| {
@@ -130,8 +129,8 @@ struct Wave {
 }
 
 impl Wave {
-    /// A wave over a surface whose diagonal is `size`. Lengths are in turns a mm: the shortest wave is somewhat less
-    /// than a third of the diagonal.
+    /// A wave over a surface whose diagonal is `size`. Wave vectors are in turns a mm: the shortest wave is slightly
+    /// shorter than a third of the diagonal.
     fn new(rng: &mut Rng, size: f32) -> Self {
         Self {
             along: unit(rng) * unit(rng) * (20.0 / TAU / size),
@@ -145,7 +144,7 @@ fn signed(rng: &mut Rng) -> Vec3 {
     Vec3::new(rng.f32(), rng.f32(), rng.f32()) * 2.0 - 1.0
 }
 
-/// A smooth wave of period and height 1, made of parabolas: sines would dominate the time of a run.
+/// A smooth wave of period and height 1, made of parabolas, because sines would dominate the run time.
 fn smooth_wave(turns: f32) -> f32 {
     // Adding and subtracting 1.5 * 2^23 rounds to the nearest whole turn, up to 2^22 turns.
     const ROUND: f32 = 12_582_912.0;
@@ -156,7 +155,7 @@ fn smooth_wave(turns: f32) -> f32 {
 /// Ticks a second of a control loop.
 pub const TICK_RATE: f32 = 1_000.0;
 
-/// A recorded motion, played at its recorded speed and sampled at every tick of a control loop.
+/// A recorded motion at its recorded speed, sampled at every tick of a control loop.
 pub struct Beat<'m> {
     motion: &'m Motion,
     middle: Vec3,
@@ -165,7 +164,7 @@ pub struct Beat<'m> {
 }
 
 impl<'m> Beat<'m> {
-    /// Plays a motion, over and over.
+    /// Repeats a motion.
     ///
     /// # Panics
     /// If it has no frame.
@@ -184,7 +183,7 @@ impl<'m> Beat<'m> {
         self.deform_at(tick as f32 / TICK_RATE, positions);
     }
 
-    /// The same after so many seconds.
+    /// The same at this time (s).
     pub fn deform_at(&self, seconds: f32, positions: &mut Vec<Vec3>) {
         let rate = if self.motion.rate > 0.0 { self.motion.rate } else { 25.0 };
         let frames = &self.motion.frames;
@@ -197,9 +196,9 @@ impl<'m> Beat<'m> {
             .extend(frames[first].iter().zip(&frames[second]).map(|(&a, &b)| a + (b - a) * share));
     }
 
-    /// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery, while its tip
-    /// sweeps around the surface and, every seven seconds, through the middle of it. The motion is the sum of a few
-    /// slow sines and a physiological tremor, the same as in `firmware-example`.
+    /// The instrument at a tick: a capsule that enters through a fixed port, as in keyhole surgery, while its tip moves
+    /// around the surface and, every seven seconds, through its middle. The motion is the sum of a few slow sines and a
+    /// physiological tremor, the same as in `firmware-example`.
     ///
     /// # Panics
     /// Never for finite frames.

@@ -1,11 +1,11 @@
-//! Stretch in f64, independent of the measurement under test: per triangle by singular values of the deformation
-//! gradient in an orthonormal frame, per edge by lengths.
+//! Stretch in f64, independent of the measurement under test: for triangles by singular values of the deformation
+//! gradient in an orthonormal basis, for edges by lengths.
 
 use dibs_build::Mesh;
 use dibs_nostd::format::PathKind;
 use glam::{DMat2, DVec2, DVec3, Vec3};
 
-/// The largest stretch of `now` against the rest shape, over all triangles or edges.
+/// The largest stretch of `now` relative to the rest shape, over all triangles or edges.
 #[must_use]
 pub fn largest(mesh: &Mesh, now: &[Vec3], paths: PathKind) -> f64 {
     (0..mesh.triangles.len()).map(|t| of_triangle(mesh, now, t, paths)).fold(0.0, f64::max)
@@ -34,8 +34,8 @@ fn largest_singular_value(rest: [DVec3; 3], now: [DVec3; 3]) -> f64 {
     (trace / 2.0 + root).sqrt()
 }
 
-/// Raises a triangle lower than 1/64 of its longest edge to that height, by a stretch across that edge: the measurement
-/// under test counts its rest shape so.
+/// Raises a triangle whose height is less than 1/64 of its longest edge to that height, by stretching it across that
+/// edge: the measurement under test treats rest shapes in the same way.
 fn higher(edges: DMat2) -> DMat2 {
     let (first, second) = (edges.x_axis, edges.y_axis);
     let longest = [first, second, second - first]

@@ -6,13 +6,13 @@ use glam::Vec3;
 
 /// A mesh and its tree.
 pub struct Surface {
-    /// At rest.
+    /// The mesh at rest.
     pub mesh: Mesh,
-    /// Its tree, of 16-bit indices.
+    /// Its tree, with 16-bit indices.
     pub tree: BuiltTree,
 }
 
-/// Positions, and the error (mm) that they state.
+/// Positions, and their stated error (mm).
 pub struct Inexact<'s>(pub &'s [Vec3], pub f32);
 
 impl VertexTable for Inexact<'_> {
@@ -127,7 +127,7 @@ pub fn slivers(rows: u32) -> Mesh {
     Mesh { positions, triangles, ..Mesh::default() }
 }
 
-/// A square grid around the origin, each of its squares cut in two, raised by a height function of x and y.
+/// A square grid around the origin, whose squares are cut in two, raised by a height function of x and y.
 #[must_use]
 pub fn sheet(cells: u32, size: f32, height: impl Fn(f32, f32) -> f32) -> Mesh {
     let at = |x: u32, y: u32| y * (cells + 1) + x;

@@ -1,4 +1,4 @@
-//! A tree's bytes, read by `docs/format.md` alone.
+//! Reads a tree's bytes only by `docs/format.md`.
 
 use dibs_nostd::format::CRC;
 
@@ -14,7 +14,7 @@ pub fn section(bytes: &[u8], kind: u32) -> (usize, usize) {
     (word(at + 4) as usize, word(at + 8) as usize)
 }
 
-/// Puts the right checksum into changed bytes.
+/// Corrects the checksum of changed bytes.
 ///
 /// # Panics
 /// If there are fewer bytes than a header has.

@@ -1,4 +1,4 @@
-//! A chain of tools that wanders.
+//! A chain of tools on a random walk.
 
 use dibs_nostd::Capsule;
 use fastrand::Rng;
@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::deform::unit;
 
-/// A chain of eight capsules that bends, and wanders through two hearts beside each other.
+/// A chain of eight capsules that bends on a random walk through two hearts beside each other.
 pub struct Wanderer {
     joints: [Vec3; 9],
     rng: Rng,
@@ -21,7 +21,7 @@ impl Wanderer {
         Self { joints, rng: Rng::with_seed(seed), time: 0.0 }
     }
 
-    /// Steps as a rule, rests or leaps now and then. Returns the capsules.
+    /// Usually steps, sometimes rests or leaps. Returns the capsules.
     ///
     /// # Panics
     /// Never: its joints stay finite.

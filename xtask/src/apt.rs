@@ -1,4 +1,4 @@
-//! Installs Debian packages where this needs no password.
+//! Installs Debian packages, if this needs no password.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,13 +8,13 @@ use anyhow::{Result, bail};
 
 use crate::process::quiet;
 
-/// More than the limits below.
+/// Longer than the two timeouts below together.
 const LIMIT: Duration = Duration::from_secs(620);
 
-/// Seconds in which packages are installed.
+/// Timeout of an installation, in seconds.
 const INSTALL: &str = "600";
 
-/// Seconds after which an update hangs, and the times that it is tried. It takes some ten seconds.
+/// Timeout of an update, in seconds, and the number of attempts. An update takes some ten seconds.
 const UPDATE: &str = "90";
 const TRIES: usize = 3;
 
@@ -28,7 +28,7 @@ pub fn install(packages: &[&str]) -> Result<()> {
     if !root && quiet(Command::new("sudo").args(["-n", "true"]), seconds).is_err() {
         bail!("installing packages needs root, and `sudo -n` asks for a password");
     }
-    // `timeout` ends what `sudo` started, so that no lock is left to the next try.
+    // `timeout` also ends what `sudo` started, so that no lock remains for the next attempt.
     let apt = |seconds: &str, arguments: &[&str]| {
         let mut command = Command::new(if root { "timeout" } else { "sudo" });
         if !root {

@@ -26,7 +26,7 @@ fn version() -> Result<String> {
     Ok(text.lines().next().unwrap_or_default().to_owned())
 }
 
-/// Builds the program for a tree of so many vertices; it links only if the library has no panic path.
+/// Builds the program for a tree with this number of vertices; it links only if the library has no panic path.
 pub fn build(cross: &Cross, tree: &[u8], vertices: u32) -> Result<PathBuf> {
     let library = c_interface::build(cross, "")?;
     let sources = workspace::root().join("examples/c/firmware");
@@ -35,7 +35,7 @@ pub fn build(cross: &Cross, tree: &[u8], vertices: u32) -> Result<PathBuf> {
     fs::write(folder.join("surface.dibs"), tree)?;
     let program = folder.join("firmware");
     let mut gcc = Command::new(COMPILER);
-    // The options that a user types too; paths in them start from that folder.
+    // The options that a user would type; paths in them are relative to that folder.
     gcc.current_dir(&sources).arg("@flags").arg("-I").arg(&folder);
     gcc.arg(format!("-DSURFACE_VERTICES={vertices}"));
     gcc.args(names(&sources)?).arg(&library).arg("-o").arg(&program);
@@ -43,7 +43,6 @@ pub fn build(cross: &Cross, tree: &[u8], vertices: u32) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// The source files, in order.
 fn names(sources: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(sources)?.collect::<std::io::Result<Vec<_>>>()?;
     let names = entries.iter().map(|entry| PathBuf::from(entry.file_name()));

@@ -23,7 +23,7 @@ pub fn build(cross: &Cross, features: &str) -> Result<PathBuf> {
 }
 
 /// Links every function of the header. A panic path that the compiler did not remove calls a symbol that does not
-/// exist, and breaks the link. A planted panic path must break it too: otherwise the check shows nothing.
+/// exist, so the link fails. With a planted panic path it must fail: otherwise the check proves nothing.
 pub fn has_no_panic_path(cross: &Cross) -> Result<Outcome> {
     let header = fs::read_to_string(workspace::root().join("bindings/c/include/dibs.h"))?;
     let functions = functions(&header);
@@ -40,7 +40,7 @@ pub fn has_no_panic_path(cross: &Cross) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// The functions that a header declares for the board: the sender is for a computer.
+/// The functions that a header declares for the board; the sender is for a host computer only.
 fn functions(header: &str) -> Vec<&str> {
     let declarations = header.lines().filter(|line| !line.starts_with([' ', '#', '/']));
     let names = declarations.filter_map(|line| {
@@ -55,7 +55,7 @@ fn functions(header: &str) -> Vec<&str> {
 fn link(library: &PathBuf, functions: &[&str]) -> Result<Option<String>> {
     let mut linker = Command::new(toolchain::linker()?);
     linker.args(["-flavor", "gnu", "--gc-sections", "--entry", "0"]);
-    // The second is an error where the library has no such function.
+    // `--undefined` makes it an error if the library lacks a function.
     linker.args(functions.iter().map(|function| format!("--undefined={function}")));
     linker.args(functions.iter().map(|function| format!("--defsym=has_{function}={function}")));
     linker.arg(library).arg("-o").arg(workspace::target().join("dibs-c-linked"));

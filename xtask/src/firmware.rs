@@ -12,21 +12,21 @@ use crate::toolchain::Cross;
 pub struct Surface {
     /// A mesh file, or the generated heart.
     pub mesh: Option<PathBuf>,
-    /// The limits on stretch.
+    /// The stretch limits.
     pub limits: Limits,
-    /// The cells of the lattice whose nodes carry it, if any do.
+    /// The cells of the lattice whose nodes move it, if any.
     pub nodes: Option<[u32; 3]>,
 }
 
 /// How far a surface may be stretched.
 pub enum Limits {
-    /// Everywhere alike.
+    /// One limit for all triangles.
     Stretch(f32),
     /// A file with a limit for each triangle.
     File(PathBuf),
 }
 
-/// The generated heart's limit on stretch, as in the paper; its motion stays within it.
+/// The generated heart's stretch limit, as in the paper; its motion stays within it.
 pub const HEART_STRETCH: f32 = 1.5;
 
 impl Default for Surface {
@@ -35,7 +35,7 @@ impl Default for Surface {
     }
 }
 
-/// Builds the firmware; it links only if no panic path survived.
+/// Builds the firmware; it links only if no panic path remains.
 pub fn build(cross: &Cross, surface: &Surface) -> Result<PathBuf> {
     run(&mut command(cross, surface)).context("the firmware does not build")?;
     Ok(cross.program("firmware", "board"))
@@ -48,7 +48,7 @@ pub fn command(cross: &Cross, surface: &Surface) -> Command {
     cargo
 }
 
-/// Completes a `cargo build` of the firmware.
+/// Adds the arguments for the firmware to a `cargo build`.
 pub fn describe(cargo: &mut Command, surface: &Surface) {
     cargo.args(["--quiet", "--package", "firmware-example", "--bin", "board"]);
     cargo.args(["--features", "board", "--profile", "firmware"]);
@@ -56,8 +56,8 @@ pub fn describe(cargo: &mut Command, surface: &Surface) {
 }
 
 impl Surface {
-    /// Passes the surface to the build script. The default surface sets no variable, because cargo rebuilds at any
-    /// change of these variables.
+    /// Passes the surface to the build script. For the default surface no variable is set, because cargo rebuilds when
+    /// these variables change.
     pub fn describe_to(&self, cargo: &mut Command) {
         match &self.mesh {
             Some(mesh) => cargo.env("DIBS_MESH", mesh),

@@ -11,8 +11,8 @@ use clap::{Parser, Subcommand};
 use prove::Passed;
 use xtask::nightly;
 
-/// Finds or installs the cross toolchain and the emulator where a task needs them.
-/// `DIBS_CROSS=rustup|debian|none` forces one way to build for the board.
+/// Finds or installs the cross toolchain and the emulator if a task needs them. `DIBS_CROSS=rustup|debian|none` selects
+/// one way to build for the board.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
 struct Arguments {
@@ -29,7 +29,8 @@ enum Task {
     /// Runs the paper's experiments.
     #[command(disable_help_flag = true)]
     Bench(Passed),
-    /// Asks other libraries by their Python packages, and writes docs/evidence/peers.json and docs/evidence/peers.md.
+    /// Queries other libraries through their Python packages, and writes docs/evidence/peers.json and
+    /// docs/evidence/peers.md.
     #[command(disable_help_flag = true)]
     Peers(Passed),
     /// Measures every promise, and writes docs/evidence/guarantees.json and docs/evidence/guarantees.md.
@@ -51,7 +52,7 @@ enum Task {
     Processors(Passed),
     /// Runs the tests of frames, bus and format under the address and the thread sanitizer.
     Sanitize,
-    /// Runs the tests of the frames under Miri, where it is installed.
+    /// Runs the tests of the frames under Miri, if it is installed.
     Miri,
 }
 

@@ -17,7 +17,7 @@ const DOWNLOAD: Duration = Duration::from_secs(300);
 /// The fuzz targets in `tests/fuzz/`.
 pub const TARGETS: [&str; 4] = ["tree", "packets", "mesh", "query"];
 
-/// A target that runs only when it is named: its readers compile for long.
+/// A target that runs only if it is requested by name: its readers take long to compile.
 const FORMATS: &str = "formats";
 
 /// Runs every fuzz target, two at a time.
@@ -49,7 +49,7 @@ pub struct Sanitized {
     pub findings: u64,
 }
 
-/// The reason for which neither fuzzers nor sanitizers can run, or `None`. Tries to install the nightly compiler first.
+/// Why neither fuzzers nor sanitizers can run, or `None`. Tries to install the nightly compiler first.
 pub fn missing() -> Option<String> {
     let found = || quiet(Command::new("cargo").args(["+nightly", "--version"]), MOMENT).is_ok();
     if found() {
@@ -73,7 +73,7 @@ fn nightly(arguments: &[&str]) -> Command {
     cargo
 }
 
-/// Runs the fuzz targets. The caller judges their findings.
+/// Runs the fuzz targets. The caller evaluates their findings.
 pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
     if quiet(Command::new("cargo").args(["fuzz", "--version"]), MOMENT).is_err() {
         let mut cargo = Command::new("cargo");
@@ -131,7 +131,7 @@ pub fn fuzz(options: &FuzzOptions) -> Result<Vec<Fuzzed>> {
     Ok(fuzzed)
 }
 
-/// Runs the fuzz targets for a user: an error names the finding.
+/// Runs the fuzz targets on request: a finding is an error.
 pub fn fuzz_by_hand(options: &FuzzOptions) -> Result<()> {
     for Fuzzed { target, inputs, finding } in fuzz(options)? {
         println!("{target}: {inputs} inputs in {} s", options.seconds);
@@ -160,13 +160,13 @@ pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
             cargo.args(["--test", name]);
         }
         cargo.arg("--target-dir").arg(workspace::target().join(sanitizer));
-        // A few small trees are built sooner by a builder that is compiled sooner.
+        // The tests build a few small trees: a builder with little optimisation compiles faster.
         cargo.args(["--config", "profile.dev.package.dibs-build.opt-level=1"]);
-        // One test at a time: side by side, tests of two threads wait long for each other.
+        // One test at a time, because parallel tests with two threads each wait long for each other.
         cargo.args(["--", "--test-threads=1"]).args(arguments);
         let flags = format!("-Zsanitizer={sanitizer} -Cunsafe-allow-abi-mismatch=sanitizer");
         cargo.env("RUSTFLAGS", flags).env("CARGO_PROFILE_DEV_DEBUG", "line-tables-only");
-        // A test leaks its frames on purpose.
+        // A test leaks its frames intentionally.
         cargo.env("ASAN_OPTIONS", "detect_leaks=0");
         let suppressions = workspace::root().join("tests/soundness/tsan.txt");
         cargo.env("TSAN_OPTIONS", format!("suppressions={}", suppressions.display()));
@@ -198,7 +198,7 @@ pub fn sanitize(sanitizer: &str) -> Result<Sanitized> {
     Ok(Sanitized { tests: passed.sum(), findings })
 }
 
-/// Runs both sanitizers for a user: findings are an error.
+/// Runs both sanitizers on request: a finding is an error.
 pub fn sanitize_by_hand() -> Result<()> {
     for sanitizer in ["address", "thread"] {
         let Sanitized { tests, findings } = sanitize(sanitizer)?;
@@ -208,7 +208,7 @@ pub fn sanitize_by_hand() -> Result<()> {
     Ok(())
 }
 
-/// The reason for which Miri cannot run here, or `None`.
+/// Why Miri cannot run, or `None`.
 pub fn miri_missing() -> Option<String> {
     let found = quiet(&mut nightly(&["miri", "--version"]), MOMENT).is_ok();
     (!found).then(|| {

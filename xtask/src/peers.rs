@@ -1,4 +1,5 @@
-//! `cargo xtask peers`: `tests/peers`, which asks other libraries by their Python packages, in an environment of its own.
+//! `cargo xtask peers`: runs `tests/peers`, which queries other libraries through their Python packages, in its own
+//! environment.
 
 use std::fs;
 use std::path::Path;
@@ -8,7 +9,7 @@ use anyhow::Result;
 use xtask::process::run;
 use xtask::{python, workspace};
 
-/// Installs the libraries, and runs the tests of the counts before anything is counted.
+/// Installs the libraries, and runs the tests of the counting before anything is counted.
 pub fn peers(arguments: &[String]) -> Result<()> {
     let folder = workspace::target().join("peers");
     let source = workspace::root().join("tests/peers");
@@ -26,7 +27,7 @@ pub fn peers(arguments: &[String]) -> Result<()> {
     run(command().arg(&source).arg("--folder").arg(folder.join("cases")).args(arguments))
 }
 
-/// One by one where not all can be had: the page says which are missing.
+/// Installs the libraries one by one if some are unavailable: the page says which are missing.
 fn install_each(python: &Path, requirements: &Path) -> Result<()> {
     let lines = fs::read_to_string(requirements)?;
     let lines: Vec<&str> = lines.lines().filter(|line| !line.starts_with('#')).collect();

@@ -17,8 +17,8 @@ pub fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a command quietly and returns its standard output. On failure the error holds the last line of its output.
-/// After `limit` the command is killed.
+/// Runs a command without showing its output, and returns its standard output. On failure the error contains the last
+/// line of its output. After `limit` the command is killed.
 pub fn quiet(command: &mut Command, limit: Duration) -> Result<String> {
     let name = shown(command);
     let mut child = command
@@ -64,7 +64,7 @@ pub fn shown(command: &Command) -> String {
 
 fn text(mut pipe: impl Read) -> String {
     let mut bytes = Vec::new();
-    // After a read error, the output so far still serves the message.
+    // After a read error the output so far is still useful for the message.
     let _ = pipe.read_to_end(&mut bytes);
     String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -5,10 +5,10 @@ use std::process::Command;
 use anyhow::Result;
 use xtask::workspace;
 
-/// The crate that has other libraries beside ours.
+/// The crate that also contains other libraries, for comparison.
 const BENCH: &str = "dibs-bench";
 
-/// Arguments that are passed on as they are.
+/// Arguments that are passed on unchanged.
 #[derive(clap::Args)]
 pub struct Passed {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -23,7 +23,7 @@ fn command(package: &str) -> Command {
     cargo
 }
 
-/// The program, built together with everything else.
+/// The program, built together with the whole workspace.
 pub fn with_workspace() -> Result<Command> {
     workspace::build()?;
     let mut prove = Command::new(workspace::target().join("release/prove"));
@@ -41,7 +41,7 @@ pub fn bench(passed: &Passed) -> Result<()> {
     end(command(BENCH).args(&passed.arguments))
 }
 
-/// Runs a program that prints its error, and exits with its code.
+/// Runs a program that prints its own errors, and exits with its code.
 fn end(command: &mut Command) -> Result<()> {
     match command.status()?.code() {
         Some(0) => Ok(()),

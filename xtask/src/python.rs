@@ -19,7 +19,7 @@ const OLDEST: &str = "import sys; assert sys.version_info >= (3, 9), 'older than
 /// A virtual environment with these packages. Returns its Python.
 ///
 /// # Errors
-/// If there is no Python that serves, or a package cannot be had.
+/// If there is no suitable Python, or a package is unavailable.
 pub fn environment(folder: &Path, packages: &[&str]) -> Result<PathBuf> {
     let mut python = Command::new("python3");
     quiet(python.args(["-c", OLDEST]), MOMENT).context("no Python that serves")?;
@@ -36,7 +36,7 @@ pub fn environment(folder: &Path, packages: &[&str]) -> Result<PathBuf> {
 /// Installs packages into the environment of this Python, from wheels.
 ///
 /// # Errors
-/// If one cannot be had.
+/// If a package is unavailable.
 pub fn install(python: &Path, packages: &[&str]) -> Result<()> {
     let mut pip = Command::new(python);
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
@@ -44,8 +44,8 @@ pub fn install(python: &Path, packages: &[&str]) -> Result<()> {
     quiet(&mut pip, DOWNLOAD).context("Python packages cannot be had").map(drop)
 }
 
-/// Puts the package together from its Python half and the library of the workspace's build, which is there already: a
-/// wheel would compile its dependencies anew. Returns the folder for `PYTHONPATH`.
+/// Assembles the package from its Python part and the library of the workspace's build, because building a wheel would
+/// compile the dependencies again. Returns the folder for `PYTHONPATH`.
 ///
 /// # Errors
 /// If something does not compile or cannot be copied.

@@ -15,10 +15,10 @@ const PROGRAM: &str = "qemu-system-arm";
 /// executes one instruction a cycle.
 const SHIFT: u32 = 1;
 
-/// Instructions that the processor executes while the board's 25 MHz clock counts one.
+/// Instructions for each count of the board's 25 MHz clock.
 pub const INSTRUCTIONS_A_COUNT: u32 = 40 >> SHIFT;
 
-/// Arguments of a machine that has nothing but semihosting.
+/// Arguments of a machine that only needs semihosting.
 pub const HEADLESS: [&str; 8] = [
     "-display",
     "none",
@@ -52,7 +52,7 @@ pub enum Time {
 }
 
 /// The time of a Cortex-M7 at about 480 MHz. While the processor sleeps, counted time jumps to the next interrupt; real
-/// time would overshoot by this computer's wake-up delay.
+/// time would overshoot by the host's wake-up latency.
 pub const BOARD: Time = Time::Counted(SHIFT);
 
 /// The command that boots a program with these arguments, without serial lines: the program needs only semihosting.
@@ -77,8 +77,8 @@ pub enum Bus {
     Ethernet(String),
 }
 
-/// The command that boots `program` for `ticks` control ticks, with a word for the instrument's robot. Its telemetry is
-/// UART 1, connected to the socket `telemetry`.
+/// The command that boots `program` for `ticks` control ticks, with the argument `robot`. Its telemetry is UART 1,
+/// connected to the socket `telemetry`.
 pub fn command(program: &Path, robot: &str, bus: &Bus, telemetry: &Path, ticks: u32) -> Command {
     // The firmware reads its robot, its bus and its run length from the arguments.
     let (bus_word, serial) = match bus {

@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use crate::process::run;
 use crate::workspace;
 
-/// Most lines of an error that the list repeats. One is too few: a list of broken promises starts with a heading.
+/// Most lines of an error in the list. One line is not enough: a list of broken promises starts with a heading.
 const REASON_LINES: usize = 4;
 
 const PASSED: &str = "passed";
@@ -59,7 +59,7 @@ impl Steps {
         self.lines.push(line);
     }
 
-    /// Writes the steps to a file, for the program that started this one.
+    /// Writes the steps to a file, for the parent process.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -89,7 +89,7 @@ impl Steps {
         let count = |word| self.lines.iter().filter(|line| line.starts_with(word)).count();
         println!("\n{}", self.lines.join("\n"));
         println!("{} passed, {} failed", count(PASSED), count(FAILED));
-        // The list names the failures, and stays the last output.
+        // The list names the failures, so it must be the last output.
         if count(FAILED) > 0 {
             std::process::exit(1);
         }

@@ -25,18 +25,18 @@ pub struct Options {
     /// Seconds of the controller's time in the demo.
     #[arg(long, default_value_t = 5)]
     pub demo_seconds: u32,
-    /// Also the slow tests: an empty crate brought to an answer on the board by the guide alone, the firmware once more in
-    /// another folder, the viewer's and its query in WebAssembly, the paper's experiments in small, a filter, an embedded
-    /// organ, modal ticks and a flood on the board, other processors, the sanitizers, the fuzzers, and all cases of tests
-    /// that else try a quarter.
+    /// Also the slow tests: a new user's path from an empty crate to an answer on the board by the guide, the firmware
+    /// built again in another folder, the viewer's tests and its query in WebAssembly, small runs of the paper's
+    /// experiments, a filter, an embedded organ, modal ticks and a flood on the board, other processors, the
+    /// sanitizers, the fuzzers, and all cases of tests that otherwise run a quarter.
     #[arg(long)]
     pub whole: bool,
-    /// Only these steps, for machines that run side by side; by default all.
+    /// Only these steps, for machines that run in parallel; by default all.
     #[arg(long)]
     pub job: Option<Job>,
 }
 
-/// Steps that belong together.
+/// Groups of steps.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Job {
     /// Format and lints.
@@ -62,10 +62,10 @@ pub fn test(options: &Options) -> Result<()> {
     if is_due(Job::Host) || is_due(Job::Promises) {
         steps.run("build", || workspace::build().map(|()| Outcome::Passed));
     }
-    // Found first, since all threads would install them.
+    // Found first, because otherwise all threads would install them.
     let found = (is_due(Job::Board) || is_due(Job::Promises))
         .then(|| Cross::find().and_then(|cross| qemu::find().map(|_| cross)));
-    // Threads, because tests, builds and emulators each leave a core idle now and then.
+    // Threads, because tests, builds and emulators each leave a core idle at times.
     let checks = is_due(Job::Promises).then(|| thread::spawn(move || checks(seconds, is_whole)));
     let board = found
         .filter(|_| is_due(Job::Board))
@@ -101,7 +101,7 @@ fn panicked() -> anyhow::Error {
     anyhow!("the thread panicked")
 }
 
-/// The paper's experiments, which are no default member of the workspace, are compiled and run only with `--whole`.
+/// The paper's experiments are not a default member of the workspace: they are compiled and run only with `--whole`.
 const fn bench_too(is_whole: bool) -> &'static [&'static str] {
     if is_whole { &["--workspace"] } else { &[] }
 }
@@ -110,7 +110,7 @@ fn lints(steps: &mut Steps, is_whole: bool) {
     steps.cargo("format", &["fmt", "--all", "--check"], &[]);
     let board = ["fmt", "--check", "--manifest-path", "examples/stm32h743/Cargo.toml"];
     steps.cargo("format of the board apart", &board, &[]);
-    // Lints and documentation take the tests' profile, so that common dependencies are built once.
+    // Lints and documentation use the tests' profile, so that common dependencies are built once.
     let lints = ["clippy", "--release", "--all-targets"];
     let lints = [&lints, bench_too(is_whole), &["--", "-D", "warnings"]].concat();
     steps.cargo("lints", &lints, &[]);
@@ -161,7 +161,7 @@ fn board(found: Result<Cross>, is_whole: bool) -> Steps {
 /// Runs the checks of `tests/prove`. Returns the file with the list of its steps.
 fn checks(demo_seconds: u32, is_whole: bool) -> Result<PathBuf> {
     let list = workspace::target().join("steps.txt");
-    // An earlier run's list must not be taken for this run's.
+    // A list of an earlier run must not be mistaken for this run's.
     std::fs::write(&list, "")?;
     let mut prove = prove::with_workspace()?;
     prove.args(["test", "--demo-seconds", &demo_seconds.to_string(), "--steps"]).arg(&list);
@@ -172,10 +172,10 @@ fn checks(demo_seconds: u32, is_whole: bool) -> Result<PathBuf> {
     Ok(list)
 }
 
-/// Files that other programs write now, by those that are installed.
+/// Compares with files that other programs write, if they are installed.
 fn other_programs() -> Result<Outcome> {
     let mut command = Command::new("cargo");
-    // All packages, so that cargo reuses the tests' build.
+    // All packages, so that cargo reuses the build of the tests.
     command.args([
         "test",
         "--release",
@@ -229,10 +229,10 @@ fn oldest_compiler() -> Result<Outcome> {
     run(command.current_dir(workspace::root())).map(|()| Outcome::Passed)
 }
 
-/// The core crate compiles for the board with only `core`: with all layers and the traits of other crates, and with every smaller set of
-/// layers.
+/// The core crate compiles for the board with only `core`: with all layers and the traits of other crates, and with
+/// each smaller set of layers.
 fn core_crate(cross: &Cross) -> Result<Outcome> {
-    // The firmware's profile, whose dependencies are needed anyway.
+    // The firmware's profile, because its dependencies are needed anyway.
     let check = || {
         let mut check = cross.cargo("check");
         check.args(["--quiet", "--profile", "firmware", "--package", "dibs-nostd"]);
@@ -258,7 +258,7 @@ fn firmware_lints(cross: &Cross, is_whole: bool) -> Result<Outcome> {
         command.args(["--features", program, "--profile", "firmware", "--", "-D", "warnings"]);
         run(&mut command)?;
     }
-    // The drivers take as long again to check as to build.
+    // Checking the drivers would take as long again as building them.
     let buses: &[&[&str]] = &[&[], &["--features", "fdcan"]];
     for bus in buses.iter().filter(|_| is_whole) {
         let mut command = cross.cargo_apart("examples/stm32h743", "clippy");
@@ -277,8 +277,8 @@ fn new_user(cross: &Cross) -> Result<Outcome> {
     run(command.args(["--", "--ignored"])).map(|()| Outcome::Passed)
 }
 
-/// Runs the program that measures cycles on silicon. In the emulator the cycle counter stands still, and the program
-/// counts `SysTick` instead; it must still end and print constants.
+/// Runs the program that measures cycles on real hardware. In the emulator the cycle counter does not count, and the
+/// program uses `SysTick` instead; it must still end and print constants.
 fn cycles(cross: &Cross) -> Result<Outcome> {
     let mut cargo = cross.cargo("build");
     cargo.args(["--quiet", "--package", "firmware-example", "--bin", "cycles"]);

@@ -1,8 +1,8 @@
 //! Chooses the toolchain that builds for the board; no other code does.
 //!
-//! The first of these that works: the toolchain in use has the target; `rustup target add` adds it; Debian's own
+//! It uses the first of these that works: the present toolchain has the target; `rustup target add` adds it; Debian's
 //! toolchain builds it together with `core`. Otherwise a message gives the manual steps. `DIBS_CROSS=rustup|debian`
-//! forces one of them, `DIBS_CROSS=none` refuses all.
+//! selects one of them, `DIBS_CROSS=none` refuses all.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -25,9 +25,9 @@ const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 
 /// A toolchain that builds for the board.
 pub enum Cross {
-    /// The toolchain in use has the target.
+    /// The present toolchain has the target.
     Rustup,
-    /// Debian's compiler with `core` built from source, and the linker of the toolchain in use.
+    /// Debian's compiler with `core` built from source, and the linker of the present toolchain.
     Debian {
         /// `rust-lld`.
         linker: PathBuf,
@@ -47,16 +47,16 @@ impl Cross {
         }
     }
 
-    /// `cargo SUBCOMMAND` for the board. Each toolchain has its own target folder, so that two compilers do not
-    /// discard each other's output.
+    /// `cargo SUBCOMMAND` for the board. Each toolchain has its own target folder, so that two compilers do not discard
+    /// each other's output.
     pub fn cargo(&self, subcommand: &str) -> Command {
         let mut command = self.cargo_in(&self.target_dir(), subcommand);
         command.current_dir(workspace::root());
         command
     }
 
-    /// `cargo SUBCOMMAND` for a board whose crate is apart from the workspace. With a target folder of its own it does not
-    /// wait for other builds.
+    /// `cargo SUBCOMMAND` for a board whose crate is not in the workspace. It has its own target folder, so that it
+    /// does not wait for other builds.
     pub fn cargo_apart(&self, folder: &str, subcommand: &str) -> Command {
         let mut command = self.cargo_in(&self.target_dir_apart(folder), subcommand);
         command.current_dir(workspace::root().join(folder));
@@ -98,7 +98,7 @@ impl Cross {
                     .env("RUSTC", DEBIAN_RUSTC)
                     .env("RUSTC_BOOTSTRAP", "1")
                     .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker)
-                    // `tests/prove` reads the stack frame of every function from it.
+                    // `tests/prove` reads the size of every function's stack frame from it.
                     .env("RUSTFLAGS", "-Zemit-stack-sizes")
                     .env_remove("RUSTUP_TOOLCHAIN");
                 command
@@ -113,7 +113,7 @@ impl Cross {
         self.target_dir().join(TARGET).join(profile).join(name)
     }
 
-    /// One line for the user.
+    /// A description in one line.
     pub fn describe(&self) -> String {
         match self {
             Self::Rustup => format!("rustup toolchain with {TARGET}"),
@@ -136,10 +136,10 @@ fn rustup() -> Result<Cross> {
     add_target(TARGET).map(|()| Cross::Rustup)
 }
 
-/// Finds a target in the toolchain in use, or adds it.
+/// Finds a target in the present toolchain, or adds it.
 ///
 /// # Errors
-/// If it is not there and rustup cannot add it.
+/// If the target is missing and rustup cannot add it.
 pub fn add_target(target: &str) -> Result<()> {
     if target_installed(target) {
         return Ok(());

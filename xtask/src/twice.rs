@@ -1,4 +1,4 @@
-//! The firmware is the same, bit by bit, wherever its checkout is.
+//! Checks that the firmware is the same, bit for bit, in whatever folder the checkout is.
 
 // Requirement: P-12
 
@@ -14,10 +14,10 @@ use crate::process::{quiet, run};
 use crate::toolchain::Cross;
 use crate::workspace;
 
-/// Builds the firmware once more, in a copy of the checkout with a longer path, and compares what a loader would load. Debug
-/// information has the folder's name, and is not loaded.
+/// Builds the firmware again in a copy of the checkout with a longer path, and compares the bytes that a loader would
+/// load. Debug information contains the folder's name, but is not loaded.
 ///
-/// The copy stays below the target folder, so that the next comparison compiles what changed.
+/// The copy stays below the target folder, so that the next comparison only compiles changes.
 ///
 /// # Errors
 /// If a copy, a build or the comparison fails.
@@ -44,14 +44,14 @@ pub fn same_bytes(cross: &Cross) -> Result<()> {
     Ok(())
 }
 
-/// Copies the files that belong to the repository. Those that have not changed keep their times, by which cargo goes.
+/// Copies the files of the repository. Unchanged files keep their times, which cargo compares.
 fn copy_to(copy: &Path) -> Result<()> {
     let mut git = Command::new("git");
     git.args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]);
     let listed = quiet(git.current_dir(workspace::root()), Duration::from_secs(20))?;
     for name in listed.split('\0').filter(|name| !name.is_empty()) {
         let (from, to) = (workspace::root().join(name), copy.join(name));
-        // One that is deleted and not committed yet.
+        // A file that is deleted but whose deletion is not committed yet.
         if !from.is_file() {
             continue;
         }
@@ -64,10 +64,10 @@ fn copy_to(copy: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The segments that a loader loads, each with its place, one after the other: of a 32-bit little-endian ELF file.
+/// The segments that a loader would load from a 32-bit little-endian ELF file, each with its address.
 ///
 /// # Errors
-/// If it is none.
+/// If it is not such a file.
 pub fn loaded(file: &[u8]) -> Result<Vec<u8>> {
     let half = |at: usize| Some(u16::from_le_bytes(file.get(at..)?.first_chunk::<2>().copied()?));
     let word = |at: usize| Some(u32::from_le_bytes(*file.get(at..)?.first_chunk::<4>()?) as usize);

@@ -26,7 +26,7 @@ pub struct Options {
     record: bool,
 }
 
-/// Builds the page and, if asked to, tests it.
+/// Builds the page and, if requested, tests it.
 pub fn viewer(options: &Options) -> Result<()> {
     let folder = session()?;
     programs(&[("node", "nodejs"), ("npm", "npm")])?;
@@ -39,7 +39,7 @@ pub fn viewer(options: &Options) -> Result<()> {
     let page = workspace::target().join("viewer").join(PAGE);
     copy_whole(&folder.join(PAGE), &page)?;
     println!("{}", page.display());
-    // Beside every `dibs` there is: `dibs view` looks there.
+    // Beside every build of `dibs`, because `dibs view` looks there.
     for profile in ["release", "debug"] {
         let beside = workspace::target().join(profile);
         if beside.is_dir() {
@@ -58,7 +58,7 @@ pub fn viewer(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// The session compiles for WebAssembly: CI's sample of the viewer, whose tests are on request.
+/// Checks that the session compiles for WebAssembly: this stands for the viewer in CI, whose tests run on request.
 pub fn compiles() -> Result<Outcome> {
     if let Err(error) = add_target() {
         return Ok(Outcome::Skipped(format!("{error:#}")));
@@ -151,12 +151,12 @@ fn programs(needed: &[(&str, &str)]) -> Result<()> {
     Ok(())
 }
 
-/// What is done, for the one who waits.
+/// Prints what is being done.
 fn say(what: &str) {
     eprintln!("{what} ...");
 }
 
-/// Copies a file so that nobody sees a part of it.
+/// Copies a file so that a partial copy is never visible.
 fn copy_whole(from: &Path, to: &Path) -> Result<()> {
     let part = to.with_extension(format!("{}.part", std::process::id()));
     fs::copy(from, &part)?;

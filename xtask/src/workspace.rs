@@ -8,8 +8,8 @@ use anyhow::Result;
 
 use crate::process::run;
 
-/// The repository's top folder: of the package that cargo runs, of this program, or the current folder's. It is looked
-/// for at each start, so that a copy of the checkout, target folder included, works on itself.
+/// The repository's top folder: that of the package that cargo runs, of this program, or of the current folder. It is
+/// determined at each start, so that a copy of the checkout, including its target folder, works on itself.
 pub fn root() -> PathBuf {
     let starts = [
         env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from),
@@ -26,7 +26,7 @@ pub fn root_above(start: &Path) -> Option<&Path> {
     start.ancestors().find(|folder| holds(folder, "xtask") && holds(folder, "dibs-nostd"))
 }
 
-/// The variable that tells tests and checks that [`build`] has run: they take what it made, in release.
+/// The variable that tells tests and checks that [`build`] has run, so that they use its results.
 const BUILT: &str = "DIBS_BUILT";
 
 /// For the processes that run after [`build`].
@@ -37,8 +37,7 @@ pub fn is_built() -> bool {
     env::var_os(BUILT).is_some()
 }
 
-/// Builds every program and library, as the tests do: alone, each would compile its dependencies anew, with fewer
-/// features.
+/// Builds everything as the tests do: built separately, each would compile its dependencies again, with fewer features.
 ///
 /// # Errors
 /// If something does not compile.

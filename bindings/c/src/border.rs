@@ -1,8 +1,8 @@
-//! The border: the pointers that a C caller hands over, and nearly all of the code that trusts them.
+//! The border: the pointers that a C caller passes, and nearly all of the code that trusts them.
 //!
-//! Only the header's functions call these, with the pointers that C gave them. The header states the contract: a pointer
-//! is null, or it points to as much as its function says, for as long as it says. Null, misalignment, another kind of
-//! object and an object in use are found here, and become codes.
+//! Only the functions of the header use these traits, with the pointers that C passed. The header states the contract:
+//! a pointer is null, or it points to as much as its function says, for as long as it says. Null, misalignment, an
+//! object of another kind and an object in use are detected here, and become codes.
 
 // Requirements: P-04, P-06
 
@@ -22,16 +22,16 @@ use crate::code::dibs_code;
 /// Alignment, in bytes, of the storage of every object.
 pub const DIBS_ALIGNMENT: usize = 8;
 
-/// A value that any bits make.
+/// A type for which any bits are a valid value.
 ///
 /// # Safety
-/// Any bits are a value of the type.
+/// Any bits must be a valid value of the type.
 pub unsafe trait AnyBits: Copy {}
 
-// SAFETY: the trait's own promise.
+// SAFETY: `AnyBitPattern` promises the same.
 unsafe impl<T: AnyBitPattern> AnyBits for T {}
 
-/// A pointer to a value, or to the first of several, that is read.
+/// A pointer to one or several values that are read.
 pub trait Input<T>: Sized {
     /// A copy of the value.
     fn get(self) -> Result<T, dibs_code>;
@@ -39,7 +39,7 @@ pub trait Input<T>: Sized {
     /// The same, or `None` for a null pointer.
     fn get_if_any(self) -> Result<Option<T>, dibs_code>;
 
-    /// So many values, which stay as long as the header says.
+    /// Several values, which are valid as long as the header says.
     fn slice(self, count: usize) -> Result<&'static [T], dibs_code>
     where
         T: 'static;
@@ -48,7 +48,7 @@ pub trait Input<T>: Sized {
 impl<T: AnyBits> Input<T> for *const T {
     fn get(self) -> Result<T, dibs_code> {
         check(self)?;
-        // SAFETY: neither null nor misaligned, so the caller promises a value; any bits are one of this type.
+        // SAFETY: neither null nor misaligned, so the caller promises a value; any bits are a valid one.
         Ok(unsafe { self.read() })
     }
 
@@ -69,15 +69,15 @@ impl<T: AnyBits> Input<T> for *const T {
     }
 }
 
-/// A pointer to a place for a value, or for several.
+/// A pointer to memory for one or several values that are written.
 pub trait Output<T>: Sized {
-    /// The place, if it is one: asked for before any work is done.
+    /// The memory, if the pointer is valid: checked before any work is done.
     fn check(self) -> Result<Place<T>, dibs_code>;
 
     /// The same, or `None` for a null pointer.
     fn check_if_any(self) -> Result<Option<Place<T>>, dibs_code>;
 
-    /// Places for so many values, side by side.
+    /// Contiguous memory for several values.
     fn places(self, count: usize) -> Result<Places<T>, dibs_code>;
 }
 
@@ -97,13 +97,13 @@ impl<T> Output<T> for *mut T {
     }
 }
 
-/// A place that was checked.
+/// Memory for a value, after its check.
 pub struct Place<T>(*mut T);
 
 impl<T> Place<T> {
     /// Writes the value.
     pub fn set(self, value: T) {
-        // SAFETY: checked, and so a place that is this call's alone.
+        // SAFETY: the pointer was checked, and the caller promises that only this call uses the memory.
         unsafe { self.0.write(value) };
     }
 
@@ -114,27 +114,28 @@ impl<T> Place<T> {
         }
     }
 
-    /// The value there.
+    /// The value that is there.
     pub fn get(&self) -> T
     where
         T: AnyBits,
     {
-        // SAFETY: checked, and the function takes a value there; any bits are one of this type.
+        // SAFETY: the pointer was checked, and the function's contract requires a value there; any bits are a valid
+        // one.
         unsafe { self.0.read() }
     }
 }
 
-/// Places for several values, of which the first have one.
+/// Memory for several values, of which the first are written.
 pub struct Places<T> {
     next: *mut T,
     left: usize,
 }
 
 impl<T> Places<T> {
-    /// Writes a value after those before it.
+    /// Writes the next value.
     pub fn push(&mut self, value: T) -> Result<(), dibs_code> {
         self.left = self.left.checked_sub(1).ok_or(dibs_code::Capacity)?;
-        // SAFETY: the caller promises places for as many values as were asked for, this call's alone.
+        // SAFETY: the caller promises memory for as many values as requested, which only this call uses.
         unsafe {
             self.next.write(value);
             self.next = self.next.add(1);
@@ -142,7 +143,7 @@ impl<T> Places<T> {
         Ok(())
     }
 
-    /// Writes all the values, or none where there are fewer places. Returns their number.
+    /// Writes all values, or none if there is too little memory. Returns their number.
     pub fn fill(mut self, values: &[T]) -> Result<usize, dibs_code>
     where
         T: Copy,
@@ -157,9 +158,9 @@ impl<T> Places<T> {
     }
 }
 
-/// Memory of the caller's, in which an object is made.
+/// The caller's memory in which an object is created.
 pub trait Storage {
-    /// Makes an object in memory of `size` bytes, and hands its address to `out`.
+    /// Creates an object in memory of `size` bytes, and writes its address to `out`.
     fn make<T: Kind>(
         self,
         size: usize,
@@ -167,7 +168,7 @@ pub trait Storage {
         body: impl FnOnce() -> Result<T, dibs_code>,
     ) -> Result<(), dibs_code>;
 
-    /// So many zeroed words after the first `offset` bytes, a multiple of 4.
+    /// Zeroed words after the first `offset` bytes, which are a multiple of 4.
     fn words(
         self,
         size: usize,
@@ -175,7 +176,7 @@ pub trait Storage {
         words: usize,
     ) -> Result<&'static mut [u32], dibs_code>;
 
-    /// A value after the first `offset` bytes, a multiple of [`DIBS_ALIGNMENT`].
+    /// Stores a value after the first `offset` bytes, which are a multiple of [`DIBS_ALIGNMENT`].
     fn keep<T>(self, size: usize, offset: usize, value: T) -> Result<&'static T, dibs_code>;
 }
 
@@ -203,8 +204,8 @@ impl Storage for *mut c_void {
         const { assert!(align_of::<Object<T>>() <= DIBS_ALIGNMENT) };
         let out = out.check()?;
         let place = memory(self, size, T::SIZE)?.cast::<Object<T>>();
-        // Without its mark while it is made: nobody takes a half-made object for a whole one.
-        // SAFETY: large enough and aligned, and the caller's to give away.
+        // The mark is cleared while the object is created, so that nobody uses it half-made.
+        // SAFETY: large enough and aligned, and the caller gives it up.
         unsafe { (&raw mut (*place).mark).write(AtomicU32::new(0)) };
         let body = body()?;
         // SAFETY: the same.
@@ -224,7 +225,7 @@ impl Storage for *mut c_void {
         let bytes = words.checked_mul(4).and_then(|bytes| bytes.checked_add(offset));
         let needed = bytes.filter(|_| offset.is_multiple_of(4)).ok_or(dibs_code::Argument)?;
         let start = memory(self, size, needed)?.cast::<u32>();
-        // SAFETY: inside the caller's memory, which is this object's alone from now on.
+        // SAFETY: inside the caller's memory, which belongs to this object alone from now on.
         unsafe {
             let start = start.add(offset / 4);
             start.write_bytes(0, words);
@@ -237,7 +238,7 @@ impl Storage for *mut c_void {
         let needed = size_of::<T>().checked_add(offset);
         let needed = needed.filter(|_| offset.is_multiple_of(DIBS_ALIGNMENT));
         let start = memory(self, size, needed.ok_or(dibs_code::Argument)?)?;
-        // SAFETY: inside the caller's memory, aligned, and this object's alone from now on.
+        // SAFETY: inside the caller's memory and aligned; it belongs to this object alone from now on.
         unsafe {
             let place = start.byte_add(offset).cast::<T>();
             place.write(value);
@@ -246,9 +247,9 @@ impl Storage for *mut c_void {
     }
 }
 
-/// A kind of object.
+/// A kind of object, such as a tree or a query.
 pub trait Kind: 'static {
-    /// Marks an object of this kind.
+    /// The number that marks an object of this kind.
     const MARK: u32;
     /// Bytes of storage, as the header states them.
     const SIZE: usize;
@@ -261,12 +262,12 @@ struct Object<T> {
     body: UnsafeCell<T>,
 }
 
-/// An object's address, as the caller has it from the function that made the object.
+/// The address of an object, as its constructor returned it.
 pub trait Handle<T: Kind> {
-    /// The object, this call's alone.
+    /// Opens the object for exclusive use by this call.
     fn open(self) -> Result<Open<T>, dibs_code>;
 
-    /// The object, out of its storage, which has none from then on.
+    /// Moves the object out of its storage, which then holds none.
     fn take(self) -> Result<T, dibs_code>;
 
     /// The object, shared with other contexts. Only for kinds that are never opened.
@@ -275,7 +276,7 @@ pub trait Handle<T: Kind> {
         T: Sync;
 }
 
-/// Turns a mark into that of an object in use.
+/// This bit of the mark means that the object is in use.
 const IN_USE: u32 = 1;
 
 impl<T: Kind> Handle<T> for *mut T {
@@ -290,9 +291,9 @@ impl<T: Kind> Handle<T> for *mut T {
 
     fn take(self) -> Result<T, dibs_code> {
         let object = self.open()?;
-        // SAFETY: its mark keeps everybody else out, now and, because it is replaced, from now on.
+        // SAFETY: replacing its mark excludes all other users, now and from now on.
         let body = unsafe { (*object.0).body.get().read() };
-        // SAFETY: the storage is still there.
+        // SAFETY: the caller keeps the storage.
         unsafe { &*object.0 }.mark.store(0, Ordering::Release);
         core::mem::forget(object);
         Ok(body)
@@ -306,14 +307,15 @@ impl<T: Kind> Handle<T> for *mut T {
             return Err(dibs_code::NotInitialised);
         }
         let object = self.cast::<Object<T>>();
-        // SAFETY: its mark says that it was made here, and the caller keeps its storage. Nothing of this kind is opened.
+        // SAFETY: its mark proves that it was created here, and the caller keeps its storage. Objects of this kind are
+        // never opened.
         Ok(unsafe { &*(*object).body.get() })
     }
 }
 
-/// The addresses of several objects, one after the other.
+/// The addresses of several objects, in an array.
 pub trait Handles<T: Kind> {
-    /// The objects, each this call's alone: one at least, and at most `N`. One that is there twice is in use.
+    /// Opens one to `N` objects for exclusive use by this call. An object that is listed twice is in use.
     fn open_all<const N: usize>(self, count: u32) -> Result<Vec<Open<T>, N>, dibs_code>;
 }
 
@@ -331,27 +333,28 @@ impl<T: Kind> Handles<T> for *const *mut T {
     }
 }
 
-/// A number of things that a call takes: one at least, and at most `N`.
+/// A count that must be from one to `N`.
 pub fn some_of<const N: usize>(count: u32) -> Result<usize, dibs_code> {
     Some(count as usize).filter(|count| (1..=N).contains(count)).ok_or(dibs_code::Argument)
 }
 
-/// The mark of an object, or of storage in which none was made.
+/// The mark of an object, or of storage without an object.
 fn mark<T: Kind>(object: *mut T) -> Result<&'static AtomicU32, dibs_code> {
     let mark = object.cast::<AtomicU32>();
     check(mark)?;
-    // SAFETY: neither null nor misaligned, so the caller promises an object or storage for one; any bits are a word.
+    // SAFETY: neither null nor misaligned, so the caller promises an object or storage for one; any bits are a valid
+    // word.
     Ok(unsafe { &*mark })
 }
 
-/// An object in use, until this is dropped.
+/// An object that is in use until this is dropped.
 pub struct Open<T: Kind>(*mut Object<T>);
 
 impl<T: Kind> Deref for Open<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
-        // SAFETY: its mark said that it was made here, and keeps everybody else out.
+        // SAFETY: its mark proved that it was created here, and excludes all other users.
         unsafe { &*(*self.0).body.get() }
     }
 }
@@ -380,11 +383,11 @@ fn check<T>(pointer: *const T) -> Result<(), dibs_code> {
     }
 }
 
-/// A text that a zero ends.
+/// A zero-terminated text.
 #[cfg(not(target_os = "none"))]
 pub fn text(pointer: *const c_char) -> Result<&'static str, dibs_code> {
     check(pointer)?;
-    // SAFETY: not null, so the caller promises a zero at the end.
+    // SAFETY: not null, so the caller promises a terminating zero.
     let text = unsafe { CStr::from_ptr(pointer) };
     text.to_str().map_err(|_| dibs_code::Argument)
 }

@@ -20,15 +20,15 @@ use crate::tree::{Row, dibs_tree};
 /// Bytes of a bus's storage.
 pub const DIBS_BUS_SIZE: usize = 3_072;
 
-/// The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the
-/// tree's bytes, and makes the statuses that go back.
+/// The bus's end of a guarded surface: it receives packets, checks complete frames in slices, publishes them, checks
+/// the tree's bytes in the background, and writes the statuses for the sender.
 ///
-/// Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
-/// control tick's priority. The interrupt gets `DIBS_CODE_IN_USE` where it meets the loop at work: it keeps its bytes for
-/// later, or the loop works with the interrupt masked.
+/// Two contexts may use it, one at a time: an interrupt that receives bytes, and an idle loop that checks. Both have a
+/// lower priority than the control tick. The interrupt gets `DIBS_CODE_IN_USE` while the loop uses the bus: it then
+/// keeps its bytes for later, or the loop masks the interrupt while it works.
 pub struct dibs_bus(TheBus);
 
-/// Of frames of vertices, or of the nodes that carry the surface.
+/// For frames of vertices, or of the nodes that move the surface.
 #[expect(
     clippy::large_enum_variant,
     reason = "its storage has one size, and there is no allocator"
@@ -68,7 +68,7 @@ impl Kind for dibs_bus {
     const SIZE: usize = DIBS_BUS_SIZE;
 }
 
-/// Makes the bus's end of a surface, once. `dibs_start` makes it with all that it needs.
+/// Makes the bus's end of a surface, once. `dibs_start` makes it together with all other objects.
 ///
 /// @param storage  `DIBS_BUS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size     Bytes of the storage.
@@ -76,9 +76,10 @@ impl Kind for dibs_bus {
 /// @param tree     Its tree.
 /// @param limits   The guard's limits: the same as for `dibs_guard_init`.
 /// @param bus      Receives the bus's address.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many rows; `DIBS_CODE_STORAGE_SIZE`
-///         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
-///         `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` where the limits need one; or a misuse.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of rows is not the tree's;
+/// `DIBS_CODE_STORAGE_SIZE`
+///          also if the surface has only two buffers; `DIBS_CODE_TAKEN` if its end was taken;
+///          `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` if the limits need one; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_init(
     storage: *mut c_void,
@@ -108,10 +109,10 @@ pub extern "C" fn dibs_bus_init(
     })
 }
 
-/// Takes bytes of a serial line or another stream. `dibs_bus_counters` says what became of them, by cause.
+/// Receives bytes from a serial line or another stream. `dibs_bus_counters` counts the outcomes by cause.
 ///
-/// Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped where the next one begins
-/// before it was checked.
+/// Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped if the next one begins before
+/// it was checked.
 ///
 /// @param bus     The bus.
 /// @param bytes   The bytes, read during the call.
@@ -132,7 +133,7 @@ pub extern "C" fn dibs_bus_receive(
     })
 }
 
-/// Takes one packet, from a bus that keeps packets apart.
+/// Receives one packet, from a bus that preserves packet boundaries.
 ///
 /// Cost: linear in the bytes.
 ///
@@ -158,21 +159,22 @@ pub extern "C" fn dibs_bus_packet(
     })
 }
 
-/// Takes a whole frame from this process, say from a solver's own thread. `dibs_bus_work` then checks and publishes it, as
-/// one that came in packets.
+/// Receives a whole frame from this process, for example from a solver's own thread. `dibs_bus_work` then checks and
+/// publishes it like a frame of packets.
 ///
-/// The call counts as a sign of life, and its transit time is 0. One source at a time: a frame of packets that is in work
-/// is abandoned. No lock: the control tick reads the last surface meanwhile.
+/// The call counts as a good packet, and the frame's transit time is 0. Use one source at a time: an unfinished frame
+/// of packets is abandoned. There is no lock: the control tick reads the last surface meanwhile.
 ///
-/// Cost: linear in the vertices, several readings each.
+/// Cost: linear in the vertices, each of which is read several times.
 ///
 /// @param bus        The bus.
 /// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order. Read
 ///                   during the call.
 /// @param count      Their number: the vertices of the mesh's file.
-/// @param captured   When the surface was so, on the receiver's clock, in ms: at most 65,534 before `now`.
+/// @param captured   Time of capture on the receiver's clock, in ms: at most 65,534 before `now`.
 /// @param now        The receiver's clock, in ms; wraps.
-/// @return `DIBS_CODE_OK`, the cause of a refusal as `dibs_receiver_accept` (the last good surface stays), or a misuse.
+/// @return `DIBS_CODE_OK`, a cause of refusal as from `dibs_receiver_accept` (the last good surface stays), or a
+/// misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_frame(
     bus: *mut dibs_bus,
@@ -188,7 +190,7 @@ pub extern "C" fn dibs_bus_frame(
     })
 }
 
-/// Where a mesh is as a whole: its point `p` is at `rotation p + shift`.
+/// A rigid pose of a mesh: its point `p` is at `rotation p + shift`.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_pose {
@@ -198,20 +200,21 @@ pub struct dibs_pose {
     pub shift: dibs_vec3,
 }
 
-/// The same as `dibs_bus_frame`, with the mesh as a whole elsewhere, say by a tracker of the patient: tools, answers and
-/// commands are then in the world. A frame without a pose is where the mesh's file has it.
+/// The same as `dibs_bus_frame`, with a rigid pose of the whole mesh, for example from a tracker of the patient: tools,
+/// answers and commands are then in world coordinates. Without a pose the mesh is where its file has it.
 ///
-/// The limits on speed and recovery hold for positions and pose together; the reach is that of the positions alone. Where a
-/// step turns by more than half a radian the surface is held, not extrapolated.
+/// The limits on speed and recovery apply to positions and pose together; the reach applies to the positions alone. If
+/// a step rotates by more than half a radian, the surface is held at the last frame, not extrapolated.
 ///
 /// @param bus        The bus.
 /// @param positions  As for `dibs_bus_frame`.
 /// @param count      Their number.
 /// @param pose       The pose, read during the call.
-/// @param captured   When the surface was so, and there.
+/// @param captured   Time of capture of positions and pose.
 /// @param now        The receiver's clock, in ms; wraps.
-/// @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM` for
-///         numbers that are no pose.
+/// @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM`
+/// for
+///          an invalid pose.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_frame_at(
     bus: *mut dibs_bus,
@@ -230,14 +233,14 @@ pub extern "C" fn dibs_bus_frame_at(
     })
 }
 
-/// Does a slice of the checks: looks at some rows and triangles of the frame that arrives, and publishes it once it is
+/// Does a slice of the checks: checks some rows and triangles of the arriving frame, and publishes it once it is
 /// complete and admitted. Without a frame it checks the tree's bytes.
 ///
 /// Cost: linear in `work`.
 ///
 /// @param bus      The bus.
-/// @param work     Most rows and triangles that are looked at.
-/// @param advance  Receives the outcome, `DIBS_ADVANCE_PENDING` if more is due at once; or null.
+/// @param work     Most rows and triangles that are checked.
+/// @param advance  Receives the outcome, `DIBS_ADVANCE_PENDING` if more work is due at once; or null.
 /// @return As `dibs_receiver_advance`.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_work(
@@ -253,15 +256,15 @@ pub extern "C" fn dibs_bus_work(
     })
 }
 
-/// Writes the status that is due for the sender, whose next frame echoes it, which measures the transit of frames.
-/// Call it after each slice of work: none is due unless there is news, or 100 ms went by.
+/// Writes the status for the sender, if one is due. The sender's next frame echoes it, which measures the transit time
+/// of frames. Call it after each slice of work: a status is due if there is news, or 100 ms have passed.
 ///
 /// @param bus       The bus.
 /// @param now       The receiver's clock, in ms.
 /// @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
-/// @param out       Receives it.
-/// @param capacity  Bytes that there is room for: `DIBS_STATUS` at least.
-/// @param length    Receives its length; 0 where none is due.
+/// @param out       Receives the status.
+/// @param capacity  Size of `out` in bytes: at least `DIBS_STATUS`.
+/// @param length    Receives the status's length; 0 if none is due.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_status(
@@ -274,7 +277,7 @@ pub extern "C" fn dibs_bus_status(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (length, out) = (length.check()?, out.places(capacity)?);
-        // Before the status is made: one that has no room would be lost.
+        // Checked before the status is made: a status that does not fit would be lost.
         if capacity < DIBS_STATUS {
             return Err(dibs_code::Capacity);
         }
@@ -303,22 +306,22 @@ pub extern "C" fn dibs_bus_counters(bus: *mut dibs_bus, counters: *mut u32) -> d
     })
 }
 
-/// Facts about a bus.
+/// State of a bus.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_bus_facts {
-    /// 0 before the first frame; then the epoch is 0, too.
+    /// 0 before the first frame; the epoch is then 0 as well.
     pub is_published: u32,
-    /// Number of the frame published last; wraps.
+    /// Number of the latest published frame; wraps.
     pub epoch: u32,
-    /// Whole rounds of the check of the tree's bytes; wraps.
+    /// Completed rounds of the check of the tree's bytes; wraps.
     pub rounds: u32,
 }
 
-/// Reads the facts about a bus.
+/// Reads the state of a bus.
 ///
 /// @param bus    The bus.
-/// @param facts  Receives the facts.
+/// @param facts  Receives the state.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_get_facts(bus: *mut dibs_bus, facts: *mut dibs_bus_facts) -> dibs_code {
     dibs_code::of(|| {
@@ -334,7 +337,7 @@ pub extern "C" fn dibs_bus_get_facts(bus: *mut dibs_bus, facts: *mut dibs_bus_fa
     })
 }
 
-/// Position (mm) of a vertex, or node, in the frame published last, for a checksum of the published rows, or a log.
+/// Position (mm) of a vertex, or node, in the latest published frame, for a checksum of the published rows, or a log.
 ///
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex, or a
 ///         misuse.
@@ -352,7 +355,7 @@ pub extern "C" fn dibs_bus_position(
     })
 }
 
-/// Registers the surface anew, as `dibs_receiver_register` does: only an operator decides that.
+/// Registers the surface again, as `dibs_receiver_register` does: only an operator may decide this.
 ///
 /// @return `DIBS_CODE_OK`, or a misuse.
 #[unsafe(no_mangle)]

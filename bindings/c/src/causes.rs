@@ -131,7 +131,7 @@ impl From<ReceiveError> for dibs_code {
     }
 }
 
-/// The cause of packets of a frame that was refused before.
+/// The cause that packets of an already refused frame report.
 impl From<Event> for dibs_code {
     fn from(cause: Event) -> Self {
         match cause {
@@ -189,7 +189,7 @@ impl From<FilterError> for dibs_code {
     }
 }
 
-/// The errors of a guard's start.
+/// Errors of a guard's start.
 impl From<Error> for dibs_code {
     fn from(error: Error) -> Self {
         match error {

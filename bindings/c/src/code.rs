@@ -1,8 +1,8 @@
-//! Codes of errors, each with its text.
+//! Error codes, each with its text.
 
 use core::ffi::{CStr, c_char};
 
-/// The outcome of a call. Numbers do not change from version to version; those from 1 to 99 are misuses.
+/// The outcome of a call. Numbers stay the same in all versions; those from 1 to 99 are misuses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_code {
@@ -20,13 +20,13 @@ pub enum dibs_code {
     NotInitialised = 5,
     /// Another call that has not returned uses the object.
     InUse = 6,
-    /// This end of the surface's buffers was taken before: one receiver, one reader.
+    /// This end of the surface's buffers was taken before: there is one receiver and one reader.
     Taken = 7,
     /// A frame is held already: release it first.
     Held = 8,
-    /// The objects are not of one tree, or of one number of vertices.
+    /// The objects are of different trees, or of different numbers of vertices.
     OtherTree = 9,
-    /// A number that is not one of those allowed: flags, counts, states.
+    /// A number that is not allowed: flags, counts, states.
     Argument = 10,
     /// The caller's buffer is too small for the result.
     Capacity = 11,
@@ -34,7 +34,7 @@ pub enum dibs_code {
     Version = 12,
     /// The tree has fewer bytes than its header states.
     TreeLength = 100,
-    /// The bytes are no tree.
+    /// The bytes are not a tree.
     TreeMagic = 101,
     /// The tree is of another format version: build it again.
     TreeVersion = 102,
@@ -56,7 +56,7 @@ pub enum dibs_code {
     ToolCoordinate = 200,
     /// The tool's radius is negative, not finite or too large.
     ToolRadius = 201,
-    /// The surface has not one vertex for each of the tree's.
+    /// The surface's number of vertices is not the tree's.
     VertexCount = 202,
     /// The position of a vertex is not finite or too large.
     Position = 203,
@@ -64,7 +64,7 @@ pub enum dibs_code {
     StretchOfOtherTree = 204,
     /// The stretch was measured on another frame.
     StretchOfOtherFrame = 205,
-    /// The surface is stretched beyond what the query was told.
+    /// The surface is stretched beyond the limit given to the query.
     Uncovered = 206,
     /// The margin is negative, not finite, or larger than that of the contacts.
     Margin = 207,
@@ -98,7 +98,7 @@ pub enum dibs_code {
     Shrunk = 312,
     /// A vertex moved farther than the limits on speed and recovery allow.
     TooFast = 313,
-    /// There is no surface for another cause.
+    /// There is no surface, for another cause.
     Unavailable = 314,
     /// The tool's side is not known, so it may be inside.
     NoSide = 315,
@@ -108,29 +108,29 @@ pub enum dibs_code {
     NoPose = 317,
     /// The packet's checksum does not match, or it is too short for one.
     PacketDamaged = 400,
-    /// The packet is of another protocol version.
+    /// The packet's checksum is right, but its form is not.
     PacketVersion = 401,
     /// The packet's checksum is right and its form is not.
     PacketForm = 402,
     /// The packet is of another mesh.
     PacketMesh = 403,
-    /// The packet has no genuine tag.
+    /// The packet's tag is missing or not authentic.
     PacketForged = 404,
     /// The packet's frame is not later than the published one.
     PacketStale = 405,
     /// The packet's frame is not being received.
     PacketUnexpected = 406,
-    /// The frame before is still being checked.
+    /// The previous frame is still being checked.
     PacketBusy = 407,
-    /// The frame changes another one than that published.
+    /// The partial frame is not based on the published frame.
     PacketBase = 408,
-    /// Rows came before the published frame was copied that far.
+    /// Rows came before the published frame was copied up to them.
     PacketNotReady = 409,
     /// The frame's rows are not those of this surface.
     PacketRows = 410,
-    /// The frame's content or encoding is not received here.
+    /// The frame's content or encoding is not accepted here.
     PacketEncoding = 411,
-    /// The packet's place in the frame does not fit the others, or leaves too many gaps.
+    /// The packet's position in the frame does not fit the others, or leaves too many gaps.
     PacketOrder = 412,
     /// A coordinate in the packet is not finite.
     PacketNotFinite = 413,
@@ -138,35 +138,35 @@ pub enum dibs_code {
     PacketTooFar = 414,
     /// The packets are not all of one frame.
     PacketDigest = 415,
-    /// Bytes between two zeros of the stream are no packet.
+    /// Bytes between two zeros of the stream are not a packet.
     Framing = 416,
     /// The packet was refused for another cause.
     PacketRefused = 417,
     /// The surface was captured before the published one.
     PacketEarlier = 418,
-    /// The surface was 65,535 ms old or older when it was sent, or captured in the future.
+    /// The surface's age was 65,535 ms or more when it was sent, or its capture is in the future.
     PacketTooOld = 419,
-    /// A hello came too soon after another to be answered at once.
+    /// A hello came too soon after another one to be answered at once.
     PacketThrottled = 420,
     /// A stiffness, damping, largest force or margin is out of range.
     Gain = 500,
     /// A safe limit is below the degraded one.
     LimitOrder = 501,
-    /// A limit is 2^31 or more, or the age is not watched.
+    /// A limit is 2^31 or more, or the age has no limit.
     LimitTooLong = 502,
     /// The tissue's speed is negative or not finite.
     LimitSpeed = 503,
-    /// No frame cannot recover a surface.
+    /// The number of frames that recover is 0.
     LimitRecovery = 504,
     /// The acknowledgement came before the machine waited for it.
     Acknowledge = 505,
-    /// A limit is so high that its input never exceeds it.
+    /// A limit is so high that its input can never exceed it.
     LimitUntrippable = 506,
-    /// A stand-off, speed, lever, approach, period or uncertainty of a filter is out of range.
+    /// A stand-off, speed, lever arm, approach, period or uncertainty of a filter is out of range.
     Filter = 507,
-    /// A sender's target is none, or cannot be opened.
+    /// A sender's target is invalid, or cannot be opened.
     SenderTarget = 600,
-    /// The positions are no frame of the sender's surface, or cannot be sent.
+    /// The positions are not a frame of the sender's surface, or cannot be sent.
     SenderFrame = 601,
     /// The sender's connection broke.
     SenderLine = 602,
@@ -177,7 +177,7 @@ pub enum dibs_code {
 }
 
 impl dibs_code {
-    /// The code of a call.
+    /// The code of a fallible function.
     pub fn of(call: impl FnOnce() -> Result<(), Self>) -> Self {
         match call() {
             Ok(()) => Self::Ok,
@@ -185,7 +185,7 @@ impl dibs_code {
         }
     }
 
-    /// A call's error, for a call that makes others.
+    /// The code as an error; `DIBS_CODE_OK` as success.
     pub fn done(self) -> Result<(), Self> {
         if self == Self::Ok { Ok(()) } else { Err(self) }
     }
@@ -278,7 +278,7 @@ impl dibs_code {
         Self::SenderOtherSurface,
     ];
 
-    /// The code of a number from C.
+    /// The code that a number from C stands for.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::ALL.iter().copied().find(|code| *code as u32 == number)
     }
@@ -375,7 +375,7 @@ impl dibs_code {
 
 /// One sentence about a code, in English, without a full stop.
 ///
-/// Never null, also for a number that is no code. The text is static.
+/// Never null, even for a number that is not a code. The text is static.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_code_text(code: u32) -> *const c_char {
     dibs_code::from_number(code).map_or(c"no code of this library", dibs_code::text).as_ptr()

@@ -20,11 +20,11 @@ pub struct dibs_wall {
     pub stiffness: f32,
     /// In N s/mm, at least 0.
     pub damping: f32,
-    /// Damping (N s/mm, at least 0) where there is no answer to act on; 0 lets go of the tool.
+    /// Damping (N s/mm, at least 0) if there is no answer to act on; 0 releases the tool.
     pub hold_damping: f32,
     /// In N, above 0.
     pub max_force: f32,
-    /// Reach of the wall from the surface (mm, above 0).
+    /// Distance from the surface at which the wall begins (mm, above 0).
     pub margin: f32,
 }
 
@@ -35,7 +35,7 @@ impl dibs_wall {
     }
 }
 
-/// The origin of a force.
+/// Which rule a force comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_force_state {
@@ -45,7 +45,7 @@ pub enum dibs_force_state {
     Active = 1,
     /// The wall acts with its largest force.
     Saturated = 2,
-    /// The answer cannot be used: the force is the hold.
+    /// The answer cannot be used: the force is the hold, pure damping.
     Safe = 3,
 }
 
@@ -55,16 +55,16 @@ pub enum dibs_force_state {
 pub struct dibs_force {
     /// In N. Always finite.
     pub force: dibs_vec3,
-    /// In N mm, about the point asked for. Always finite; zero of one pair.
+    /// In N mm, about the given point. Always finite; zero for a single pair.
     pub torque: dibs_vec3,
-    /// Their origin.
+    /// Which rule they come from.
     pub state: dibs_force_state,
     /// The cause of a hold; otherwise `DIBS_CODE_OK`.
     pub cause: dibs_code,
 }
 
 impl dibs_force {
-    /// `outcome` is the cause of a hold that C asked for.
+    /// `outcome` is the cause of a hold that C requested.
     fn of(Wrench { force, torque, state }: Wrench, outcome: Option<dibs_code>) -> Self {
         let (state, cause) = match state {
             ConstraintState::Inactive => (dibs_force_state::Inactive, dibs_code::Ok),
@@ -79,7 +79,7 @@ impl dibs_force {
     }
 }
 
-/// The code of the calls before, if it is an error.
+/// The code of the preceding calls, if it is an error.
 fn failure(outcome: u32) -> Option<dibs_code> {
     match dibs_code::from_number(outcome) {
         Some(dibs_code::Ok) => None,
@@ -90,15 +90,16 @@ fn failure(outcome: u32) -> Option<dibs_code> {
 
 /// The force of a wall on the tool, from its closest pair.
 ///
-/// Call it at every tick, with the code of whatever the pair came from: with an error the force is the hold, pure damping.
+/// Call it at every tick, with the code of the call that returned the pair: with an error the force is the hold, pure
+/// damping.
 ///
 /// @param wall       The wall.
-/// @param outcome    The code of the query, of the fail-safe machine, or of the reader: of the first that was not
-///                   `DIBS_CODE_OK`.
-/// @param proximity  The closest pair; not read, and may be null, where the outcome is an error.
-/// @param velocity   Velocity (mm/s) of the tool's closest point against the surface.
+/// @param outcome    The code of the query, of the fail-safe machine, or of the reader: the first one that was not
+///                    `DIBS_CODE_OK`.
+/// @param proximity  The closest pair; not read, and may be null, if the outcome is an error.
+/// @param velocity   Velocity (mm/s) of the tool's closest point relative to the surface.
 /// @param force      Receives the force.
-/// @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
+/// @return `DIBS_CODE_OK`, even if the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_wall_force(
     wall: *const dibs_wall,
@@ -121,16 +122,17 @@ pub extern "C" fn dibs_wall_force(
     })
 }
 
-/// The force and the torque of a wall on the tool, from all its contacts: a proxy that they hold outside together.
+/// The force and the torque of a wall on the tool, from all its contacts: by a proxy that the contacts together keep
+/// outside.
 ///
 /// @param wall      The wall. Its margin is at most that of the contacts.
 /// @param outcome   As for `dibs_wall_force`.
 /// @param contacts  The list.
-/// @param origin    The tool's point (mm) that the torque and the velocity are about.
+/// @param origin    The tool's point (mm) that torque and velocity refer to.
 /// @param velocity  Velocity (mm/s) of the tool at `origin`.
 /// @param angular   Angular velocity (1/s) of the tool.
 /// @param force     Receives force and torque.
-/// @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
+/// @return `DIBS_CODE_OK`, even if the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_wall_proxy_force(
     wall: *const dibs_wall,

@@ -15,10 +15,10 @@ use crate::tool::{Shape, dibs_tool, dibs_vec3};
 /// Bytes of a list's storage.
 pub const DIBS_CONTACTS_SIZE: usize = 13_056;
 
-/// Contacts that a list holds: of more, the deepest.
+/// Contacts that a list holds; if there are more, the deepest.
 pub const DIBS_CONTACTS: usize = 16;
 
-/// Triangles that a list looks at together: of more, the nearest.
+/// Triangles that a search for contacts considers at once; if there are more, the nearest.
 pub const DIBS_NEAR: usize = 512;
 
 /// A list of contacts.
@@ -29,7 +29,7 @@ pub struct dibs_contacts(pub(crate) List);
 type List = Contacts<DIBS_CONTACTS, DIBS_NEAR>;
 
 impl dibs_contacts {
-    /// Fills the list. After an error it is empty: the contacts of the last pose are none of this one.
+    /// Fills the list. After an error it is empty: the contacts of the last pose do not apply to this one.
     pub(crate) fn fill<R>(
         &mut self,
         call: impl FnOnce(&mut List) -> Result<R, dibs_code>,
@@ -51,19 +51,19 @@ impl Kind for dibs_contacts {
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_contact {
-    /// Signed separation (mm): the lower end of the pair's interval, as `lower` of `dibs_proximity`.
+    /// Signed separation (mm): the lower bound of the pair's interval, as `lower` of `dibs_proximity`.
     pub separation: f32,
-    /// Unit vector that leads out.
+    /// Unit vector that points out of the surface.
     pub normal: dibs_vec3,
     /// The surface's point (mm).
     pub point_on_surface: dibs_vec3,
     /// The tool's point (mm).
     pub point_on_tool: dibs_vec3,
-    /// Place of the pair along the tool's axis: 0 at its start, 1 at its end.
+    /// Position of the pair along the tool's axis: 0 at its start, 1 at its end.
     pub axis_parameter: f32,
-    /// The surface's number in a scene; 0 for a single surface.
+    /// Index of the surface in a scene; 0 for a single surface.
     pub surface: u32,
-    /// The tool's number in a chain; 0 for a single tool.
+    /// Index of the tool in a chain; 0 for a single tool.
     pub tool: u32,
     /// Row of the triangle.
     pub triangle: u32,
@@ -71,7 +71,7 @@ pub struct dibs_contact {
     pub corners: [u32; 3],
     /// Weights of the corners at `point_on_surface`.
     pub barycentric: [f32; 3],
-    /// Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`, and there in a guard's list.
+    /// Velocity (mm/s) of the surface at the contact: zero until `dibs_contacts_set_velocities`; a guard's list has it.
     pub velocity: dibs_vec3,
 }
 
@@ -94,17 +94,17 @@ impl From<&Contact> for dibs_contact {
     }
 }
 
-/// Facts that hold for a list.
+/// Properties of a list.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_contacts_facts {
     /// Contacts in the list.
     pub count: u32,
-    /// Every contact whose separation is below this (mm) is in the list.
+    /// Every contact with a separation below this (mm) is in the list.
     pub bound: f32,
-    /// No separation is too high by more (mm).
+    /// No separation is too high by more than this (mm).
     pub accuracy: f32,
-    /// 1 where contacts within the margin were left out because the list is full; else 0.
+    /// 1 if contacts within the margin were left out because the list is full; else 0.
     pub is_full: u32,
 }
 
@@ -130,7 +130,7 @@ pub extern "C" fn dibs_contacts_init(
 /// @param frame      The surface.
 /// @param tool       The tool.
 /// @param margin     In mm, at least 0.
-/// @param options    Options, or null. A budget that runs out shows in the list's bound.
+/// @param options    Options, or null. A budget that runs out lowers the list's bound.
 /// @param contacts   The list; empty after an error.
 /// @param proximity  Receives the closest pair, or null.
 /// @return As `dibs_query_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
@@ -156,7 +156,7 @@ pub extern "C" fn dibs_query_contacts(
     })
 }
 
-/// Facts that hold for the list.
+/// Reads the properties of the list.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_get_facts(
     contacts: *mut dibs_contacts,
@@ -174,9 +174,9 @@ pub extern "C" fn dibs_contacts_get_facts(
     })
 }
 
-/// One contact of the list, the deepest being number 0.
+/// One contact of the list; number 0 is the deepest.
 ///
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` where there are not so many, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` if there are fewer contacts, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_get(
     contacts: *mut dibs_contacts,
@@ -191,11 +191,11 @@ pub extern "C" fn dibs_contacts_get(
     })
 }
 
-/// Sets each contact's velocity to that of the surface there.
+/// Sets each contact's velocity to that of the surface at the contact.
 ///
 /// @param velocities  x, y and z (mm/s) of each vertex, in the tree's order of rows; only read during the call.
 /// @param vertices    Their number.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` where a contact's corner has no row, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` if a contact's corner has no row, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_set_velocities(
     contacts: *mut dibs_contacts,
@@ -214,28 +214,28 @@ pub extern "C" fn dibs_contacts_set_velocities(
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_row {
-    /// Factors of the linear velocity: the contact's normal; where the deepest point is inside the tool's axis, the mean of
-    /// two triangles'.
+    /// Factors of the linear velocity: the contact's normal; if the deepest point is inside the tool's axis, the mean
+    /// of two triangles' normals.
     pub linear: [f32; 3],
     /// Factors (mm) of the angular velocity.
     pub angular: [f32; 3],
-    /// The least sum allowed (mm/s).
+    /// Lower bound of the sum (mm/s).
     pub least: f32,
 }
 
 /// The rows of all contacts in the list, deepest first.
 ///
-/// With a row, a contact's separation falls towards `stand_off` no faster than exponentially, at a rate of `gain`; below, it
-/// has to grow.
+/// By its row, a contact's separation decreases towards `stand_off` no faster than exponentially, at a rate of `gain`;
+/// below `stand_off` it must increase.
 ///
 /// @param contacts   The list.
-/// @param origin     The tool's point (mm) whose velocity the rows are about.
+/// @param origin     The tool's point (mm) that the rows' velocity refers to.
 /// @param stand_off  In mm.
 /// @param gain       In 1/s.
-/// @param capacity   Rows that there is room for.
+/// @param capacity   Number of rows that fit in `rows`.
 /// @param rows       Receives them.
 /// @param count      Receives their number.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` where there is room for fewer, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` if not all rows fit, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_contacts_rows(
     contacts: *mut dibs_contacts,

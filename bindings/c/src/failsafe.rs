@@ -14,10 +14,11 @@ use crate::reader::{dibs_age, dibs_link};
 /// Bytes of a machine's storage.
 pub const DIBS_FAILSAFE_SIZE: usize = 192;
 
-/// Stands for any code of [`dibs_observation::query`]: the machine needs only the fact, the code is kept beside it.
+/// Stands for any code of [`dibs_observation::query`]: the machine only needs to know that there is an error; its code
+/// is stored beside it.
 const NO_ANSWER: Unavailable = Unavailable::Query(QueryError::NoAdjacency);
 
-/// The machine. It begins in the safe state.
+/// The machine. It starts in the safe state.
 ///
 /// One context at a time.
 pub struct dibs_failsafe {
@@ -31,14 +32,14 @@ impl Kind for dibs_failsafe {
     const SIZE: usize = DIBS_FAILSAFE_SIZE;
 }
 
-/// Two limits on one input: beyond the first the state is degraded, beyond the second safe. Both `DIBS_UNLIMITED` where
-/// the input is not watched; otherwise below 2^31.
+/// Two limits on one input: above the first the state is degraded, above the second safe. Both `DIBS_UNLIMITED` if the
+/// input has no limits; otherwise below 2^31.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_watch {
     /// The first limit.
     pub degraded: u32,
-    /// The second limit, not below the first.
+    /// The second limit, at least the first.
     pub safe: u32,
 }
 
@@ -72,7 +73,7 @@ impl TryFrom<dibs_watch> for Watch<u32> {
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_limits {
-    /// Age of the surface; must be watched.
+    /// Age of the surface; must have limits.
     pub age: dibs_watch,
     /// Time since any good packet.
     pub silence: dibs_watch,
@@ -80,21 +81,21 @@ pub struct dibs_limits {
     pub heartbeat: dibs_watch,
     /// Frames refused or abandoned since the last one was published.
     pub rejections: dibs_watch,
-    /// Transit of the published frame. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
+    /// Transit time of the published frame. With `DIBS_UNLIMITED` it has no limit, and is covered by the margin.
     pub transit: dibs_watch,
     /// Age of the published frame when it was sent; a safe limit is below 65,534.
     pub source_age: dibs_watch,
-    /// Forged packets, of which 10 are forgotten each second; the limits are below 1,000.
+    /// Forged packets, minus 10 for each second; the limits are below 1,000.
     pub forgeries: dibs_watch,
     /// Largest speed of any point of the tissue, in mm per ms (m/s); at least 0.
     pub tissue_speed: f32,
-    /// Frames in a row that recover: 1 to 65,535.
+    /// Consecutive good frames that recover: 1 to 65,535.
     pub recovery_frames: u32,
-    /// Steps in a row with every input within its first limit, before the one that recovers.
+    /// Consecutive steps with every input within its first limit, before recovery.
     pub dwell: u32,
-    /// Other than 0 to leave the time on the way out of the margin and the limits: a delay is then not detected.
+    /// Other than 0 to omit the transit time from the margin and the limits: a delay is then not detected.
     pub without_transit: u32,
-    /// 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+    /// 0 to leave the safe state only by an acknowledgement; otherwise automatically.
     pub automatic: u32,
 }
 
@@ -102,7 +103,7 @@ impl TryFrom<dibs_limits> for Limits {
     type Error = LimitError;
 
     fn try_from(given: dibs_limits) -> Result<Self, LimitError> {
-        // Beyond the largest number there is none.
+        // Beyond the largest possible number there is no valid limit.
         let frames = u16::try_from(given.recovery_frames).unwrap_or(0);
         let limits = Self::new(given.age.try_into()?, given.tissue_speed)?
             .recovery(frames)?
@@ -144,13 +145,13 @@ pub extern "C" fn dibs_failsafe_init(
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_observation {
-    /// The published frame and its age: of `dibs_reader_latest`.
+    /// The published frame and its age, from `dibs_reader_latest`.
     pub age: dibs_age,
-    /// The bus's health: of `dibs_reader_link`.
+    /// The bus's health, from `dibs_reader_link`.
     pub link: dibs_link,
-    /// Code of the query on that frame: `DIBS_CODE_OK` where it gave an answer, and where it was not asked.
+    /// Code of the query on that frame: `DIBS_CODE_OK` if it gave an answer, or there was no query.
     pub query: u32,
-    /// Other than 0 once the tree's bytes were found changed: of `dibs_scrub_step`. Leave it set.
+    /// Other than 0 once `dibs_scrub_step` has found the tree's bytes changed. Leave it set.
     pub is_tree_corrupt: u32,
 }
 
@@ -160,9 +161,9 @@ pub struct dibs_observation {
 pub enum dibs_state {
     /// Every input is within its limits.
     Nominal = 0,
-    /// The surface is acted on, with a growing margin.
+    /// The surface may be acted on, with a growing margin.
     Degraded = 1,
-    /// The surface is not acted on.
+    /// The surface must not be acted on.
     Safe = 2,
 }
 
@@ -174,9 +175,9 @@ pub struct dibs_verdict {
     pub state: u32,
     /// Cause of a state that is not nominal: a `dibs_code`.
     pub cause: u32,
-    /// Most that the tissue moves (mm) in the surface's age and transit.
+    /// Largest motion of the tissue (mm) in the surface's age and transit time.
     pub margin: f32,
-    /// 1 where only an acknowledgement is missing to leave the safe state; else 0.
+    /// 1 if only an acknowledgement is missing to leave the safe state; else 0.
     pub waits_for_acknowledgement: u32,
 }
 
@@ -195,7 +196,7 @@ impl From<Verdict> for dibs_verdict {
 ///
 /// Cost: a comparison of two limits for each input.
 ///
-/// @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for a query's code that is none; or a misuse.
+/// @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for an invalid code of the query; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_failsafe_step(
     failsafe: *mut dibs_failsafe,
@@ -241,8 +242,9 @@ pub extern "C" fn dibs_failsafe_acknowledge(failsafe: *mut dibs_failsafe) -> dib
 ///
 /// @param verdict    The verdict of this tick.
 /// @param proximity  The answer of this tick, which is widened.
-/// @return `DIBS_CODE_OK`; in the safe state the cause, to be passed on to a wall; `DIBS_CODE_ARGUMENT` for numbers that are
-///         no state or no code; or a misuse.
+/// @return `DIBS_CODE_OK`; in the safe state the cause, to be passed on to a wall; `DIBS_CODE_ARGUMENT` for numbers
+/// that are
+///          not a state or a code; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_verdict_admit(
     verdict: *const dibs_verdict,

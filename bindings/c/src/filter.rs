@@ -1,4 +1,4 @@
-//! The filter of commands: the motion nearest to a commanded one that keeps a chain of tools out of the tissue.
+//! The filter of commands: the motion closest to a commanded one that keeps a chain of tools out of the tissue.
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
@@ -16,33 +16,33 @@ use crate::tracker::{TheTracker, dibs_tracker};
 /// Most tools of a filter's chain.
 pub const DIBS_FILTER_TOOLS: usize = 8;
 
-/// Most rows of a caller's.
+/// Most rows that a caller may add.
 pub const DIBS_FILTER_ROWS: usize = 8;
 
-/// A filter of commands. `dibs_filter_of` makes one of two numbers.
+/// A filter of commands. `dibs_filter_of` makes one from two numbers.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_filter {
     /// Least separation (mm) of every tool from the tissue, at least 0.
     pub stand_off: f32,
-    /// Most speed (mm/s) of the robot's reference point, and of the lever's end by a rotation; above 0.
+    /// Largest speed (mm/s) of the robot's reference point, and of the lever arm's end in a rotation; above 0.
     pub speed: f32,
-    /// A rotation by one radian counts as much as a translation by this length (mm), at least 1; 0 for the distance from the
-    /// reference point to the farthest end of a tool's axis.
+    /// Lever arm: a rotation by one radian counts as a translation by this length (mm), at least 1; 0 for the distance
+    /// from the reference point to the farthest end of a tool's axis.
     pub lever: f32,
-    /// A tool comes nearer to its stand-off at no more than its distance from there divided by this time (s), at least 0; 0 for
+    /// A tool approaches its stand-off no faster than its distance from it divided by this time (s), at least 0; 0 for
     /// no such limit.
     pub approach: f32,
     /// Most instructions of all queries of a tick, by `cost`.
     pub instructions: u32,
     /// A `dibs_cost`.
     pub cost: u32,
-    /// As of `dibs_options`.
+    /// As in `dibs_options`.
     pub depth_tolerance: f32,
 }
 
 impl dibs_filter {
-    /// The core's filter.
+    /// Converts it to the core's filter.
     pub(crate) fn read(self) -> Result<Filter, dibs_code> {
         if !(self.depth_tolerance >= 0.0) {
             return Err(dibs_code::Argument);
@@ -62,7 +62,7 @@ impl dibs_filter {
 /// A filter with 200,000 instructions of a Cortex-M7 a tick.
 ///
 /// @param stand_off  Least separation (mm) from the tissue.
-/// @param speed      Most speed (mm/s) of the robot.
+/// @param speed      Largest speed (mm/s) of the robot.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_filter_of(stand_off: f32, speed: f32) -> dibs_filter {
     let (instructions, cost) = (200_000, dibs_cost::M7Capsule as u32);
@@ -70,7 +70,8 @@ pub extern "C" fn dibs_filter_of(stand_off: f32, speed: f32) -> dibs_filter {
     dibs_filter { stand_off, speed, lever, approach, instructions, cost, depth_tolerance }
 }
 
-/// The motion of a rigid instrument in a period: its reference point goes straight, and the instrument turns about it.
+/// The motion of a rigid instrument in a period: its reference point moves in a straight line, and the instrument
+/// rotates about it.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_motion {
@@ -94,18 +95,19 @@ impl From<Motion> for dibs_motion {
     }
 }
 
-/// How far the tissue may be from the surface that is searched, besides that surface's own position error.
+/// How far the tissue may be from the searched surface, in addition to that surface's own position error.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_uncertainty {
-    /// At the start of the period (mm, at least 0): the speed times age and transit, and the error of registration.
+    /// At the start of the period (mm, at least 0): the tissue's speed times age and transit time, plus the error of
+    /// registration.
     pub now: f32,
-    /// Most speed (mm/s, at least 0) of the tissue in the period.
+    /// Largest speed (mm/s, at least 0) of the tissue in the period.
     pub speed: f32,
 }
 
 /// An inequality on the motion: `linear . translation + angular . rotation >= least`. For limits that only the caller
-/// knows: joints, a remote centre, a guide. They hold before the walls do.
+/// knows: joints, a remote centre of motion, a guide. They take precedence over the walls.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_motion_row {
@@ -113,7 +115,7 @@ pub struct dibs_motion_row {
     pub linear: [f32; 3],
     /// Factors (mm) of the rotation.
     pub angular: [f32; 3],
-    /// The least sum allowed (mm).
+    /// Lower bound of the sum (mm).
     pub least: f32,
 }
 
@@ -121,17 +123,17 @@ pub struct dibs_motion_row {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_reason {
-    /// It is the command.
+    /// It is the commanded motion.
     Commanded = 0,
-    /// The nearest motion that walls, the caller's rows and the robot's speed allow.
+    /// It is the closest motion that walls, the caller's rows and the robot's speed allow.
     Nearest = 1,
-    /// A half of that, or less: no more could be verified.
+    /// It is half of that motion, or less: no more could be verified.
     Shortened = 2,
-    /// Nothing but rest could be verified.
+    /// No motion could be verified: it is zero.
     Stopped = 3,
-    /// The surface comes closer: the least motion that keeps the stand-off.
+    /// The surface approaches: it is the smallest motion that keeps the stand-off.
     Retreating = 4,
-    /// No motion was found that certainly keeps the stand-off. The motion is the best one known.
+    /// No motion was found that certainly keeps the stand-off. It is the best known one.
     NoSafeMotion = 5,
 }
 
@@ -154,13 +156,14 @@ impl From<Reason> for dibs_reason {
 pub struct dibs_admitted {
     /// The motion to execute.
     pub motion: dibs_motion,
-    /// No separation (mm) of any tool is less at any instant of the period, wherever the tissue is within its uncertainty.
+    /// At no instant of the period the separation (mm) of any tool is less, as long as the tissue is within its
+    /// uncertainty.
     pub least_separation: f32,
-    /// Why it is this motion.
+    /// Why this motion was chosen.
     pub reason: dibs_reason,
-    /// Queries made.
+    /// Number of queries.
     pub queries: u32,
-    /// Instructions that the queries took, by the filter's cost.
+    /// Instructions of the queries, by the filter's cost model.
     pub instructions: u32,
 }
 
@@ -176,7 +179,7 @@ impl From<Admitted> for dibs_admitted {
     }
 }
 
-/// A tick of a filter, but for its tools.
+/// The arguments of a filter's tick, except its tools.
 struct Command<'r> {
     filter: Filter,
     motion: Motion,
@@ -195,30 +198,32 @@ impl Command<'_> {
     }
 }
 
-/// The motion nearest to a commanded one that keeps every tool of a rigid chain out of the tissue at every instant of the
-/// period. After an error nothing is admitted: the tool stays at rest.
+/// The motion closest to a commanded one that keeps every tool of a rigid chain out of the tissue at every instant of
+/// the period. After an error nothing is admitted: the tool must rest.
 ///
-/// The promise is that of the core's module `filter`: the robot executes the motion, the tissue is within its uncertainty and
-/// no faster than stated, the surface within its stretch. A tick does not end because a search was cut: its tracker goes on
-/// in the next one.
+/// The promise is that of the core's module `filter`, provided that the robot executes the motion, the tissue is within
+/// its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
+/// its tracker continues in the next tick.
 ///
-/// Cost: the filter's instructions at most for the queries, and for each motion that is tried 1,000 as a rule, 40,000 at
-/// most.
+/// Cost: at most the filter's instructions for the queries, and for each motion that is tried usually 1,000, at most
+/// 40,000.
 ///
 /// @param filter       The filter.
-/// @param trackers     Addresses of the trackers, one for each tool. No tracker is there twice.
-/// @param frame        A reader's frame, for all tools, without a copy of it; null for the trackers' own surfaces.
+/// @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.
+/// @param frame        A reader's frame, used for all tools without copying it; null for the trackers' own surfaces.
 /// @param tools        The tools as they are now, in the same order.
-/// @param count        Tools: 1 to `DIBS_FILTER_TOOLS`.
+/// @param count        Number of tools: 1 to `DIBS_FILTER_TOOLS`.
 /// @param command      The commanded motion.
 /// @param period       The period, in s: above 0.
 /// @param uncertainty  That of the tissue.
 /// @param rows         The caller's rows; null for none.
 /// @param row_count    Their number: at most `DIBS_FILTER_ROWS`.
-/// @param admitted     Receives the motion to execute, and why it is that; nothing is written after an error.
-/// @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range; `DIBS_CODE_NOT_FINITE` for a
-///         command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too many, too many rows, or a frame of the
-///         caller's vertices; those of `dibs_tracker_closest`; or a misuse.
+/// @param admitted     Receives the motion to execute, and its reason; nothing is written after an error.
+/// @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range;
+/// `DIBS_CODE_NOT_FINITE` for a
+///          command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too many, too many rows, or a
+/// frame of the
+///          caller's vertices; the errors of `dibs_tracker_closest`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_filter_admit(
     filter: *const dibs_filter,
@@ -258,7 +263,7 @@ pub extern "C" fn dibs_filter_admit(
             let frame = frame.open()?;
             let surface = match &frame.table {
                 Table::Empty => return Err(dibs_code::NoSurface),
-                // Their motion is not measured.
+                // The motion of a caller's vertices is not measured.
                 Table::Vertices(_) => return Err(dibs_code::Argument),
                 Table::Held(held) => held.moving(),
             };
@@ -290,7 +295,7 @@ fn read_rows(
     Ok(all)
 }
 
-/// A tool after a motion of up to half a radian: a point of the axis is where the rotation and the displacement lead it.
+/// A tool after a motion of up to half a radian: each point of the axis is rotated and displaced.
 ///
 /// @param motion  The motion.
 /// @param tool    The tool before.
@@ -311,8 +316,8 @@ pub extern "C" fn dibs_motion_apply(
     })
 }
 
-/// The distance (mm) between tool and searched surface at which a period begins without a risk of contact: the uncertainty
-/// at its end. A filter keeps its stand-off beyond that.
+/// The distance (mm) between tool and searched surface at which a period can begin without a risk of contact: the
+/// uncertainty at its end. A filter adds its stand-off to this.
 ///
 /// @param uncertainty  The uncertainty at the start.
 /// @param period       The period, in s.

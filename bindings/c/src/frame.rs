@@ -14,7 +14,7 @@ use crate::tree::dibs_tree;
 /// Bytes of a frame's storage.
 pub const DIBS_FRAME_SIZE: usize = 192;
 
-/// The surface at one moment: vertices of the caller's, or the frame that a reader holds. Queries search it.
+/// The surface at one moment: the caller's vertices, or the frame that a reader holds. Queries search it.
 ///
 /// One context at a time.
 pub struct dibs_frame {
@@ -76,14 +76,14 @@ impl VertexTable for Table {
     }
 }
 
-/// Vertices of the caller's, or those that nodes of the caller's carry.
+/// The caller's vertices, or those that the caller's nodes move.
 pub(crate) struct Vertices {
     rows: Rows,
     nodes: Option<&'static Nodes<'static>>,
     stretch: Option<MeasuredStretch>,
 }
 
-/// Positions of the caller's.
+/// The caller's positions.
 struct Rows {
     rows: &'static [[f32; 3]],
     position_error: f32,
@@ -134,7 +134,7 @@ impl VertexTable for Vertices {
     }
 }
 
-/// Calls a function of the core with the frame's table and the tool, each as the type that it is.
+/// Calls a function of the core with the frame's table and the tool, each as its own type.
 macro_rules! ask {
     ($frame:expr, $shape:expr, |$table:ident, $tool:ident| $call:expr) => {{
         use crate::frame::Table;
@@ -150,7 +150,7 @@ macro_rules! ask {
 }
 pub(crate) use ask;
 
-/// Makes an empty frame. Storage of a frame that a reader holds is released before it is used anew.
+/// Makes an empty frame. If the storage has a frame that a reader holds, it is released first.
 ///
 /// @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size     Bytes of the storage.
@@ -164,14 +164,14 @@ pub extern "C" fn dibs_frame_init(
     dibs_code::of(|| storage.make(size, frame, || Ok(dibs_frame { table: Table::Empty })))
 }
 
-/// Makes the frame one of these vertices. Its stretch is not measured: queries take the tree's limit.
+/// Sets the frame to these vertices. Their stretch is not measured: queries assume the tree's limit.
 ///
-/// @param frame           The frame; one that a reader holds is released first.
+/// @param frame           The frame; if a reader holds it, it is released first.
 /// @param positions       x, y and z (mm) of each vertex, in the tree's order of rows, not that of the mesh's file:
-///                        `dibs_tree_to_rows`. Not copied: unchanged until the frame is given other vertices or released.
+///                        `dibs_tree_to_rows`. Not copied: they must not change until the frame is given other vertices or released.
 /// @param vertices        Their number.
-/// @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
-///                        every answer.
+/// @param position_error  Largest error (mm, at least 0) of a vertex position. Part of the accuracy of
+///                         every answer.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an error that is negative or not finite, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_set_vertices(
@@ -191,17 +191,19 @@ pub extern "C" fn dibs_frame_set_vertices(
     })
 }
 
-/// Makes the frame the surface that these nodes carry, of a tree that `dibs build --nodes` made. Vertices are computed where a
-/// query reads them. The stretch is not measured: queries take the tree's limit.
+/// Sets the frame to the surface that these nodes move, for a tree that `dibs build --nodes` made. Vertices are
+/// computed when a query reads them. The stretch is not measured: queries assume the tree's limit.
 ///
-/// @param frame           The frame; one that a reader holds is released first.
-/// @param tree            The tree, used for as long as the frame has these nodes.
-/// @param positions       x, y and z (mm) of each node, in the order of the volume's file. Not copied: unchanged until the
-///                        frame is given other positions or released.
+/// @param frame           The frame; if a reader holds it, it is released first.
+/// @param tree            The tree, which must exist as long as the frame has these nodes.
+/// @param positions       x, y and z (mm) of each node, in the order of the volume's file. Not copied: they must not
+/// change until
+///                         the frame is given other positions or released.
 /// @param nodes           Their number.
-/// @param position_error  No node is farther (mm, at least 0) than this from where it is here.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` of another number than the tree's `rows`, `DIBS_CODE_ARGUMENT` where the tree
-///         has no nodes, or for an error that is negative or not finite, or a misuse.
+/// @param position_error  Largest error (mm, at least 0) of a node position.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` for another number than the tree's `rows`, `DIBS_CODE_ARGUMENT` if
+/// the tree
+///          has no nodes, or for an error that is negative or not finite, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_set_nodes(
     frame: *mut dibs_frame,
@@ -226,20 +228,21 @@ pub extern "C" fn dibs_frame_set_nodes(
     })
 }
 
-/// So many positions of the caller's.
+/// The caller's positions.
 pub(crate) fn rows(positions: *const f32, count: u32) -> Result<&'static [[f32; 3]], dibs_code> {
     let floats = (count as usize).checked_mul(3).ok_or(dibs_code::Argument)?;
     let (rows, _) = positions.slice(floats)?.as_chunks();
     Ok(rows)
 }
 
-/// Measures the stretch of the frame's vertices, which makes queries on it cheaper. Frames from a receiver are measured.
+/// Measures the stretch of the frame, which makes queries on it cheaper. A receiver's frames are already measured.
 ///
 /// Cost: linear in the triangles.
 ///
 /// @param stretch  Receives the largest stretch, 1 for none; or null.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, vertices in the file's order
-///         among them, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` if distances on this frame could be wrong, as with vertices in the
+///         file's order, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a
+///         misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_measure(
     frame: *mut dibs_frame,
@@ -267,15 +270,15 @@ pub extern "C" fn dibs_frame_measure(
     })
 }
 
-/// Facts about a frame.
+/// Properties of a frame.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_frame_facts {
-    /// Vertices.
+    /// Number of vertices.
     pub vertices: u32,
-    /// No vertex is farther (mm) than this from where it is here. Part of the accuracy of every answer.
+    /// Largest error (mm) of a vertex position. Part of the accuracy of every answer.
     pub position_error: f32,
-    /// The largest stretch, 1 for none; 0 where it was not measured.
+    /// The largest stretch, 1 for none; 0 if it was not measured.
     pub stretch: f32,
 }
 
@@ -289,9 +292,9 @@ impl dibs_frame_facts {
     }
 }
 
-/// Facts about the frame.
+/// Reads the properties of a frame.
 ///
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` for an empty frame, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_get_facts(
     frame: *mut dibs_frame,
@@ -308,7 +311,7 @@ pub extern "C" fn dibs_frame_get_facts(
     })
 }
 
-/// Lets go of the vertices, or of the frame that a reader holds: the next one can then be published.
+/// Releases the vertices, or the frame that a reader holds: the next frame can then be published.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_release(frame: *mut dibs_frame) -> dibs_code {
     dibs_code::of(|| {

@@ -1,4 +1,4 @@
-//! The control tick's end of a guarded surface: pose in, answer out.
+//! The control tick's end of a guarded surface: from a tool's pose to an answer.
 
 use core::ffi::c_void;
 use core::ptr;
@@ -27,15 +27,15 @@ use crate::tree::{DIBS_TREE_SIZE, Row, dibs_tree, dibs_tree_init};
 /// Bytes of a guard's storage.
 pub const DIBS_GUARD_SIZE: usize = 25_344;
 
-/// The control tick's end of a guarded surface: the closest pair of one tool on the surface as it is now, and the trust in
-/// it.
+/// The control tick's end of a guarded surface: it finds the closest pair of one tool and the present surface, and
+/// decides whether to trust the surface.
 ///
 /// One context at a time: the control interrupt, of higher priority than the bus's.
 pub struct dibs_guard(TheGuard);
 
 type OfRows<R> = Guard<'static, 'static, Row, STACK, DIBS_OPENED, R, DIBS_OPENED>;
 
-/// Of frames of vertices, or of the nodes that carry the surface.
+/// For frames of vertices, or of the nodes that move the surface.
 enum TheGuard {
     Vertices(OfRows<OfVertices>),
     Nodes(OfRows<OfNodes>),
@@ -62,7 +62,7 @@ impl Kind for dibs_guard {
     const SIZE: usize = DIBS_GUARD_SIZE;
 }
 
-/// Makes the control tick's end of a surface, once. `dibs_start` makes it with all that it needs.
+/// Makes the control tick's end of a surface, once. `dibs_start` makes it together with all other objects.
 ///
 /// @param storage  `DIBS_GUARD_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size     Bytes of the storage.
@@ -70,9 +70,10 @@ impl Kind for dibs_guard {
 /// @param tree     Its tree.
 /// @param limits   The guard's limits: the same as for `dibs_bus_init`.
 /// @param guard    Receives the guard's address.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many rows; `DIBS_CODE_STORAGE_SIZE`
-///         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
-///         `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of rows is not the tree's;
+/// `DIBS_CODE_STORAGE_SIZE`
+///          also if the surface has only two buffers; `DIBS_CODE_TAKEN` if its end was taken;
+///          `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_guard_init(
     storage: *mut c_void,
@@ -102,31 +103,31 @@ pub extern "C" fn dibs_guard_init(
     })
 }
 
-/// The answer of a tick: what a wall may act on, and how it came about.
+/// The answer of a tick: the pair that a wall may act on, and how it was found.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_answer {
-    /// A `dibs_code`: `DIBS_CODE_OK` where there is a pair to act on; otherwise why there is none.
+    /// A `dibs_code`: `DIBS_CODE_OK` if there is a pair to act on; otherwise why there is none.
     pub outcome: u32,
-    /// The closest pair to act on; no numbers where there is none. Its accuracy covers the frame's error, the
-    /// extrapolation's, and the tissue's motion where the surface lags; where its side is not known it is the last one whose
-    /// side was.
+    /// The closest pair to act on; NaN if there is none. Its accuracy covers the frame's error, the extrapolation's
+    /// error, and the tissue's motion during the surface's lag. If its side is unknown, it is the last pair whose side
+    /// was known.
     pub closest: dibs_proximity,
-    /// Its certified interval: act on the lower end. From minus to plus infinity where there is no pair.
+    /// Its certified interval: act on the lower bound. From minus to plus infinity if there is no pair.
     pub interval: dibs_interval,
-    /// Velocity (mm/s) of the tool's point of the pair relative to the surface's; without a pair that of the middle of the
-    /// axis. Zero at the first tick, and no number without a tool.
+    /// Velocity (mm/s) of the tool's point of the pair relative to the surface's; without a pair that of the middle of
+    /// the axis. Zero at the first tick, NaN without a tool.
     pub velocity: dibs_vec3,
     /// The trust in the surface: state, cause, margin.
     pub trust: dibs_verdict,
     /// The frame that was searched, and its age.
     pub age: dibs_age,
-    /// Time (ms) by which the surface that was searched is behind the present, as far as its error does not cover it;
-    /// `UINT32_MAX` where that is not known.
+    /// Time (ms) by which the searched surface lags behind the present, as far as its error does not cover it;
+    /// `UINT32_MAX` if unknown.
     pub lag: u32,
     /// The health of the bus.
     pub link: dibs_link,
-    /// The surface that was searched, and the pair on it, trusted or not: for records.
+    /// The searched surface, and the pair on it, trusted or not: for records.
     pub searched: dibs_searched,
 }
 
@@ -134,20 +135,20 @@ pub struct dibs_answer {
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_searched {
-    /// A `dibs_code`: `DIBS_CODE_OK` where there is a pair; otherwise why there is none. Before the first surface the rest is
-    /// 0, and the residual -1.
+    /// A `dibs_code`: `DIBS_CODE_OK` if there is a pair; otherwise why there is none. Before the first surface all
+    /// other fields are 0, and the residual is -1.
     pub outcome: u32,
-    /// The pair; no numbers where there is none. Its accuracy covers the frame's error and the extrapolation's.
+    /// The pair; NaN if there is none. Its accuracy covers the frame's error and the extrapolation's.
     pub tracked: dibs_tracked,
-    /// Number of the frame before that of the answer's age; the same for a surface that is held.
+    /// Number of the frame before the latest one; the same number if the surface is held at the latest frame.
     pub before: u32,
-    /// Its time in steps: 0 is the frame before, 1 the last frame, 3 the end of the extrapolation.
+    /// Its time in frame intervals: 0 is the previous frame, 1 the latest one, 3 the end of the extrapolation.
     pub t: f32,
-    /// Error (mm) of each position, that of the extrapolation included.
+    /// Error (mm) of each position, including that of the extrapolation.
     pub position_error: f32,
-    /// The distance (mm) of the last frames from their extrapolation; -1 for a surface that is held.
+    /// The distance (mm) of recent frames from their extrapolation; -1 if the surface is held at the latest frame.
     pub residual: f32,
-    /// Its velocity (mm/s) at the pair: from one frame to the next, zero for a surface that is held.
+    /// Its velocity (mm/s) at the pair: from one frame to the next, zero if the surface is held.
     pub velocity: dibs_vec3,
 }
 
@@ -187,18 +188,20 @@ impl From<Answer> for dibs_answer {
     }
 }
 
-/// The answer of this tick: the closest pair on the surface published last, moved on to now, and whether it may be trusted.
+/// The answer of this tick: the closest pair on the latest published surface, extrapolated to now, and whether to trust
+/// it.
 ///
-/// Call it at every tick. Errors of the query are in the answer, and lead to the safe state.
+/// Call it at every tick. An error of the query is reported in the answer, and leads to the safe state.
 ///
-/// Cost: the budget at most, and about a thousand instructions.
+/// Cost: at most the budget, and about a thousand instructions.
 ///
 /// @param guard   The guard.
-/// @param tool    The tool; null where it has no pose: the answer is then the hold, and the next velocity starts anew.
+/// @param tool    The tool; null if it has no pose: the answer is then the hold, and the velocity is measured anew.
 /// @param now     The receiver's clock, in ms; wraps.
 /// @param answer  Receives the answer.
-/// @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_TOOL_COORDINATE` or `DIBS_CODE_TOOL_RADIUS`, with the answer of a
-///         tool without a pose; or a misuse.
+/// @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_TOOL_COORDINATE` or `DIBS_CODE_TOOL_RADIUS`, with the same
+/// answer as
+///          without a pose; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_guard_closest(
     guard: *mut dibs_guard,
@@ -209,7 +212,7 @@ pub extern "C" fn dibs_guard_closest(
     dibs_code::of(|| {
         let (answer, mut guard, now) = (answer.check()?, guard.open()?, Millis(now));
         let shape = tool.get_if_any()?.map(Shape::try_from).transpose();
-        // Without a pose the machine takes its step all the same.
+        // Without a pose the fail-safe machine still takes its step.
         let found = match &shape {
             Ok(Some(Shape::Sphere(sphere))) => {
                 with_guard!(&mut guard.0, |guard| guard.closest(sphere, now))
@@ -223,7 +226,7 @@ pub extern "C" fn dibs_guard_closest(
     })
 }
 
-/// The answer of a tick whose tool may have had no pose.
+/// The answer of a tick, whose tool may have no pose.
 fn conclude<S>(
     place: Place<dibs_answer>,
     found: Answer,
@@ -237,19 +240,19 @@ fn conclude<S>(
     shape.map(|_| ())
 }
 
-/// The answer of this tick, and all locally closest pairs whose separation is at most `margin`, deepest first, in the one
-/// budget. Each has the velocity of the surface there, so that `dibs_contacts_set_velocities` is not needed.
+/// The answer of this tick, and all locally closest pairs with a separation of at most `margin`, deepest first, within
+/// the same budget. Each has the velocity of the surface there, so `dibs_contacts_set_velocities` is not needed.
 ///
-/// Call it in place of `dibs_guard_closest`. Act on the list only where the answer's outcome is `DIBS_CODE_OK`, and for a
-/// constraint within the list's bound. Its accuracy covers what the pair's does.
+/// Call it instead of `dibs_guard_closest`. Act on the list only if the answer's outcome is `DIBS_CODE_OK`, and in a
+/// constraint only up to the list's bound. Its accuracy covers the same errors as the pair's.
 ///
 /// Cost: that of `dibs_guard_closest`, and some hundred instructions a contact.
 ///
 /// @param guard     The guard.
-/// @param tool      The tool; null where it has no pose: the list is then empty.
+/// @param tool      The tool; null if it has no pose: the list is then empty.
 /// @param margin    In mm, at least 0.
 /// @param now       The receiver's clock, in ms; wraps.
-/// @param contacts  The list; empty where there is no surface, or the query failed.
+/// @param contacts  The list; empty if there is no surface, or the query failed.
 /// @param answer    Receives the answer.
 /// @return As `dibs_guard_closest`.
 #[unsafe(no_mangle)]
@@ -283,11 +286,11 @@ pub extern "C" fn dibs_guard_contacts(
     })
 }
 
-/// The answer of this tick, and the motion nearest to a commanded one that keeps the tool out of the tissue until the next tick.
-/// The period, the tissue's speed, lag and transit are the guard's. The surface is extrapolated, whose residual is an
-/// estimate.
+/// The answer of this tick, and the motion closest to a commanded one that keeps the tool out of the tissue until the
+/// next tick. The period, the tissue's speed, lag and transit time are the guard's. The surface is extrapolated, and
+/// its residual is an estimate.
 ///
-/// Call it in place of `dibs_guard_closest`. After an error nothing is admitted: the tool stays at rest.
+/// Call it instead of `dibs_guard_closest`. After an error nothing is admitted: the tool must rest.
 ///
 /// Cost: that of `dibs_guard_closest` and of `dibs_filter_admit`.
 ///
@@ -296,7 +299,7 @@ pub extern "C" fn dibs_guard_contacts(
 /// @param tool      The tool as it is now.
 /// @param command   The commanded motion.
 /// @param now       The receiver's clock, in ms; wraps.
-/// @param answer    Receives the answer, also where nothing is admitted; or null.
+/// @param answer    Receives the answer, even if nothing is admitted; or null.
 /// @param admitted  Receives the motion to execute.
 /// @return As `dibs_filter_admit`; in the safe state its cause.
 #[unsafe(no_mangle)]
@@ -321,7 +324,7 @@ pub extern "C" fn dibs_guard_admit(
             Ok(Shape::Capsule(capsule)) => {
                 with_guard!(&mut guard.0, |guard| guard.admit(&filter, capsule, &command, now))
             }
-            // Without a pose the machine takes its step all the same.
+            // Without a pose the fail-safe machine still takes its step.
             Err(_) => {
                 let no_pose = FilterError::Untrusted(Unavailable::NoPose);
                 (guard.0.without_pose(now), Err(no_pose))
@@ -366,23 +369,25 @@ pub extern "C" fn dibs_answer_force(
     }
 }
 
-/// Bytes of the memory of a loop's objects, besides the surface.
+/// Bytes of the memory for a control loop's objects, except the surface.
 pub const DIBS_START_BASE: usize = DIBS_TREE_SIZE + DIBS_BUS_SIZE + DIBS_GUARD_SIZE;
 
-/// Makes all that a control loop needs in one piece of memory: validates the tree, and makes the surface and its two ends. For
-/// pieces apart, each in memory of its own: `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init`, `dibs_guard_init`.
+/// Makes all objects of a control loop in one piece of memory: validates the tree, and makes the surface and its two
+/// ends. To make each object in memory of its own, use `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init` and
+/// `dibs_guard_init`.
 ///
 /// Cost: linear in the bytes; once, at start-up.
 ///
-/// @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that carry them), aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no
-///                initial value.
+/// @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that move them),
+/// aligned
+///                 to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no initial value.
 /// @param size    Bytes of the memory.
 /// @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
 /// @param length  Bytes of the tree.
 /// @param limits  The guard's limits.
 /// @param bus     Receives the bus's address.
 /// @param guard   Receives the guard's address.
-/// @return As of the four functions; `DIBS_CODE_STORAGE_SIZE` where the tree has more rows than there is room for.
+/// @return As the four functions; `DIBS_CODE_STORAGE_SIZE` if the tree has more rows than fit.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_start(
     memory: *mut c_void,

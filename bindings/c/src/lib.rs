@@ -1,11 +1,11 @@
 //! The C interface of [`dibs_nostd`]: `include/dibs.h`, which is generated from this crate.
 //!
-//! Each function checks what it was given, calls the core, and returns a code. Objects live in storage of the caller's.
-//! Nothing is allocated and nothing panics, but in the sender, which is for a computer alone. On a board the second is
-//! proved by the linker: the panic handler calls a function that does not exist.
+//! Each function checks its arguments, calls the core, and returns a code. Objects are stored in the caller's memory.
+//! Nothing is allocated and nothing panics, except in the sender, which is for a host computer only. For a board the
+//! linker proves that nothing panics: the panic handler calls a function that does not exist.
 //!
-//! Names are those of the header. `unsafe` stands in `border`, which trusts the caller's pointers, in `surface`, whose
-//! buffers have a size that no type has, and where a struct of the header has pointers.
+//! Names are those of the header. `unsafe` is used only in `border`, which trusts the caller's pointers, in `surface`,
+//! whose buffers have a size that no type has, and for structs of the header that contain pointers.
 
 // Requirement: P-06
 

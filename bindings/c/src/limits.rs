@@ -1,4 +1,4 @@
-//! The limits of a bus and a guard: numbers that only their user knows.
+//! The limits of a bus and a guard: numbers that only the user knows.
 
 use dibs_nostd::Millis;
 use dibs_nostd::guard::GuardLimits;
@@ -9,36 +9,36 @@ use crate::failsafe::dibs_limits;
 use crate::query::{DIBS_UNLIMITED, dibs_options};
 use crate::receiver::dibs_surface_limits;
 
-/// How far a surface is trusted, and how a tick asks. `dibs_guard_limits_of` makes one of two numbers.
+/// Limits on the trust in a surface, and options of a tick's query. `dibs_guard_limits_of` makes one from two numbers.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_guard_limits {
     /// Largest speed (mm/s) of any point of the tissue, at least 0.
     pub speed: f32,
-    /// Largest age (ms) of a surface: about two periods of the source and the time on the way. From three quarters of it on
-    /// the state is degraded, beyond it safe.
+    /// Largest age (ms) of a surface: about two periods of the source plus the transit time. From three quarters of it
+    /// on the state is degraded, above it safe.
     pub age: u32,
-    /// Ticks of the control loop a second, above 0: velocities count from it.
+    /// Ticks of the control loop a second, above 0: needed for velocities.
     pub ticks_a_second: u32,
-    /// Options of every tick's query; its budget is the most work of a tick.
+    /// Options of every tick's query; the budget limits the work of a tick.
     pub options: dibs_options,
-    /// 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+    /// 0 to leave the safe state only by an acknowledgement; otherwise automatically.
     pub automatic: u32,
-    /// Other than 0 for a line on which no status goes back: a delayed frame is then taken for a new one, and no margin
+    /// Other than 0 for a line that returns no status: a delayed frame is then taken for a new one, and no margin
     /// covers the delay.
     pub without_transit: u32,
-    /// The fail-safe machine's limits; or null for those that follow from the four numbers above.
+    /// The fail-safe machine's limits; or null to derive them from the numbers above.
     pub trust: *const dibs_limits,
-    /// The published surfaces' limits; or null for those that follow from the speed and the tree's rest shape: no vertex is
-    /// farther than four sizes of it.
+    /// The published surfaces' limits; or null to derive them from the speed and the tree's rest shape: a reach of four
+    /// times its size.
     pub surfaces: *const dibs_surface_limits,
 }
 
-// SAFETY: numbers and pointers.
+// SAFETY: the fields are numbers and pointers.
 unsafe impl AnyBits for dibs_guard_limits {}
 
 impl dibs_guard_limits {
-    /// The core's limits.
+    /// Converts them to the core's limits.
     pub(crate) fn read(self) -> Result<GuardLimits, dibs_code> {
         if self.ticks_a_second == 0 {
             return Err(dibs_code::Argument);

@@ -2,8 +2,8 @@
 
 use core::panic::PanicInfo;
 
-/// Links only if the optimiser has removed every call: a surviving panic path is a link error that names this symbol.
-/// Debug builds keep overflow checks and bounds checks, so they stop instead.
+/// Links only if the optimiser has removed every call: a remaining panic path is a link error that names this symbol.
+/// Debug builds have overflow checks and bounds checks, so they stop instead.
 #[panic_handler]
 fn panic(_info: &PanicInfo<'_>) -> ! {
     #[cfg(not(debug_assertions))]
@@ -11,7 +11,7 @@ fn panic(_info: &PanicInfo<'_>) -> ! {
         unsafe extern "C" {
             fn dibs_a_panic_path_survived() -> !;
         }
-        // SAFETY: never reached: the symbol is defined nowhere.
+        // SAFETY: never called: the symbol is not defined anywhere.
         unsafe { dibs_a_panic_path_survived() }
     }
     #[cfg(debug_assertions)]
@@ -20,7 +20,7 @@ fn panic(_info: &PanicInfo<'_>) -> ! {
     }
 }
 
-/// A panic path put in on purpose.
+/// A panic path for a test: with it the library must not link.
 #[cfg(feature = "planted-panic")]
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_planted_panic(at: usize) -> u8 {

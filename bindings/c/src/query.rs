@@ -17,10 +17,10 @@ use crate::tree::{Row, dibs_tree};
 /// Bytes of a query's storage.
 pub const DIBS_QUERY_SIZE: usize = 4_864;
 
-/// Entries of the stack: as many as the format allows, so that any tree can be searched.
+/// Entries of the stack: as many as the format allows, so that every tree can be searched.
 pub(crate) const STACK: usize = 512;
 
-/// A query on one tree. It starts from its last answer.
+/// A query on one tree. It starts its search from its last answer.
 ///
 /// One context at a time.
 pub struct dibs_query(pub(crate) Query<'static, Row, STACK>);
@@ -30,41 +30,41 @@ impl Kind for dibs_query {
     const SIZE: usize = DIBS_QUERY_SIZE;
 }
 
-/// As much as it takes, for a budget; no limit, for a watch.
+/// For a budget: unlimited work. For a pair of limits: no limit.
 pub const DIBS_UNLIMITED: u32 = u32::MAX;
 
 const _: () = assert!(Budget::UNLIMITED.tests() == DIBS_UNLIMITED);
 
-// The text of the options' budget.
+// The documentation of the options' budget states this number.
 const _: () = assert!(Budget::TRIANGLE == 8);
 
 /// A flag of options: neither answer nor cost depends on earlier queries.
 pub const DIBS_COLD: u32 = 1;
 
-/// A flag of options: no side is asked for, at the cost of the distance alone. The separation is that of a tool outside.
+/// A flag of options: the side is not determined, which saves its cost. The separation is that of a tool outside.
 pub const DIBS_UNSIGNED: u32 = 2;
 
-/// List only contacts of the triangles with the options' label, as if the others were not there.
+/// A flag of options: lists only contacts of the triangles with the options' label, as if the others did not exist.
 pub const DIBS_CONTACTS_OF: u32 = 4;
 
 /// Options of a query. Null for none: no budget, a warm start, signed.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_options {
-    /// The most work, in tests of spheres and planes, of which an exact triangle test counts as 8:
-    /// `dibs_budget_for_instructions`. 0 asks for next to nothing: set it.
+    /// The most work, in tests of spheres and planes, where an exact triangle test counts as 8:
+    /// `dibs_budget_for_instructions`. 0 allows next to no work, so set it.
     pub budget: u32,
-    /// Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
+    /// Largest length (mm) of the interval of a depth if the tool's axis crosses the surface; 0 for a 512th of the
     /// axis' length.
     pub depth_tolerance: f32,
-    /// The sum of any of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
+    /// Any sum of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
     pub flags: u32,
     /// A triangle's label, for `DIBS_CONTACTS_OF`: at most 255.
     pub label: u32,
 }
 
 impl dibs_options {
-    /// The core's options.
+    /// Converts them to the core's options.
     pub(crate) fn of(options: *const Self) -> Result<Options, dibs_code> {
         options.get_if_any()?.map_or(Ok(Options::new()), Options::try_from)
     }
@@ -96,29 +96,29 @@ impl TryFrom<dibs_options> for Options {
     }
 }
 
-/// On which side of the surface a tool's axis is.
+/// The side of the surface on which a tool's axis is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_side {
-    /// Outside: where the triangles' corners are seen counter-clockwise.
+    /// Outside: from there the triangles' corners appear counter-clockwise.
     Outside = 0,
     /// The whole axis is inside.
     Inside = 1,
     /// The axis crosses the surface.
     Crossing = 2,
-    /// No side: none was asked for.
+    /// No side: not requested.
     NotAsked = 3,
     /// No side: the tree has no adjacency.
     NoAdjacency = 4,
     /// No side: the closest point is on an open boundary of the surface.
     OpenBoundary = 5,
-    /// No side: the sides are closer than the accuracy.
+    /// No side: distances to both sides differ by less than the accuracy.
     BelowAccuracy = 6,
     /// No side: the triangles at the closest point have no clear normal.
     Degenerate = 7,
     /// No side: the budget ran out.
     CutShort = 8,
-    /// No side: the closest point is on an edge of more than two triangles that are no pairs.
+    /// No side: the closest point is on an edge of more than two triangles that do not form pairs.
     NonManifold = 9,
 }
 
@@ -136,7 +136,7 @@ const SIDES: [(dibs_side, Side); 10] = [
     (dibs_side::NonManifold, Side::Undefined(NoSide::NonManifold)),
 ];
 
-/// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.
+/// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_coverage {
@@ -144,8 +144,8 @@ pub enum dibs_coverage {
     Measured = 0,
     /// A bound on the stretch follows from measured frames.
     Proven = 1,
-    /// Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface can be
-    /// missed.
+    /// Nothing was measured: the tree's stretch limit is assumed to hold. If it does not, a nearer part of the surface
+    /// can be missed.
     Assumed = 2,
 }
 
@@ -155,34 +155,35 @@ const COVERAGES: [(dibs_coverage, Coverage); 3] = [
     (dibs_coverage::Assumed, Coverage::Assumed),
 ];
 
-/// In place of a triangle's row: none.
+/// Row of a triangle if there is none.
 pub const DIBS_NO_TRIANGLE: u32 = u32::MAX;
 
-/// The closest pair. `dibs_proximity_interval` gives the interval that holds its separation.
+/// The closest pair. `dibs_proximity_interval` gives the interval that contains its separation.
 ///
-/// Where the side is none of the first three, the numbers are those of a tool outside.
+/// If the side is none of the first three, the numbers are those of a tool outside.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_proximity {
-    /// Signed separation (mm) of the best pair found: negative where tool and surface overlap.
+    /// Signed separation (mm) of the best pair found: negative if tool and surface overlap.
     pub separation: f32,
-    /// The interval's lower end (mm): equal to `separation`, unless the budget ran out or the axis crosses.
+    /// The interval's lower bound (mm): equal to `separation`, unless the budget ran out or the axis crosses the
+    /// surface.
     pub lower: f32,
-    /// No separation above is off by more (mm).
+    /// Largest error (mm) of the separations above.
     pub accuracy: f32,
     /// A `dibs_side`.
     pub side: u32,
-    /// A `dibs_coverage`: whether the stretch that the answer rests on was checked.
+    /// A `dibs_coverage`: whether the stretch that the answer depends on was checked.
     pub coverage: u32,
-    /// Distance (mm) from the tool's axis to the surface: 0 where it crosses.
+    /// Distance (mm) from the tool's axis to the surface: 0 if they cross.
     pub axis_distance: f32,
     /// The surface's point of the pair (mm).
     pub point_on_surface: dibs_vec3,
     /// The tool's point of the pair, on the tool's surface (mm).
     pub point_on_tool: dibs_vec3,
-    /// Unit vector that leads out; zero where none does.
+    /// Unit vector that points out of the surface; zero if it is undefined.
     pub direction: dibs_vec3,
-    /// Place of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.
+    /// Position of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.
     pub axis_parameter: f32,
     /// Row of the triangle of `point_on_surface`, or `DIBS_NO_TRIANGLE`.
     pub triangle: u32,
@@ -251,18 +252,18 @@ impl TryFrom<dibs_proximity> for Proximity {
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_interval {
-    /// No true separation is less.
+    /// Lower bound of the true separation.
     pub lower: f32,
-    /// No true separation is more.
+    /// Upper bound of the true separation.
     pub upper: f32,
 }
 
-/// The certified interval of a pair's separation: both ends include the accuracy, rounded outwards. Act on its lower end.
+/// The certified interval of a separation: both bounds include the accuracy, rounded outwards. Act on the lower one.
 ///
-/// Without a side the tool may be inside at any depth: the lower end is negative infinity. With `DIBS_SIDE_NOT_ASKED` and
-/// `DIBS_SIDE_NO_ADJACENCY` it is that of a tool outside.
+/// Without a side the tool may be inside to any depth: the lower bound is negative infinity. With `DIBS_SIDE_NOT_ASKED`
+/// and `DIBS_SIDE_NO_ADJACENCY` it is that of a tool outside.
 ///
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an invalid side or coverage, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_proximity_interval(
     proximity: *const dibs_proximity,
@@ -294,18 +295,19 @@ pub extern "C" fn dibs_query_init(
 
 /// The closest pair of the tool and the surface in the frame.
 ///
-/// Exact within `accuracy`, as long as the surface keeps to its stretch. A budget that runs out is no error: the interval is
-/// wider then.
+/// Exact within `accuracy`, as long as the surface is within its stretch limit. A budget that runs out is not an error:
+/// the interval is then wider.
 ///
-/// Cost: the budget at most.
+/// Cost: at most the budget.
 ///
 /// @param query      The query.
 /// @param frame      The surface.
 /// @param tool       The tool.
 /// @param options    Options, or null.
 /// @param proximity  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TOOL_COORDINATE` to `DIBS_CODE_QUERY_FAILED`,
-///         `DIBS_CODE_TREE_CORRUPT`, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_TOOL_COORDINATE` to
+/// `DIBS_CODE_QUERY_FAILED`,
+///          `DIBS_CODE_TREE_CORRUPT`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_query_closest(
     query: *mut dibs_query,
@@ -325,7 +327,7 @@ pub extern "C" fn dibs_query_closest(
     })
 }
 
-/// A processor and a tool whose tests were counted.
+/// A processor and a kind of tool whose instructions were measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_cost {
@@ -339,10 +341,10 @@ pub enum dibs_cost {
     X86Capsule = 3,
 }
 
-/// The budget of a query that is to end within so many instructions, by a fit with a margin of 20 %.
+/// The budget of a query that must end within this number of instructions, by a fitted model with a margin of 20 %.
 ///
 /// @param cost  A `dibs_cost`.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is no `dibs_cost`, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is not a `dibs_cost`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_budget_for_instructions(
     instructions: u32,
@@ -356,7 +358,7 @@ pub extern "C" fn dibs_budget_for_instructions(
     })
 }
 
-/// The cost of a number from C.
+/// The cost model that a number from C stands for.
 pub(crate) fn cost_of(cost: u32) -> Result<&'static Cost, dibs_code> {
     const COSTS: [(dibs_cost, &Cost); 4] = [
         (dibs_cost::M7Sphere, &Cost::M7_SPHERE),

@@ -14,7 +14,7 @@ use crate::surface::{Held, Reader, dibs_surface};
 /// Bytes of a reader's storage.
 pub const DIBS_READER_SIZE: usize = 128;
 
-/// Reads the frame that was published last.
+/// Reads the latest published frame.
 ///
 /// One context at a time: the control interrupt.
 pub struct dibs_reader {
@@ -27,15 +27,15 @@ impl Kind for dibs_reader {
     const SIZE: usize = DIBS_READER_SIZE;
 }
 
-/// The frame that was published last, and its age.
+/// The latest published frame, and its age.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_age {
-    /// 0 before the first frame; then the rest is 0, too.
+    /// 0 before the first frame; all other fields are then 0 as well.
     pub is_published: u32,
     /// Number of the frame; wraps.
     pub epoch: u32,
-    /// When its first packet came, on the receiver's clock; wraps.
+    /// Arrival of its first packet, on the receiver's clock; wraps.
     pub received: u32,
     /// Time since then, in the clock's unit.
     pub age: u32,
@@ -62,7 +62,7 @@ impl From<dibs_age> for Option<FrameAge> {
     }
 }
 
-/// The health of the bus. Times in ms, `UINT32_MAX` for one that is not known.
+/// The health of the bus. Times in ms, `UINT32_MAX` if unknown.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_link {
@@ -72,9 +72,9 @@ pub struct dibs_link {
     pub heartbeat: u32,
     /// Frames refused or abandoned since the last one was published.
     pub rejections: u32,
-    /// Packets without a genuine tag, less 10 for each second.
+    /// Packets without an authentic tag, minus 10 for each second.
     pub forgeries: u32,
-    /// Transit of the published frame, at most.
+    /// Upper bound on the transit time of the published frame.
     pub transit: u32,
     /// Age of the published frame when it was sent.
     pub source_age: u32,
@@ -114,7 +114,7 @@ impl From<dibs_link> for Link {
 /// @param size     Bytes of the storage.
 /// @param surface  The surface.
 /// @param reader   Receives the reader's address.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a reader, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` if the surface has a reader already, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_reader_init(
     storage: *mut c_void,
@@ -130,16 +130,17 @@ pub extern "C" fn dibs_reader_init(
     })
 }
 
-/// Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so
-/// release it after the tick's queries.
+/// Holds the latest published frame, if it is not too old. Until it is released no frame is published, so release it
+/// after the tick's queries.
 ///
 /// @param reader  The reader.
 /// @param now     The receiver's clock, in ms; wraps.
-/// @param limit   The greatest age, in ms; UINT32_MAX leaves the age to the fail-safe machine.
-/// @param frame   The frame that holds it; what it held before is released.
-/// @param age     Receives its age, also where it is too old; or null.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
-///         surface, or a misuse. The frame is then empty.
+/// @param limit   Largest age, in ms; UINT32_MAX leaves the age to the fail-safe machine.
+/// @param frame   Holds the frame; a frame that it held before is released.
+/// @param age     Receives its age, even if it is too old; or null.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` if another frame holds one of
+/// this
+///          surface, or a misuse. After an error the frame is empty.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_reader_latest(
     reader: *mut dibs_reader,

@@ -23,12 +23,12 @@ pub const DIBS_MTU: usize = 1_472;
 /// Largest status, framed or not.
 pub const DIBS_STATUS: usize = 98;
 
-/// Largest status packet: the report and all counters in three of them.
+/// Largest status packet: the report and all counters take three of them.
 const STATUS: usize = 96;
 
 const _: () = assert!(DIBS_STATUS == framed_bytes(STATUS));
 
-/// Assembles frames from packets, checks them, and publishes those that are complete and right.
+/// Assembles frames from packets, checks them, and publishes those that are complete and valid.
 ///
 /// One context at a time, of lower priority than the reader's: the bus interrupt.
 pub struct dibs_receiver {
@@ -36,7 +36,7 @@ pub struct dibs_receiver {
     deframer: Deframer<DIBS_MTU>,
     surface: &'static dibs_surface,
     mesh_id: u32,
-    /// Number of the frame published last.
+    /// Number of the latest published frame.
     published: Option<u32>,
 }
 
@@ -46,12 +46,12 @@ impl Kind for dibs_receiver {
 }
 
 impl dibs_receiver {
-    /// Tells the reader how the bus is.
+    /// Passes the bus's health to the reader.
     fn note(&self) {
         self.surface.notes.link().set(&self.assembler.health());
     }
 
-    /// The end of a packet.
+    /// The common end of all calls that receive a packet.
     fn end(
         &self,
         outcome: Result<Progress, dibs_code>,
@@ -63,18 +63,18 @@ impl dibs_receiver {
     }
 }
 
-/// Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
+/// Limits of a surface in addition to the tree's stretch limit. A limit that is NaN refuses every frame.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_surface_limits {
-    /// No coordinate is beyond this (mm) on any axis. The smaller, the more damage it tells from a surface.
+    /// Largest magnitude (mm) of a coordinate. The smaller it is, the more damage it detects.
     pub reach: f32,
     /// Largest speed of a vertex, in mm per ms (m/s); `INFINITY` for no limit.
     pub speed: f32,
-    /// Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
+    /// Least size of a region relative to its size at rest, 0.25 for example; 0 for no limit.
     pub shrinkage: f32,
-    /// Farthest (mm) that a vertex may be from its place in the published frame, however long ago that was; 0 for a
-    /// tenth of the reach, `INFINITY` for no limit.
+    /// Largest displacement (mm) of a vertex from its position in the published frame, however long ago that was; 0 for
+    /// a tenth of the reach, `INFINITY` for no limit.
     pub recovery: f32,
 }
 
@@ -93,8 +93,9 @@ impl From<dibs_surface_limits> for SurfaceLimits {
 /// @param tree      Its tree.
 /// @param limits    Limits of every frame.
 /// @param receiver  Receives the receiver's address.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_TAKEN` where
-///         the surface has a receiver; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of vertices is not the tree's;
+/// `DIBS_CODE_TAKEN` if
+///          the surface has a receiver already; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_init(
     storage: *mut c_void,
@@ -127,15 +128,15 @@ pub enum dibs_progress {
     None = 0,
     /// A frame began.
     Begun = 1,
-    /// The packet was taken.
+    /// The packet was accepted.
     Stored = 2,
-    /// The packet had come before, and was ignored.
+    /// The packet was a repetition, and was ignored.
     Duplicate = 3,
     /// The frame is complete: `dibs_receiver_advance` checks and publishes it.
     Complete = 4,
-    /// The sender lives.
+    /// The packet was a heartbeat of the sender.
     Heartbeat = 5,
-    /// The sender asks for a status: it is due now.
+    /// The packet was a hello, which asks for a status: it is due now.
     Hello = 6,
 }
 
@@ -152,8 +153,9 @@ impl From<Progress> for dibs_progress {
     }
 }
 
-/// Registers the surface anew: the next whole frame is compared with none before it. For an operator who knows that the
-/// tissue was moved farther than `dibs_surface_limits.recovery`; until then no frame that far away is published.
+/// Registers the surface again: the next whole frame is not compared with an earlier one. For an operator who knows
+/// that the tissue was moved farther than `dibs_surface_limits.recovery`; until then no frame that far away is
+/// published.
 ///
 /// @return `DIBS_CODE_OK`, or a misuse.
 #[unsafe(no_mangle)]
@@ -164,7 +166,7 @@ pub extern "C" fn dibs_receiver_register(receiver: *mut dibs_receiver) -> dibs_c
     })
 }
 
-/// Takes one packet, whole: a datagram, or the data of a CAN-FD message.
+/// Receives one whole packet: a datagram, or the data of a CAN-FD message.
 ///
 /// Cost: linear in the bytes.
 ///
@@ -173,8 +175,8 @@ pub extern "C" fn dibs_receiver_register(receiver: *mut dibs_receiver) -> dibs_c
 /// @param length    Its bytes.
 /// @param now       The receiver's clock, in ms; wraps.
 /// @param progress  Receives its outcome, or null.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` where the packet was not taken, which
-///         has been counted, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` if the packet was refused (and
+///          counted), or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_accept(
     receiver: *mut dibs_receiver,
@@ -190,13 +192,13 @@ pub extern "C" fn dibs_receiver_accept(
     })
 }
 
-/// Takes one byte of a stream of COBS frames, each ended by a zero: a serial line.
+/// Receives one byte of a stream of COBS frames, each ended by a zero, such as a serial line.
 ///
 /// @param receiver  The receiver.
 /// @param byte      The byte.
 /// @param now       The receiver's clock, in ms; wraps.
 /// @param progress  Receives the outcome of the packet that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
-/// @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` where bytes between two zeros are no packet.
+/// @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` if the bytes between two zeros are not a packet.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_byte(
     receiver: *mut dibs_receiver,
@@ -230,7 +232,7 @@ pub enum dibs_advance {
     Idle = 0,
     /// More work is left.
     Pending = 1,
-    /// The frame is admitted, but the last one is being read: a later call publishes it.
+    /// The frame is admitted, but the previous one is being read: a later call publishes it.
     Held = 2,
     /// The frame is published.
     Published = 3,
@@ -247,15 +249,16 @@ impl From<Advance> for dibs_advance {
     }
 }
 
-/// Does some of the work that is due: checks rows and triangles, and publishes a frame that keeps to its limits.
+/// Does some of the pending work: checks rows and triangles, and publishes a frame that is within its limits.
 ///
-/// Worth calling after each packet, and from time to time when the bus is quiet. Cost: linear in `work`.
+/// Call it after each packet, and from time to time when the bus is quiet. Cost: linear in `work`.
 ///
 /// @param receiver  The receiver.
 /// @param work      Most rows and triangles that are checked or copied.
 /// @param advance   Receives the outcome, or null.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` where the frame is refused,
-///         which has been counted; or a misuse.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` if the frame is
+/// refused (and
+///          counted); or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_advance(
     receiver: *mut dibs_receiver,
@@ -281,9 +284,9 @@ pub extern "C" fn dibs_receiver_advance(
 /// @param now       The receiver's clock, in ms.
 /// @param safety    0 not reported, 1 nominal, 2 degraded, 3 safe.
 /// @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
-/// @param out       Receives it.
-/// @param capacity  Bytes that there is room for: `DIBS_STATUS` are enough.
-/// @param length    Receives its length.
+/// @param out       Receives the status.
+/// @param capacity  Size of `out` in bytes: `DIBS_STATUS` is enough.
+/// @param length    Receives the status's length.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_status(
@@ -312,7 +315,7 @@ pub extern "C" fn dibs_receiver_status(
     })
 }
 
-/// Number of the frame that was published last, which wraps.
+/// Number of the latest published frame; wraps.
 ///
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, or a misuse.
 #[unsafe(no_mangle)]
@@ -324,7 +327,7 @@ pub extern "C" fn dibs_receiver_epoch(receiver: *mut dibs_receiver, epoch: *mut 
     })
 }
 
-/// Position (mm) of a vertex in the frame that was published last, for a checksum of the published rows, or a log.
+/// Position (mm) of a vertex in the latest published frame, for a checksum of the published rows, or a log.
 ///
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
 #[unsafe(no_mangle)]
@@ -346,11 +349,10 @@ pub const DIBS_EVENTS: usize = 27;
 
 const _: () = assert!(Event::ALL.len() == DIBS_EVENTS);
 
-/// Name of an event, in English: published, abandoned, duplicate, heartbeat, and from the fifth on rejections by their
-/// cause.
+/// Name of an event, in English: published, abandoned, duplicate, heartbeat, then rejections by their cause.
 ///
-/// @param event  Its place among the counters.
-/// @return A static text; never null, also for a number that is no event.
+/// @param event  Its index among the counters.
+/// @return A static text; never null, even for a number that is not an event.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_event_name(event: u32) -> *const c_char {
     let event = Event::ALL.into_iter().find(|known| *known as u32 == event);

@@ -11,38 +11,40 @@ use crate::query::{STACK, dibs_options, dibs_proximity, dibs_query};
 use crate::tool::{DIBS_TOOLS, chain, dibs_tool};
 use crate::tree::Row;
 
-/// Most surfaces of a scene.
+/// Largest number of surfaces in a scene.
 pub const DIBS_SURFACES: usize = 8;
 
-/// A chain of tools, whose axes touch each other, and the surfaces around it. A chain and one surface are a scene too.
+/// A chain of tools whose axes touch each other, and the surfaces around it. A chain and one surface are a scene as
+/// well.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_scene {
-    /// Addresses of queries, one for each surface, on the surface's tree. No query is there twice.
+    /// Addresses of queries, one for each surface, on the surface's tree. No query may be listed twice.
     pub queries: *const *mut dibs_query,
-    /// Addresses of the surfaces' frames, in the same order. No frame is there twice.
+    /// Addresses of the surfaces' frames, in the same order. No frame may be listed twice.
     pub frames: *const *mut dibs_frame,
-    /// Surfaces: 1 to `DIBS_SURFACES`.
+    /// Number of surfaces: 1 to `DIBS_SURFACES`.
     pub surface_count: u32,
     /// The chain's tools.
     pub tools: *const dibs_tool,
-    /// Tools: 1 to `DIBS_TOOLS`.
+    /// Number of tools: 1 to `DIBS_TOOLS`.
     pub tool_count: u32,
 }
 
-// SAFETY: pointers and numbers.
+// SAFETY: the fields are pointers and numbers.
 unsafe impl AnyBits for dibs_scene {}
 
 /// The closest pair of a scene.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_closest {
-    /// The surface's number in the scene.
+    /// Index of the surface in the scene.
     pub surface: u32,
-    /// The tool's number in the chain.
+    /// Index of the tool in the chain.
     pub tool: u32,
-    /// The pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are those
-    /// of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
+    /// The pair. Its interval starts at the least lower bound of all pairs, its accuracy is the worst, and its tests
+    /// are those of all pairs. Its side is `DIBS_SIDE_CUT_SHORT` if the budget ended before the side of any pair was
+    /// known.
     pub proximity: dibs_proximity,
 }
 
@@ -55,7 +57,7 @@ impl dibs_closest {
     }
 }
 
-/// The scene's objects, this call's alone.
+/// The scene's objects, opened for exclusive use by this call.
 struct Scene {
     queries: Vec<Open<dibs_query>, DIBS_SURFACES>,
     frames: Vec<Open<dibs_frame>, DIBS_SURFACES>,
@@ -89,15 +91,15 @@ impl Scene {
 
 /// The closest pair of a chain of tools and the surfaces of a scene.
 ///
-/// Exact within its accuracy, as `dibs_query_closest`. Query tools whose axes do not touch each other one by one: of such
-/// tools, one deep inside a surface may be missed.
+/// Exact within its accuracy, as `dibs_query_closest`. Tools whose axes do not touch each other must be queried one by
+/// one: otherwise one deep inside a surface may be missed.
 ///
-/// Cost: the budget at most, for all pairs together, and a node test a pair.
+/// Cost: at most the budget, for all pairs together, and a node test a pair.
 ///
 /// @param scene    The scene.
 /// @param options  Options, or null.
 /// @param closest  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
-/// @return As `dibs_query_closest`, of any surface; `DIBS_CODE_ARGUMENT` for no surface, no tool, or too many.
+/// @return As `dibs_query_closest`, for any surface; `DIBS_CODE_ARGUMENT` for no surface, no tool, or too many.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_scene_closest(
     scene: *const dibs_scene,
@@ -121,7 +123,7 @@ pub extern "C" fn dibs_scene_closest(
 ///
 /// @param scene     The scene.
 /// @param margin    In mm, at least 0.
-/// @param options   Options, or null. A budget that runs out shows in the list's bound, which holds for all pairs.
+/// @param options   Options, or null. A budget that runs out lowers the list's bound, which holds for all pairs.
 /// @param contacts  The list; empty after an error.
 /// @param closest   Receives the closest pair, or null.
 /// @return As `dibs_scene_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.

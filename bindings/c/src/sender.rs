@@ -1,4 +1,4 @@
-//! The imaging side, on a computer: a moving surface goes to a controller over a serial line or a socket.
+//! The imaging side, on a host computer: sends a moving surface to a controller over a serial line or a socket.
 
 use core::ffi::{c_char, c_void};
 use std::string::{String, ToString};
@@ -19,23 +19,23 @@ use crate::tree::dibs_tree;
 /// Bytes of a sender's storage.
 pub const DIBS_SENDER_SIZE: usize = 1_024;
 
-/// The age of a frame whose time of capture is not known: it counts as captured when it is sent, unless it equals the
-/// last one in every bit.
+/// The age of a frame whose time of capture is unknown: the frame counts as captured when it is sent, unless it equals
+/// the last one in every bit.
 pub const DIBS_AGE_UNKNOWN: u32 = u32::MAX;
 
-/// Bytes of a packet, at most.
+/// Largest packet, in bytes.
 const MTU: usize = 1_024;
 
-/// Sends the frames of a moving surface to a controller, and takes the statuses that come back.
+/// Sends the frames of a moving surface to a controller, and receives statuses.
 ///
-/// In the library for a computer alone. Its calls wait for the line, and are no work for a control loop. Unlike the other
-/// objects it allocates when it starts, and has a thread, which reads the line: `dibs_sender_close` ends both. Another
-/// `dibs_sender_init` in the storage without it leaves them until the program ends.
+/// Only in the library for a host computer. Its calls wait for the line, so they do not belong in a control loop.
+/// Unlike the other objects it allocates when it starts, and has a thread that reads the line: `dibs_sender_close` ends
+/// both. Another `dibs_sender_init` in the same storage without it leaks them.
 pub struct dibs_sender {
     sender: Sender<Line, MTU>,
-    /// Positions of the frame in work, used again.
+    /// Positions of the present frame, in memory that is reused.
     positions: Vec<Vec3>,
-    /// The last error's sentence.
+    /// The text of the last error.
     error: String,
 }
 
@@ -44,20 +44,20 @@ impl Kind for dibs_sender {
     const SIZE: usize = DIBS_SENDER_SIZE;
 }
 
-/// How a surface is sent. `dibs_sender_settings_of` makes one.
+/// Settings of a sender. `dibs_sender_settings_of` returns the defaults.
 #[derive(Clone, Copy, bytemuck::AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_sender_settings {
     /// Other than 0 for 6 bytes a vertex instead of 12, in a box that is fitted to each frame.
     pub quantised: u32,
-    /// Sends only the vertices that moved by more than this (mm); below 0 every frame whole.
+    /// Sends only the vertices that moved by more than this (mm); below 0 every frame is whole.
     pub partial: f32,
-    /// With partial frames, the most frames from one whole frame to the next.
+    /// With partial frames, the largest number of frames from one whole frame to the next.
     pub whole_every: u32,
     /// Time between two heartbeats, in ms; 0 sends none.
     pub heartbeat: u32,
-    /// Number of this run of the sender. The receiver ignores packets of an earlier run, which is one with a smaller
-    /// number, so a program that starts anew needs a larger one. By default the time in tenths of a second.
+    /// Session number of this sender. The receiver ignores packets of earlier sessions, whose numbers are smaller, so a
+    /// program that restarts needs a larger one. By default the time in tenths of a second.
     pub session: u32,
 }
 
@@ -88,11 +88,11 @@ pub struct dibs_sent {
     pub epoch: u32,
     /// 0 for a whole frame.
     pub is_partial: u32,
-    /// Rows in it.
+    /// Number of rows in it.
     pub rows: u32,
-    /// Packets that it took.
+    /// Number of its packets.
     pub packets: u32,
-    /// Bytes of the packets, without a serial line's framing.
+    /// Bytes of its packets, without the framing of a serial line.
     pub bytes: u32,
     /// Largest distance (mm) of a vertex from its position at the receiver.
     pub error: f32,
@@ -112,11 +112,11 @@ impl From<Sent> for dibs_sent {
 }
 
 impl dibs_sender {
-    /// Keeps an error's sentence.
+    /// Stores an error's text.
     fn keep(&mut self, error: &SendError) -> dibs_code {
         use core::fmt::Write;
         self.error.clear();
-        // A string takes all that is written to it.
+        // Writing to a string cannot fail.
         let _ = write!(self.error, "{error}");
         match error {
             SendError::Line(_) => dibs_code::SenderLine,
@@ -127,7 +127,7 @@ impl dibs_sender {
     }
 }
 
-/// The settings by default: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
+/// The default settings: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_sender_settings_of() -> dibs_sender_settings {
     let usual = Settings::default();
@@ -149,7 +149,7 @@ pub extern "C" fn dibs_sender_settings_of() -> dibs_sender_settings {
 /// @param target    `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`, ended by a zero.
 /// @param settings  How to send; or null for `dibs_sender_settings_of`.
 /// @param sender    Receives the sender's address.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_TARGET` for a target that is none, or that cannot be opened; or a misuse.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_TARGET` for a target that is invalid or cannot be opened; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_sender_init(
     storage: *mut c_void,
@@ -174,18 +174,20 @@ pub extern "C" fn dibs_sender_init(
     })
 }
 
-/// Sends a frame, with heartbeats in between when due. From the third whole frame on over UDP, this thread allocates nothing.
+/// Sends a frame, with heartbeats between its packets when due. From the third whole frame on over UDP, this thread
+/// allocates nothing.
 ///
 /// @param sender     The sender.
 /// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order; or of
 ///                   each node that carries the surface.
 /// @param count      Their number.
-/// @param age        Time (ms) since the surface was so; or `DIBS_AGE_UNKNOWN`.
+/// @param age        Time (ms) since the surface was captured; or `DIBS_AGE_UNKNOWN`.
 /// @param sent       Receives the frame's number and size; or null.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are no frame of the surface: nothing was sent;
-///         `DIBS_CODE_SENDER_LINE` where the connection broke: close the sender, and make another;
-///         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the whole
-///         sentence.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are not a frame of the surface: nothing was
+/// sent;
+///          `DIBS_CODE_SENDER_LINE` if the connection broke: close the sender, and make another;
+///          `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the
+///          full text.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_sender_send(
     sender: *mut dibs_sender,
@@ -210,8 +212,8 @@ pub extern "C" fn dibs_sender_send(
     })
 }
 
-/// Sends a heartbeat if one is due, and takes the statuses that have come. Does not wait. Call it a few times between two
-/// heartbeats: without it the controller takes the link for lost, and no transit time is measured.
+/// Sends a heartbeat if one is due, and receives the statuses that have arrived. Does not wait. Call it a few times
+/// between two heartbeats: otherwise the controller considers the link lost, and no transit time is measured.
 ///
 /// @return As `dibs_sender_send`.
 #[unsafe(no_mangle)]
@@ -223,11 +225,11 @@ pub extern "C" fn dibs_sender_poll(sender: *mut dibs_sender) -> dibs_code {
     })
 }
 
-/// The last error of a sender, as a sentence.
+/// The text of a sender's last error.
 ///
 /// @param sender    The sender.
-/// @param text      Receives the sentence, ended by a zero; empty before the first error.
-/// @param capacity  Bytes that there is room for.
+/// @param text      Receives the zero-terminated text; empty before the first error.
+/// @param capacity  Size of `text` in bytes.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_sender_error(
@@ -243,26 +245,26 @@ pub extern "C" fn dibs_sender_error(
     })
 }
 
-/// Facts about a sender.
+/// State of a sender.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_sender_facts {
     /// Frames sent since the start.
     pub frames: u32,
-    /// Statuses that came back.
+    /// Statuses received.
     pub statuses: u32,
     /// Frames that the receiver has not acknowledged.
     pub in_flight: u32,
-    /// 0 until the receiver has published a frame of this sender; then `acknowledged` is 0, too.
+    /// 0 until the receiver has published a frame of this sender; `acknowledged` is then 0 as well.
     pub is_acknowledged: u32,
-    /// The last of them.
+    /// Number of the latest acknowledged frame.
     pub acknowledged: u32,
 }
 
-/// Reads the facts about a sender.
+/// Reads the state of a sender.
 ///
 /// @param sender    The sender.
-/// @param facts     Receives the facts.
+/// @param facts     Receives the state.
 /// @param counters  Room for `DIBS_EVENTS` numbers: the receiver's count of each event, in the order of
 ///                  `dibs_event_name`, as its statuses report it; or null.
 #[unsafe(no_mangle)]
@@ -289,7 +291,7 @@ pub extern "C" fn dibs_sender_get_facts(
     })
 }
 
-/// Ends the connection. The storage has no sender from then on.
+/// Ends the connection. The storage then holds no sender.
 ///
 /// @return `DIBS_CODE_OK`, or a misuse.
 #[unsafe(no_mangle)]

@@ -1,4 +1,4 @@
-//! The surface's buffers: two of them or three, for as many vertices as the caller says.
+//! The surface's buffers: two or three, for a number of vertices that the caller chooses.
 
 use core::ffi::c_void;
 use core::mem;
@@ -16,7 +16,7 @@ use dibs_nostd::{
 use crate::border::{DIBS_ALIGNMENT, Kind, Storage};
 use crate::code::dibs_code;
 
-/// Bytes of a surface's storage besides its vertices.
+/// Bytes of a surface's storage in addition to its vertices.
 pub const DIBS_SURFACE_BASE: usize = 576;
 
 /// Bytes of a surface's storage for each vertex: two positions.
@@ -25,19 +25,19 @@ pub const DIBS_SURFACE_VERTEX: usize = 24;
 /// Bytes of a guarded surface's storage for each vertex: three positions.
 pub const DIBS_GUARDED_VERTEX: usize = 36;
 
-/// Two buffers of vertices: one end fills one, the other end holds the other, and neither waits. A third keeps the frame
-/// before, from which a guard knows the motion.
+/// Two buffers of vertices: one end fills one while the other end reads the other, and neither waits. With a third
+/// buffer the previous frame is kept, from which a guard extrapolates.
 ///
 /// Any number of contexts may use it at once.
 pub struct dibs_surface {
     buffers: Buffers<'static>,
-    /// Ends that were taken: of a receiver, a bus or a writer, and of a reader or a guard.
+    /// Whether each end was taken: that of a receiver, a bus or a writer, and that of a reader or a guard.
     taken: [AtomicBool; 2],
-    /// It keeps the frame before the published one.
+    /// Whether the frame before the published one is kept.
     has_third: bool,
-    /// A reader holds a frame.
+    /// Whether a reader holds a frame.
     is_held: AtomicBool,
-    /// The notes of the two ends for one another.
+    /// Data that the two ends pass to each other.
     pub(crate) notes: Notes<Poses>,
 }
 
@@ -46,7 +46,7 @@ impl Kind for dibs_surface {
     const SIZE: usize = DIBS_SURFACE_BASE;
 }
 
-/// Every frame of a bus may have a pose. Those that have none are as if no frame could, to the bit.
+/// Every frame of a bus may have a pose. Frames without one behave bit for bit as if poses did not exist.
 pub(crate) type OfVertices = Posed;
 pub(crate) type OfNodes = Posed<Nodes<'static>>;
 type Poses = <OfVertices as Rows>::Poses;
@@ -54,7 +54,7 @@ type Poses = <OfVertices as Rows>::Poses;
 pub(crate) type Writer = FrameWriter<'static>;
 pub(crate) type Reader = FrameReader<'static>;
 
-/// Offset of the buffers, after the object and the word of their state.
+/// Offset of the buffers, after the object and its word of state.
 const BUFFERS: usize = 384;
 const HEAD: usize = size_of::<Head>();
 
@@ -67,7 +67,8 @@ const _: () = assert!(align_of::<Head>() == 4 && align_of::<Position>() == 4);
 /// Makes a surface without a frame.
 ///
 /// @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, or `DIBS_GUARDED_SIZE(vertices)` for a guard, aligned to
-///                  `DIBS_ALIGNMENT`. Needs no initial value. For as long as its two ends and their frames are used.
+///                   `DIBS_ALIGNMENT`. Needs no initial value. Must exist for as long as its two ends and their frames
+/// are used.
 /// @param size      Bytes of the storage.
 /// @param vertices  Rows of the surface: `rows` of the tree's facts.
 /// @param surface   Receives the surface's address.
@@ -100,7 +101,7 @@ pub extern "C" fn dibs_surface_init(
             let third = (buffers == 3).then(|| buffer(rest, vertices));
             Ok(dibs_surface {
                 buffers: Buffers::new(
-                    // SAFETY: a word of this surface's own, aligned, and from here on never used but as an atomic.
+                    // SAFETY: an aligned word of this surface alone, which from here on is only used as an atomic.
                     unsafe { AtomicU32::from_ptr(state) },
                     [buffer(first, vertices), buffer(second, vertices)],
                     third,
@@ -114,12 +115,12 @@ pub extern "C" fn dibs_surface_init(
     })
 }
 
-/// A buffer of so many vertices in zeroed words: a head, and three a vertex.
+/// A buffer in zeroed words: a head, and three words for each vertex.
 fn buffer(words: &'static mut [u32], vertices: usize) -> Buffer<'static> {
     debug_assert!(words.len() == HEAD / 4 + 3 * vertices);
     let head = words.as_mut_ptr();
-    // SAFETY: the words are as many as a head and the positions, all of a word's alignment. Zeros are atomics, and from here
-    // on nothing else refers to them.
+    // SAFETY: there are as many words as a head and the positions need, with the alignment of a word. Zeros are valid
+    // atomics, and from here on nothing else refers to them.
     unsafe {
         let rows = head.add(HEAD / 4).cast::<Position>();
         Buffer { head: &*head.cast::<Head>(), rows: slice::from_raw_parts(rows, vertices) }
@@ -133,7 +134,7 @@ impl dibs_surface {
         writer.back().len()
     }
 
-    /// Whether a guard can use it, with a tree of so many vertices.
+    /// Fails unless a guard can use it with a tree of this many vertices.
     pub(crate) fn check_guarded(&self, vertices: u32) -> Result<(), dibs_code> {
         if self.vertices() != vertices as usize {
             Err(dibs_code::OtherTree)
@@ -144,13 +145,13 @@ impl dibs_surface {
         }
     }
 
-    /// The end that fills buffers, once.
+    /// Takes the end that fills buffers; succeeds once.
     pub(crate) fn take_writer(&'static self) -> Result<Writer, dibs_code> {
         self.take(0)?;
         Ok(self.buffers.ends().0)
     }
 
-    /// The end that holds them, once.
+    /// Takes the end that reads them; succeeds once.
     pub(crate) fn take_reader(&'static self) -> Result<Reader, dibs_code> {
         self.take(1)?;
         Ok(self.buffers.ends().1)
@@ -164,7 +165,7 @@ impl dibs_surface {
         make(self.take_writer()?).inspect_err(|_| self.give_back(0))
     }
 
-    /// The same of the end that holds them.
+    /// The same for the end that reads them.
     pub(crate) fn with_reader<T>(
         &'static self,
         make: impl FnOnce(Reader) -> Result<T, dibs_code>,
@@ -192,7 +193,7 @@ impl dibs_surface {
     }
 }
 
-/// The right to one guard, given back when it is dropped.
+/// The right to hold one frame, given back when it is dropped.
 pub(crate) struct Hold(&'static AtomicBool);
 
 impl Drop for Hold {
@@ -203,20 +204,20 @@ impl Drop for Hold {
 
 /// The frame that a reader holds.
 pub(crate) struct Held {
-    // First, so that it is dropped before the right to it is given back.
+    // Declared first, so that it is dropped before the right to it is given back.
     guard: FrameGuard<'static>,
     _hold: Hold,
 }
 
 impl Held {
     pub(crate) fn new(guard: FrameGuard<'_>, hold: Hold) -> Self {
-        // SAFETY: a guard refers to the surface's memory, which the caller keeps, and not to its reader. That no second
-        // one is made while it lives, which its lifetime would see to, is what the hold is for.
+        // SAFETY: a guard refers to the surface's memory, which the caller keeps, and not to its reader. Its lifetime
+        // would prevent a second guard at the same time; here the hold prevents it.
         let guard = unsafe { mem::transmute::<FrameGuard<'_>, FrameGuard<'static>>(guard) };
         Self { guard, _hold: hold }
     }
 
-    /// The frame with its motion since others.
+    /// The frame, with its motion since earlier frames.
     pub(crate) const fn moving(&self) -> &FrameGuard<'static> {
         &self.guard
     }

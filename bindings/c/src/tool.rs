@@ -32,8 +32,8 @@ impl From<dibs_vec3> for Vec3 {
     }
 }
 
-/// A rigid instrument: all points within `radius` of the segment from `start` to `end`, in the mesh's frame and unit
-/// (mm). A capsule; a sphere where both ends are equal.
+/// A rigid instrument: all points within `radius` of the segment from `start` to `end`, in the mesh's coordinates (mm).
+/// A capsule; a sphere if both ends are equal.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_tool {
@@ -64,10 +64,10 @@ impl TryFrom<dibs_tool> for Shape {
     }
 }
 
-/// Most tools of a chain.
+/// Largest number of tools in a chain.
 pub const DIBS_TOOLS: usize = 16;
 
-/// So many tools of one type: a sphere is a capsule without length.
+/// A chain of tools of one type: a sphere is a capsule of length zero.
 pub(crate) fn chain(
     tools: *const dibs_tool,
     count: u32,

@@ -1,6 +1,6 @@
-//! The tracker: the closest pair from tick to tick, at the cost of what has changed.
+//! The tracker: the closest pair at each tick, at the cost of what has changed since the last one.
 //!
-//! One file, because half of it is the text of the header.
+//! One file, because half of it is documentation for the header.
 
 use core::cell::Cell;
 use core::ffi::c_void;
@@ -21,28 +21,28 @@ use crate::query::{STACK, dibs_options, dibs_proximity};
 use crate::tool::{DIBS_TOOLS, Shape, chain, dibs_tool};
 use crate::tree::{Row, dibs_tree};
 
-/// Bytes of a tracker's storage besides its vertices.
+/// Bytes of a tracker's storage in addition to its vertices.
 pub const DIBS_TRACKER_BASE: usize = 24_896;
 
-/// Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.
+/// Bytes of a tracker's storage for each vertex: the present and the previous surface.
 pub const DIBS_TRACKER_VERTEX: usize = 24;
 
 const _: () = assert!(2 * size_of::<[f32; 3]>() == DIBS_TRACKER_VERTEX);
 
-/// Nodes of the tree that a tracker remembers: more, and ticks are whole queries.
+/// Nodes of the tree that a tracker remembers: if a search opens more, ticks are whole queries.
 pub const DIBS_OPENED: usize = 256;
 
-/// A query that remembers its last answer's proof.
+/// A query that remembers the proof of its last answer.
 ///
-/// It keeps a copy of the surface, so that a frame is held for its copying alone, or it searches a reader's frame itself. One
-/// context at a time.
+/// It keeps a copy of the surface, so that a frame is only held while it is copied; or it searches a reader's frame
+/// directly. One context at a time.
 pub struct dibs_tracker {
     tracker: TheTracker,
     odometer: Odometer,
-    /// The copies: the surface's, and the one to be written next.
+    /// The copies: the present one, and the one to be written next.
     copies: [&'static Copied; 2],
     surface: Option<MovingTable<'static, Copied>>,
-    /// From the surface before to this one, or from this one to itself where there is none before.
+    /// From the previous surface to the present one; without a previous one, from the present one to itself.
     step: Option<Step<'static, Copied, Copied>>,
 }
 
@@ -113,8 +113,9 @@ impl VertexTable for Copied {
 
 /// Makes a tracker on a tree, without a surface.
 ///
-/// @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`; `DIBS_TRACKER_SIZE(0)` are enough for
-///                 `dibs_tracker_closest_on` alone. Needs no initial value.
+/// @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`; `DIBS_TRACKER_SIZE(0)` is enough
+/// for
+///                  `dibs_tracker_closest_on` alone. Needs no initial value.
 /// @param size     Bytes of the storage.
 /// @param tree     The tree.
 /// @param tracker  Receives the tracker's address.
@@ -147,15 +148,16 @@ pub extern "C" fn dibs_tracker_init(
     })
 }
 
-/// Takes over a new surface: copies it, and measures how far it moved. Call it for each new frame, and release the frame
-/// then; ticks with no new frame go without.
+/// Sets a new surface: copies it, and measures how far it moved. Call it for each new frame, then release the frame; it
+/// is not needed at ticks without a new frame.
 ///
 /// Cost: linear in the vertices.
 ///
 /// @param tracker  The tracker.
 /// @param frame    The surface.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_VERTEX_COUNT` (also where the storage has no
-///         room for copies), or a misuse. After an error the surface is the one before.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_VERTEX_COUNT` (also if the storage has
+/// no
+///          room for copies), or a misuse. After an error the surface is the previous one.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_set_frame(
     tracker: *mut dibs_tracker,
@@ -172,21 +174,21 @@ pub extern "C" fn dibs_tracker_set_frame(
 }
 
 impl dibs_tracker {
-    /// The core's tracker, and the surface of its own.
+    /// The core's tracker, and its own surface.
     pub(crate) fn parts(
         &mut self,
     ) -> Result<(&mut TheTracker, &MovingTable<'static, Copied>), dibs_code> {
         Ok((&mut self.tracker, self.surface.as_ref().ok_or(dibs_code::NoSurface)?))
     }
 
-    /// The core's tracker, and the way from the surface before to its own.
+    /// The core's tracker, and the step from the previous surface to the present one.
     pub(crate) fn step(
         &mut self,
     ) -> Result<(&mut TheTracker, &Step<'static, Copied, Copied>), dibs_code> {
         Ok((&mut self.tracker, self.step.as_ref().ok_or(dibs_code::NoSurface)?))
     }
 
-    /// The core's tracker, for another surface.
+    /// The core's tracker, for use with another surface.
     pub(crate) const fn core(&mut self) -> &mut TheTracker {
         &mut self.tracker
     }
@@ -202,19 +204,19 @@ impl dibs_tracker {
     }
 }
 
-/// The reason for a whole query.
+/// Why a tick was a whole query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum dibs_fallback {
-    /// It was none.
+    /// It was not a whole query.
     None = 0,
-    /// The first tick, or the one after an error.
+    /// It was the first tick, or the first after an error.
     Start = 1,
-    /// The surface's motion was not measured all the way.
+    /// The surface's motion is not known without gaps.
     Surface = 2,
     /// Tool or surface moved too far.
     Jump = 3,
-    /// More nodes had to be opened than there are places.
+    /// More nodes were opened than the tracker has room for.
     Full = 4,
 }
 
@@ -230,27 +232,28 @@ impl From<Option<Fallback>> for dibs_fallback {
     }
 }
 
-/// The answer of a tick, of one tracker or of several.
+/// The answer of a tick, from one tracker or several.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_tracked {
-    /// The closest pair; its counts of tests are this tick's. Of several pairs its interval begins at the least lower end of
-    /// all, its accuracy is the worst, its tests are those of all, and its side is `DIBS_SIDE_CUT_SHORT` if the budget left
-    /// that of any pair open.
+    /// The closest pair; its counts of tests are this tick's. For several pairs its interval starts at the least lower
+    /// bound of all, its accuracy is the worst, its tests are those of all, and its side is `DIBS_SIDE_CUT_SHORT` if
+    /// the budget ended before the side of any pair was known.
     pub proximity: dibs_proximity,
-    /// Other than 0 where this tick's search found no side, because its budget ended or the side is undefined: it is the last
-    /// tick's, as far as the motion since leaves it possible. The pair may not be the closest then; the interval holds.
+    /// Other than 0 if this tick's search found no side, because its budget ended or the side is undefined: the side is
+    /// then the last tick's, if the motion since allows that. The pair may then not be the closest; the interval is
+    /// still valid.
     pub is_kept: u32,
-    /// A `dibs_fallback`: the first reason for a whole query, of the pairs that were searched.
+    /// A `dibs_fallback`: the first reason for a whole query, among the pairs that were searched.
     pub fallback: u32,
-    /// The most (mm) that tool and surface together have moved since the last tick; -1 where it is not known, and of several
+    /// Upper bound (mm) on the motion of tool and surface together since the last tick; -1 if unknown, and for several
     /// pairs.
     pub moved: f32,
-    /// Opened nodes that the tracker remembers, of `DIBS_OPENED`.
+    /// Opened nodes that the tracker remembers, of at most `DIBS_OPENED`.
     pub opened: u32,
-    /// That pair's number, of several; else 0.
+    /// Index of the pair, if there are several; else 0.
     pub pair: u32,
-    /// Pairs that were searched; the others were certain to be farther.
+    /// Number of pairs that were searched; the others were certain to be farther.
     pub searched: u32,
 }
 
@@ -297,7 +300,7 @@ fn closest<S: MovingSurface>(
 
 /// The closest pair of the tool and the tracker's surface: the answer of `dibs_query_closest`, within its accuracy.
 ///
-/// Cost: the budget at most, and a number for each opened node.
+/// Cost: at most the budget, and one comparison for each opened node.
 ///
 /// @param tracker   The tracker.
 /// @param tool      The tool.
@@ -321,18 +324,18 @@ pub extern "C" fn dibs_tracker_closest(
     })
 }
 
-/// The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without a copy of the
-/// surface. The receiver has measured the frame's motion. The frame is held for the whole call, and released after it. For a
-/// control tick that has no time for `dibs_tracker_set_frame`.
+/// The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without
+/// copying the surface, because the receiver has measured the frame's motion. The frame is held during the whole call;
+/// release it afterwards. For a control tick that has no time for `dibs_tracker_set_frame`.
 ///
-/// Cost: the budget at most, and a number for each opened node.
+/// Cost: at most the budget, and one comparison for each opened node.
 ///
 /// @param tracker   The tracker.
 /// @param frame     A reader's frame.
 /// @param tool      The tool.
 /// @param options   Options, or null.
 /// @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
-/// @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
+/// @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` for a frame of the caller's vertices.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_closest_on(
     tracker: *mut dibs_tracker,
@@ -347,7 +350,7 @@ pub extern "C" fn dibs_tracker_closest_on(
         let (frame, options) = (frame.open()?, dibs_options::of(options)?);
         let surface = match &frame.table {
             Table::Empty => return Err(dibs_code::NoSurface),
-            // Their motion is not measured.
+            // The motion of a caller's vertices is not measured.
             Table::Vertices(_) => return Err(dibs_code::Argument),
             Table::Held(held) => held.moving(),
         };
@@ -356,16 +359,15 @@ pub extern "C" fn dibs_tracker_closest_on(
     })
 }
 
-/// Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first: that of
+/// Fills the list with all locally closest pairs with a separation of at most `margin`, deepest first: the list of
 /// `dibs_query_contacts`.
 ///
-/// Cost: that of `dibs_tracker_closest`, and where the surface is within the margin a range search, which has no memory of
-/// the last tick.
+/// Cost: that of `dibs_tracker_closest`, and and within the margin of the surface a range search without the last tick.
 ///
 /// @param tracker   The tracker.
 /// @param tool      The tool.
 /// @param margin    In mm, at least 0.
-/// @param options   Options, or null. A budget that runs out shows in the list's bound.
+/// @param options   Options, or null. A budget that runs out lowers the list's bound.
 /// @param contacts  The list; empty after an error.
 /// @param tracked   Receives the closest pair, or null.
 /// @return As `dibs_query_contacts`.
@@ -398,17 +400,17 @@ pub extern "C" fn dibs_tracker_contacts(
     })
 }
 
-/// The closest pair of several, each a tracker, on its surface, with a tool: of a chain of tools, of several surfaces, or of
+/// The closest of several pairs, each a tracker with its surface and a tool: for a chain of tools, several surfaces, or
 /// both. A pair that is certain to be farther than the closest is not searched.
 ///
-/// Cost: the budget at most, for all pairs together.
+/// Cost: at most the budget, for all pairs together.
 ///
-/// @param trackers  Addresses of the trackers, one for each pair. No tracker is there twice.
+/// @param trackers  Addresses of the trackers, one for each pair. No tracker may be listed twice.
 /// @param tools     The tool of each pair, in the same order.
-/// @param count     Pairs: 1 to `DIBS_TOOLS`.
+/// @param count     Number of pairs: 1 to `DIBS_TOOLS`.
 /// @param options   Options, or null.
 /// @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
-/// @return As `dibs_tracker_closest`, of any pair; `DIBS_CODE_ARGUMENT` for no pair or too many.
+/// @return As `dibs_tracker_closest`, for any pair; `DIBS_CODE_ARGUMENT` for no pair or too many.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_closest_of(
     trackers: *const *mut dibs_tracker,

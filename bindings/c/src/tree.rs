@@ -1,4 +1,4 @@
-//! The tree, validated.
+//! A validated tree.
 
 use core::ffi::c_void;
 
@@ -14,27 +14,27 @@ use crate::tool::dibs_vec3;
 /// Bytes of a tree's storage.
 pub const DIBS_TREE_SIZE: usize = 640;
 
-/// A row's number in a tree's bytes: the library takes trees of one width.
+/// The type of a row's number in a tree's bytes: the library takes trees of one width.
 #[cfg(not(feature = "large"))]
 pub(crate) type Row = u16;
-/// The same, of trees with more than 65,536 vertices.
+/// The same, for trees with more than 65,536 vertices.
 #[cfg(feature = "large")]
 pub(crate) type Row = u32;
 
-/// A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices; the library of
-/// `cargo build -p dibs-c --features large` takes larger trees in place of these.
+/// A validated tree, such as `heart.dibs` from `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices; the library that
+/// `cargo build -p dibs-c --features large` makes takes larger trees instead.
 ///
 /// Any number of contexts may use it at once.
 pub struct dibs_tree {
     /// The view of the bytes.
     pub(crate) tree: Tree<'static, Row>,
-    /// The nodes that carry the surface, if any.
+    /// The nodes that move the surface, if any.
     pub(crate) nodes: Option<Nodes<'static>>,
     pub(crate) bytes: &'static [u8],
 }
 
 impl dibs_tree {
-    /// Rows of a frame.
+    /// Number of rows in a frame.
     pub(crate) fn rows(&self) -> u32 {
         self.nodes.map_or(self.tree.vertex_count(), |nodes| nodes.count())
     }
@@ -45,17 +45,17 @@ impl Kind for dibs_tree {
     const SIZE: usize = DIBS_TREE_SIZE;
 }
 
-/// Facts about a tree.
+/// Properties of a tree.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_tree_facts {
     /// Vertices.
     pub vertices: u32,
-    /// Rows of a frame: the nodes that carry the surface where the tree has any (`dibs build --nodes`), else its vertices.
+    /// Rows of a frame: the nodes that move the surface if the tree has any (`dibs build --nodes`), else its vertices.
     pub rows: u32,
     /// Triangles.
     pub triangles: u32,
-    /// Nodes.
+    /// Nodes of the tree of spheres.
     pub nodes: u32,
     /// Identity of the mesh, which packets carry.
     pub mesh_id: u32,
@@ -63,24 +63,24 @@ pub struct dibs_tree_facts {
     pub checksum: u32,
     /// The stretch limit that the tree was built for; 1 for no stretch.
     pub stretch: f32,
-    /// Largest distance (mm) of a vertex from its place in the mesh's file.
+    /// Largest distance (mm) of a vertex from its position in the mesh's file.
     pub position_error: f32,
-    /// Vertices of the mesh's file, those of no triangle too: positions of a frame in the file's order.
+    /// Vertices of the mesh's file, including those of no triangle: positions of a frame in the file's order.
     pub file_vertices: u32,
-    /// Triangles of the mesh's file, those too that the builder dropped.
+    /// Triangles of the mesh's file, including those that the builder dropped.
     pub file_triangles: u32,
-    /// Unit of the mesh's file: 0 not known, 1 mm, 2 cm, 3 m, 4 inch, 5 micrometre. All lengths of the tree are in mm.
+    /// Unit of the mesh's file: 0 unknown, 1 mm, 2 cm, 3 m, 4 inch, 5 micrometre. All lengths of the tree are in mm.
     pub unit: u8,
 }
 
-/// Validates the bytes of a tree, and makes the tree that every other object is made with.
+/// Validates the bytes of a tree, and makes the tree that all other objects need.
 ///
 /// Cost: linear in the bytes; once, at start-up.
 ///
 /// @param storage  `DIBS_TREE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`, for as long as the tree is used.
 /// @param size     Bytes of the storage.
-/// @param bytes    The tree, in flash or in memory. Not copied: it stays unchanged for as long as the tree, and any
-///                 object made with it, is used. Aligned to 4 it is read faster.
+/// @param bytes    The tree, in flash or in memory. Not copied: it must not change for as long as the tree, or any
+///                  object made with it, is used. It is read faster if aligned to 4.
 /// @param length   Bytes of the tree.
 /// @param tree     Receives the tree's address.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_TREE_LENGTH` to `DIBS_CODE_TREE_FORM`, or a misuse.
@@ -105,7 +105,7 @@ pub extern "C" fn dibs_tree_init(
     })
 }
 
-/// Facts about the tree.
+/// Reads the properties of the tree.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_get_facts(
     tree: *mut dibs_tree,
@@ -133,7 +133,7 @@ pub extern "C" fn dibs_tree_get_facts(
 
 /// Rest position (mm) of the vertex in a row.
 ///
-/// @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_NO_REST_SHAPE` outside the table or where the tree was built without.
+/// @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_NO_REST_SHAPE` outside the table or if the tree was built without it.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_rest_position(
     tree: *mut dibs_tree,
@@ -147,8 +147,8 @@ pub extern "C" fn dibs_tree_rest_position(
     })
 }
 
-/// Brings positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows, which
-/// frames take. A frame in the file's order gives wrong distances without an error, unless it is measured.
+/// Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows, as a frame
+/// needs them. A frame in the file's order gives wrong distances without an error, unless it is measured.
 ///
 /// Cost: linear in the vertices.
 ///
@@ -156,10 +156,10 @@ pub extern "C" fn dibs_tree_rest_position(
 /// @param values  x, y and z of each vertex of the mesh's file, in that file's order.
 /// @param count   Their number: `file_vertices` of the tree's facts.
 /// @param rows    Receives x, y and z of each row. Must not overlap `values`.
-/// @param room    Rows that fit there: at least `vertices` of the tree's facts.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` of another number than the file's; `DIBS_CODE_CAPACITY` of too little room;
-///         `DIBS_CODE_ARGUMENT` where the tree was built without its vertex order, or where nodes carry the surface: their order
-///         is the volume's; or a misuse.
+/// @param room    The number of rows that fit there: at least `vertices` of the tree's facts.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` for another number than the file's; `DIBS_CODE_CAPACITY` for too little room;
+///         `DIBS_CODE_ARGUMENT` if the tree was built without its vertex order, or if nodes move the surface (their order is the
+///         volume's); or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_to_rows(
     tree: *mut dibs_tree,
@@ -190,9 +190,9 @@ pub extern "C" fn dibs_tree_to_rows(
     })
 }
 
-/// Label of the triangle in a row, say of its tissue.
+/// Label of the triangle in a row, for example of its tissue.
 ///
-/// @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or where the tree was built without labels.
+/// @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or if the tree was built without labels.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_label(
     tree: *mut dibs_tree,
@@ -206,12 +206,12 @@ pub extern "C" fn dibs_tree_label(
     })
 }
 
-/// Compares the tree's header and places of sections, which are in memory, with its bytes. A scrub does not read that
-/// memory: call this once a tick.
+/// Compares the tree's header and section offsets, which are copied to memory, with its bytes. A scrub does not check
+/// that copy: call this once a tick.
 ///
 /// Cost: some hundred instructions.
 ///
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_TREE_CORRUPT` where the two differ: make the output safe; or a misuse.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_TREE_CORRUPT` if the two differ: make the output safe; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_check(tree: *mut dibs_tree) -> dibs_code {
     dibs_code::of(|| {
@@ -223,7 +223,7 @@ pub extern "C" fn dibs_tree_check(tree: *mut dibs_tree) -> dibs_code {
 /// Bytes of a scrub's storage.
 pub const DIBS_SCRUB_SIZE: usize = 128;
 
-/// A background check of a tree's bytes: flash that rots after start-up gives wrong answers, and no error.
+/// A background check of a tree's bytes: flash that is corrupted after start-up gives wrong answers without an error.
 ///
 /// One context at a time.
 pub struct dibs_scrub(Scrub<'static>);
@@ -244,7 +244,7 @@ pub extern "C" fn dibs_scrub_init(
     dibs_code::of(|| storage.make(size, scrub, || Ok(dibs_scrub(Scrub::new(tree.share()?.bytes)))))
 }
 
-/// Checks the next bytes, at most `most`, and at the end of a round compares the checksum.
+/// Checks the next `most` bytes, and at the end of a round compares the checksum.
 ///
 /// @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_CORRUPT` at the end of a round in which the bytes did not match: make the output
 ///         safe.
@@ -253,7 +253,7 @@ pub extern "C" fn dibs_scrub_step(scrub: *mut dibs_scrub, most: usize) -> dibs_c
     dibs_code::of(|| Ok(scrub.open()?.0.step(most)?))
 }
 
-/// A point of the mesh's file (mm), which single precision may not hold.
+/// A point of the mesh's file (mm), in double precision.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct dibs_point {
@@ -265,9 +265,9 @@ pub struct dibs_point {
     pub z: f64,
 }
 
-/// The point of the mesh's file that all coordinates of the tree count from: of vertices, tools and answers. Zero unless
-/// the file's coordinates are so far from their own origin that single precision would lose them; then subtract it, in
-/// double precision, from each point in the file's coordinates.
+/// The point of the mesh's file that all coordinates of the tree are relative to: those of vertices, tools and answers.
+/// Zero unless the file's coordinates are so far from their own origin that single precision would lose them; then
+/// subtract it, in double precision, from each point in the file's coordinates.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_origin(tree: *mut dibs_tree, origin: *mut dibs_point) -> dibs_code {
     dibs_code::of(|| {

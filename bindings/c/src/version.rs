@@ -2,7 +2,8 @@
 
 use crate::code::dibs_code;
 
-/// The header's version: a million times the major one, a thousand times the minor one, and the patch.
+/// The header's version: a million times the major number, plus a thousand times the minor number, plus the patch
+/// number.
 pub const DIBS_VERSION: u32 = 1_000;
 
 const _: () = {
@@ -21,8 +22,8 @@ const fn number(text: &str) -> u32 {
     }
 }
 
-/// Checks that a program was compiled with this library's header: sizes of objects may differ between versions. A
-/// program that is linked with a shared library does so before it makes an object.
+/// Checks that a program was compiled with this library's header, because sizes of objects may differ between versions.
+/// A program that is linked with a shared library calls this before it makes an object.
 ///
 /// @param version  `DIBS_VERSION`.
 /// @return `DIBS_CODE_OK`, or `DIBS_CODE_VERSION`.

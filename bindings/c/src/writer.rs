@@ -1,4 +1,4 @@
-//! A writer of frames: for surfaces that do not come in packets.
+//! A writer of frames, for surfaces that do not arrive in packets.
 
 use core::ffi::c_void;
 
@@ -14,10 +14,10 @@ use crate::tree::dibs_tree;
 /// Bytes of a writer's storage.
 pub const DIBS_WRITER_SIZE: usize = 256;
 
-/// Publishes frames whose positions the caller has, for a reader of the same surface.
+/// Publishes frames of the caller's positions, for a reader of the same surface.
 ///
-/// A frame is one `dibs_writer_begin`, any number of `dibs_writer_push`, and one `dibs_writer_publish`. Only the stretch is
-/// checked: frames that come over a line belong to a receiver. One context at a time.
+/// A frame is one `dibs_writer_begin`, any number of `dibs_writer_push`, and one `dibs_writer_publish`. Only the
+/// stretch is checked: frames that arrive over a line belong to a receiver. One context at a time.
 pub struct dibs_writer(Writer);
 
 impl Kind for dibs_writer {
@@ -31,7 +31,7 @@ impl Kind for dibs_writer {
 /// @param size     Bytes of the storage.
 /// @param surface  The surface.
 /// @param writer   Receives the writer's address.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a receiver or a writer, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` if the surface has a receiver or a writer already, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_writer_init(
     storage: *mut c_void,
@@ -44,7 +44,7 @@ pub extern "C" fn dibs_writer_init(
     })
 }
 
-/// Starts a frame, and forgets an unfinished one.
+/// Starts a frame, and discards an unfinished one.
 ///
 /// @return `DIBS_CODE_OK`, or a misuse.
 #[unsafe(no_mangle)]
@@ -62,7 +62,8 @@ pub extern "C" fn dibs_writer_begin(writer: *mut dibs_writer) -> dibs_code {
 /// @param writer     The writer.
 /// @param positions  x, y and z (mm) of each vertex, in the tree's order of rows. Copied.
 /// @param count      Their number.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` where the frame lacks fewer: nothing is stored; or a misuse.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` if these are more rows than the frame lacks: nothing is stored; or
+/// a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_writer_push(
     writer: *mut dibs_writer,
@@ -87,15 +88,19 @@ pub extern "C" fn dibs_writer_push(
 /// Cost: with a tree linear in its triangles, otherwise a few instructions.
 ///
 /// @param writer          The writer.
-/// @param tree            The surface's tree, to measure the stretch, which makes queries cheaper; or null, and queries take
-///                        the tree's limit to hold.
+/// @param tree            The surface's tree, to measure the stretch, which makes queries cheaper; or null: queries
+/// then
+///                         assume the tree's limit.
 /// @param epoch           Number of the frame.
 /// @param received        Its time on the reader's clock, in ms; wraps.
-/// @param position_error  No vertex is farther (mm, at least 0) than this from where it is here.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` while vertices are missing; `DIBS_CODE_HELD` while the published frame is
-///         read: nothing is lost, call again; `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, and
-///         the other codes of `dibs_frame_measure`; `DIBS_CODE_ARGUMENT` for an error that is negative or not finite; or a
-///         misuse.
+/// @param position_error  Largest error (mm, at least 0) of a vertex position.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` while vertices are missing; `DIBS_CODE_HELD` while the published
+/// frame is
+///          read: nothing is lost, call again; `DIBS_CODE_STRETCH_EXCEEDED` if distances on this frame could be wrong,
+/// and
+///          the other codes of `dibs_frame_measure`; `DIBS_CODE_ARGUMENT` for an error that is negative or not finite;
+/// or a
+///          misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_writer_publish(
     writer: *mut dibs_writer,

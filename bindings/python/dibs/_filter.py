@@ -35,13 +35,14 @@ class Tracked(Bound):
     """The pair, a record of `ANSWER`: act on the first of its `interval`."""
     is_kept: bool
     """Whether the side is the last tick's, because this tick's search found none: its budget ended, or the side is
-    undefined. The pair may not be the closest then; the interval holds."""
+    undefined. The pair may then not be the closest; the interval is still valid."""
     fallback: Optional[Fallback]
     """The reason, if this tick was a whole query."""
     moved: Optional[float]
-    """Most (mm) that tool and surface together have moved since the last tick; `None` where it is not known."""
+    """Upper bound (mm) on the motion of tool and surface together since the last tick; `None` if unknown."""
     contacts: Optional[Contacts]
-    """All locally closest pairs within the margin, deepest first, and how far they are complete, where they were asked for."""
+    """All locally closest pairs within the margin, deepest first, and the bound of the list; `None` without a
+    margin."""
 
     _instead = "send its `closest`"
 
@@ -56,7 +57,7 @@ class Tracked(Bound):
 
 
 class Tracker(Remade):
-    """The closest pair from tick to tick, at the cost of what has changed: it remembers its last answer's proof."""
+    """The closest pair at each tick, at the cost of what has changed: it remembers the proof of its last answer."""
 
     def __init__(self, tree: Tree) -> None:
         self._native = _dibs.Tracker(_tree(tree)._native)
@@ -69,12 +70,13 @@ class Tracker(Remade):
         instructions: Optional[int] = None,
         margin: Optional[float] = None,
     ) -> Tracked:
-        """The closest pair of this tick, on the surface as it is now.
+        """The closest pair of this tick, on the present surface.
 
-        `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. `instructions` bounds the tick's
-        work, of a Cortex-M7 by the fitted cost: pair, side, depth and contacts together. The fit is of plain queries, and too
-        low for a shaft deep in the tissue: there a tick took up to twice as many. Where it ends, the interval is that of
-        the last tick, less what moved since, and the next tick goes on. With a `margin` (mm) the contacts are listed.
+        `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. `instructions` limits the
+        tick's work (pair, side, depth and contacts together) in instructions of a Cortex-M7, by a cost model that is
+        fitted to plain queries: deep in the tissue a tick took up to twice as many. If the limit ends the search, the
+        interval is the last tick's, widened by the motion since, and the next tick continues. With a `margin` (mm) the
+        contacts are listed.
         """
         numbers = tool_of(tool)
         margin = None if margin is None else _at_least("margin", margin, 0)
@@ -83,7 +85,7 @@ class Tracker(Remade):
 
 
 class RigidMotion(NamedTuple):
-    """The motion of a rigid instrument in a period: its reference point goes straight, and the instrument turns about it."""
+    """The motion of a rigid instrument in a period: a translation of its reference point and a rotation about it."""
 
     about: npt.ArrayLike
     """The reference point before the motion, in mm."""
@@ -114,24 +116,24 @@ class Admitted(NamedTuple):
     motion: RigidMotion
     """The motion to execute."""
     least_separation: float
-    """No separation (mm) of any tool is less at any instant of the period, wherever the tissue is within its uncertainty."""
+    """Lower bound (mm) on any tool's separation during the period, as long as the tissue is within its uncertainty."""
     reason: Reason
-    """Why it is this motion."""
+    """Why this motion was chosen."""
     queries: int
-    """Queries made."""
+    """Number of queries."""
     instructions: int
-    """Instructions of a Cortex-M7 that they take, by the fitted cost."""
+    """Instructions of these queries on a Cortex-M7, by the fitted cost model."""
 
 
 class Filter(Remade):
-    """A filter of commands: the motion nearest to a commanded one that keeps a rigid chain of tools out of the tissue.
+    """A filter of commands: the motion closest to a commanded one that keeps a rigid chain of tools out of the tissue.
 
-    It keeps every tool `stand_off` (mm) from the tissue, for a robot that moves its reference point with at most `speed`
-    (mm/s). A rotation by one radian counts as much as a translation by the `lever` (mm), by default the distance from the
-    reference point to the farthest end of a tool's axis. A tool comes nearer to its stand-off at no more than its distance
-    from there divided by the `approach` (s), if that is not 0. `instructions` bounds the queries of a tick, of a Cortex-M7 by the
-    fitted cost of plain queries, which is too low for shafts deep in the tissue, by up to a half: what is not verified
-    then is not admitted.
+    It keeps every tool `stand_off` (mm) from the tissue, for a robot that moves its reference point with at most
+    `speed` (mm/s). A rotation by one radian counts as a translation by the `lever` arm (mm), by default the distance
+    from the reference point to the farthest end of a tool's axis. If `approach` (s) is not 0, a tool approaches its
+    stand-off no faster than its distance from it divided by `approach`. `instructions` limits the queries of a tick in
+    instructions of a Cortex-M7, by a cost model fitted to plain queries: deep in the tissue they take up to twice as
+    many. A motion that is not verified within the limit is not admitted.
     """
 
     def __init__(

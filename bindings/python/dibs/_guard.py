@@ -17,7 +17,7 @@ from ._tree import ANSWER, Contacts, Tree, _tests
 _WRAP = 1 << 32
 
 Progress = Literal["begun", "stored", "duplicate", "complete", "heartbeat", "hello"]
-"""The outcome of a packet that was taken."""
+"""The outcome of a packet that was accepted."""
 Advance = Literal["idle", "pending", "held", "published"]
 """The outcome of a slice of work."""
 
@@ -28,13 +28,13 @@ class State(IntEnum):
     NOMINAL = 0
     """Every input is within its limits."""
     DEGRADED = 1
-    """The surface is acted on, with a growing margin."""
+    """The surface may be acted on, with a growing margin."""
     SAFE = 2
-    """The surface is not acted on."""
+    """The surface must not be acted on."""
 
 
 class ForceState(IntEnum):
-    """The origin of a force."""
+    """Which rule a force comes from."""
 
     INACTIVE = 0
     """The tool is outside the margin."""
@@ -43,14 +43,14 @@ class ForceState(IntEnum):
     SATURATED = 2
     """The wall acts with its largest force."""
     SAFE = 3
-    """There is no pair to act on: the force is the hold."""
+    """There is no pair to act on: the force is the hold, pure damping."""
 
 
 class Answer(Bound):
-    """The answer of a tick: what a wall may act on, and how it came about."""
+    """The answer of a tick: the pair that a wall may act on, and how it was found."""
 
     closest: Optional[np.void]
-    """The pair to act on, a record of `ANSWER`: act on the first of its `interval`. `None` where there is none."""
+    """The pair to act on, a record of `ANSWER`: act on the lower bound of its `interval`. `None` if there is none."""
     reason: Optional[str]
     """Why there is no pair to act on."""
     velocity: npt.NDArray[np.float32]
@@ -61,17 +61,17 @@ class Answer(Bound):
     cause: Optional[str]
     """The cause of a state that is not nominal."""
     margin: float
-    """Most that the tissue moves (mm) in the surface's age and transit. Part of the pair's accuracy."""
+    """Largest motion of the tissue (mm) in the surface's age and transit time. Part of the pair's accuracy."""
     waits_for_acknowledgement: bool
     """Whether only `Guard.acknowledge` is missing to leave the safe state."""
     epoch: Optional[int]
-    """Number of the frame that was searched; `None` before the first."""
+    """Number of the searched frame; `None` before the first."""
     age: Optional[int]
     """Its age in ms."""
     is_kept: bool
     """Whether the pair's side is the last tick's, because the budget ended or the side is undefined."""
     lag: Optional[int]
-    """Time in ms by which the surface that was searched is behind the present, as far as its error does not cover it."""
+    """Time in ms by which the searched surface lags behind the present, as far as its error does not cover it."""
 
     _instead = "send its `closest`"
 
@@ -104,8 +104,8 @@ class Force(NamedTuple):
 class ForbiddenRegion(Remade):
     """A wall: a margin around the surface, with a spring and a damper.
 
-    `stiffness` in N/mm, `damping` and `hold_damping`, where there is no pair to act on, in N s/mm, `max_force` in N, `margin`
-    in mm. A sampled wall is passive only if the device's own damping is above `stiffness * tick / 2 + damping`.
+    `stiffness` in N/mm, `damping` and `hold_damping` (used if there is no pair to act on) in N s/mm, `max_force` in N,
+    `margin` in mm. A sampled wall is passive only if the device's damping is above `stiffness * tick / 2 + damping`.
     """
 
     def __init__(
@@ -116,8 +116,8 @@ class ForbiddenRegion(Remade):
         self._native = _dibs.ForbiddenRegion(*map(_arrays.number, names, values))
 
     def force(self, answer: Union[Answer, Tracked], velocity: Optional[npt.ArrayLike] = None) -> Force:
-        """The force on the tool, at every tick. A guard's answer has its velocity; a tracker's is given one, in mm/s, that of
-        the tool's point of the pair relative to the surface's."""
+        """The force on the tool, at every tick. For a tracker's answer pass the `velocity` (mm/s) of the tool's point
+        of the pair relative to the surface's; a guard's answer has it."""
         if isinstance(answer, Tracked):
             flow = _arrays.finite("velocity", _arrays.numbers("velocity", (0, 0, 0) if velocity is None else velocity))
             if flow.shape != (3,):
@@ -164,11 +164,11 @@ class Guard(Remade):
         self._native = _dibs.Guard(tree._native, speed, age, ticks, choices, _tests(budget))
 
     def receive(self, data: bytes, now: int) -> None:
-        """Takes bytes of a serial line or another stream. `counters` says what became of them, by cause."""
+        """Receives bytes from a serial line or another stream. `counters` counts the outcomes by cause."""
         self._native.receive(_bytes("data", data), _now(now))
 
     def packet(self, packet: bytes, now: int) -> Progress:
-        """Takes one packet, whole, of a network. Raises `ValueError` with the reason where it is not taken; it was counted."""
+        """Receives one whole packet from a network. Raises `ValueError` with the reason if it is refused."""
         return self._native.packet(_bytes("packet", packet), _now(now))
 
     def frame(
@@ -179,42 +179,43 @@ class Guard(Remade):
         captured: Optional[int] = None,
         pose: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None,
     ) -> None:
-        """Takes a whole frame of this process, say of a solver: one position (x, y, z) for each vertex of the mesh's file, or
-        for each node, in that file's order. `captured` is when the surface was so, by default `now`. `work` then checks and
-        publishes it. One source at a time: a frame of packets that is in work is abandoned. Raises `ValueError` with the
-        reason where it is not taken; it was counted, and the last good surface stays.
+        """Receives a whole frame from this process, for example from a solver: one position (x, y, z) for each vertex
+        of the mesh's file, or for each node, in that file's order. `captured` is the time of capture, by default `now`.
+        `work` then checks and publishes it. Use one source at a time: an unfinished frame of packets is abandoned.
+        Raises `ValueError` with the reason if it is refused (and counted); the last good surface stays.
 
-        `pose` is where the mesh is as a whole, a rotation (a quaternion x, y, z, w of length 1) and a shift (mm): its point
-        `p` is at `rotation p + shift`. Tools and answers are there, too. A frame without a pose is where the mesh's file
-        has it."""
+        `pose` is the rigid pose of the whole mesh, a rotation (a quaternion x, y, z, w of length 1) and a shift (mm):
+        its point `p` is at `rotation p + shift`. Tools and answers are then in world coordinates. Without a pose the
+        mesh is where its file has it."""
         now = _now(now)
         when = now if captured is None else _arrays.whole("captured", captured, 0, _WRAP - 1)
         placed = None if pose is None else _pose(pose)
         self._native.frame(_arrays.points("positions", positions).tobytes(), placed, when, now)
 
     def work(self, most: int = 1_000) -> Advance:
-        """Looks at most at so many rows and triangles of the frame that arrives, and publishes it once it is complete and
-        admitted. "pending" if more is due at once. Raises `ValueError` with the reason where a frame is refused."""
+        """Checks at most this many rows and triangles of the arriving frame, and publishes it once it is complete and
+        admitted. "pending" if more work is due at once. Raises `ValueError` with the reason if a frame is refused."""
         return self._native.work(_arrays.whole("most", most, 1, _WRAP - 1))
 
     def status(self, now: int, *, framed: bool = False) -> Optional[bytes]:
-        """The status that is due for the sender, a packet, or `framed` for a byte stream; `None` unless there is news, or
-        100 ms went by. The sender's next frame echoes it, which measures the transit of frames."""
+        """The status for the sender, if one is due: a packet, or `framed` for a byte stream. One is due if there is
+        news, or 100 ms have passed. The sender's next frame echoes it, which measures the transit time of frames."""
         return self._native.status(_now(now), bool(framed))
 
     def closest(self, tool: Optional[npt.ArrayLike], now: int) -> Answer:
-        """The answer of this tick, on the surface moved on to now.
+        """The answer of this tick, on the surface extrapolated to now.
 
-        `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule; `None` where it has no pose.
+        `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule; `None` if it has no pose.
         """
         if tool is None:
             return Answer(self._native.closest(None, _now(now)))
         return Answer(self._native.closest(tool_of(tool), _now(now)))
 
     def contacts(self, tool: npt.ArrayLike, margin: float, now: int) -> tuple[Answer, Contacts]:
-        """The answer of this tick, and all locally closest pairs within the `margin` (mm), deepest first, in the one `budget`.
+        """The answer of this tick, and all locally closest pairs within the `margin` (mm), deepest first, within one
+        `budget`.
 
-        Each has the velocity of the surface there. Act on them only where the answer has a pair to act on.
+        Each has the velocity of the surface there. Act on them only if the answer has a pair to act on.
         """
         margin = _at_least("margin", margin, 0)
         answer, found = self._native.contacts(tool_of(tool), margin, _now(now))
@@ -223,10 +224,11 @@ class Guard(Remade):
     def admit(
         self, filter: Filter, tool: npt.ArrayLike, command: RigidMotion, now: int
     ) -> tuple[Answer, Optional[Admitted]]:
-        """The answer of this tick, and the motion nearest to `command` that keeps the tool out of the tissue until the next.
+        """The answer of this tick, and the motion closest to `command` that keeps the tool out of the tissue until the
+        next.
 
-        Stand-off and the robot's speed are the filter's; the period, the tissue's speed, age and transit are the guard's. The
-        motion is `None` in the safe state: the tool stays at rest, and the answer has the cause.
+        Stand-off and the robot's speed are the filter's; period, tissue speed, age and transit time are the guard's.
+        The motion is `None` in the safe state: the tool must rest, and the answer has the cause.
         """
         if not isinstance(filter, Filter):
             raise TypeError(f"filter: a Filter is needed, not {type(filter).__name__}")
@@ -240,8 +242,8 @@ class Guard(Remade):
         self._native.acknowledge()
 
     def register(self) -> None:
-        """Registers the surface anew: the next whole frame may be far from the published one. Only an operator decides
-        that."""
+        """Registers the surface again: the next whole frame may be far from the published one. Only an operator may
+        decide this."""
         self._native.register()
 
     @property

@@ -29,7 +29,7 @@ class HasFaces(Protocol):
 
 
 class MeshWarning(UserWarning):
-    """Something unusual of a mesh, or a repair."""
+    """Something unusual in a mesh, or a repair."""
 
 
 class Mesh:
@@ -47,7 +47,7 @@ class Mesh:
     warnings: list[str]
     """A sentence for each oddity and each repair."""
     labels: Optional[npt.NDArray[np.uint8]] = None
-    """A label for each triangle from the file's groups, where `read` was asked for them. `build` takes them."""
+    """A label for each triangle from the file's groups, if `read` was called with `groups`. `build` uses them."""
     groups: list[dict[str, Any]]
     """`label`, `name` and number of `triangles` of each group."""
 
@@ -88,7 +88,7 @@ class Mesh:
 
     @property
     def origin(self) -> Floats:
-        """The point that a tree's coordinates count from: zero, unless the mesh is far from it."""
+        """The point that a tree's coordinates are relative to: zero, unless the mesh is far from its file's origin."""
         return np.array(self._native.origin())
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -143,11 +143,11 @@ def read(
 ) -> Mesh:
     """Reads a mesh file: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp, .vtu), glTF, Gmsh or 3MF, told apart by content.
 
-    `unit` ("mm", "cm", "m", "in", "um") is the unit of its lengths, which become millimetres; without it the one that the file
-    states (glTF: metres; 3MF), else millimetres. Another unit than the stated one is refused.
-    `weld` joins vertices that are at most so far apart; without it only triangle soup is welded. `strict` refuses
-    degenerate and duplicate triangles instead of dropping them. `orient` turns triangles until the surface faces
-    outwards. `groups` makes labels of the file's groups: OBJ's g and usemtl, Gmsh's physical groups, VTK's cell data label,
+    `unit` ("mm", "cm", "m", "in", "um") is the unit of its lengths, which are converted to millimetres; by default the
+    one that the file states (glTF: metres; 3MF), else millimetres. Another unit than the stated one is refused. `weld`
+    joins vertices that are at most this far apart; by default only triangle soup is welded. `strict` refuses degenerate
+    and duplicate triangles instead of dropping them. `orient` flips triangles until the surface faces outwards.
+    `groups` makes labels of the file's groups: OBJ's g and usemtl, Gmsh's physical groups, VTK's cell data label,
     labels or RegionId.
     """
     reading = _reading(unit, weld, strict, largest_component, origin, orient, groups)
@@ -172,14 +172,15 @@ def build(
     orient: bool = False,
     groups: bool = False,
 ) -> Tree:
-    """Builds the tree of a mesh: of a file, a `Mesh`, arrays of vertices and triangles, or an object of `vertices` and `faces`
-    (trimesh).
+    """Builds the tree of a mesh, which is a file, a `Mesh`, arrays of vertices and triangles, or an object with
+    `vertices` and `faces` (trimesh).
 
-    `stretch` is the largest factor by which the surface may be stretched along itself; `limits` are one for each
-    triangle, or tetrahedron, instead (`MotionStretch.limits`). `labels` are numbers from 0 to 255, one for each triangle, which answers
-    then carry. With `nodes` and `tetrahedra` of them, a volume around the surface, a surface's positions are those of the
-    nodes, and `stretch` limits each tetrahedron; vertices outside are bound to the nearest one within `bind_within` (mm).
-    The other arguments are those of `read`. What is unusual of the mesh is warned of (`MeshWarning`).
+    `stretch` is the largest factor by which the surface may be stretched along itself; `limits` instead gives a factor
+    for each triangle, or tetrahedron (`MotionStretch.limits`). `labels` are numbers from 0 to 255, one for each
+    triangle, which answers then contain. `nodes` and `tetrahedra` of them are a volume that moves the surface:
+    positions are then those of the nodes, and `stretch` limits each tetrahedron; vertices outside are bound to the
+    nearest tetrahedron within `bind_within` (mm). The other arguments are those of `read`. `MeshWarning` reports
+    unusual properties of the mesh.
     """
     reading: dict[str, Any] = {
         "unit": unit,
@@ -214,7 +215,7 @@ def build(
     if (nodes is None) != (tetrahedra is None):
         raise TypeError("build: nodes and tetrahedra go together")
     volume = None
-    # Of nodes the library itself says how many a tree has.
+    # For nodes the library checks the number itself.
     rows: Optional[int] = len(mesh.vertices)
     if nodes is not None and tetrahedra is not None:
         points = _arrays.points("nodes", nodes)
@@ -258,7 +259,7 @@ def _labels(labels: npt.ArrayLike, triangles: int) -> bytes:
 
 
 def generate(kind: str, triangles: int) -> tuple[Mesh, Optional[Motion]]:
-    """A procedural "heart" with a beat of its motion, or a "brain", which has none."""
+    """A procedural "heart" with the motion of one beat, or a "brain" without a motion."""
     native, motion = _dibs.generate(kind, triangles)
     mesh = Mesh._of(native)
     return mesh, None if motion is None else frames_of(motion)

@@ -23,7 +23,7 @@ class Motion(NamedTuple):
     frames: Floats
     """Positions in millimetres: (frames, vertices, 3)."""
     rate: float
-    """Frames a second; 0 where the file does not say."""
+    """Frames a second; 0 if the file does not state it."""
 
 
 def frames_of(native: tuple[bytearray, int, float]) -> Motion:

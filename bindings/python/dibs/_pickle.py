@@ -1,4 +1,4 @@
-"""What `pickle` makes of objects that hold the library's own."""
+"""How objects that hold native objects are pickled."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _Made = TypeVar("_Made", bound="Remade")
 
 
 class Remade:
-    """Is pickled as the call that made it: a copy begins anew."""
+    """An object that is pickled as its constructor call: a copy starts without state."""
 
     _call: tuple[tuple[Any, ...], dict[str, Any]]
 
@@ -24,7 +24,7 @@ class Remade:
 
 
 class Bound:
-    """Is of one process, and says what to send to another instead."""
+    """An object that cannot leave its process; its error names what to send instead."""
 
     _instead: str
 

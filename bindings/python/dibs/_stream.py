@@ -41,13 +41,13 @@ class Totals(NamedTuple):
 class Sender(Bound):
     """Sends the frames of a moving surface to a controller that has its tree.
 
-    `to` is `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`; without it `packets` collects what would
-    be sent. `quantised` takes 6 bytes a vertex instead of 12. `partial` sends only vertices that moved by more than that
-    many millimetres. `heartbeat` are seconds between two heartbeats, or `None`. `mtu` is 1024, or 64 for CAN-FD. `unit` ("mm",
-    "cm", "m", "in", "um") is that of the positions, by default millimetres as the tree's.
+    `to` is `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`; without it `packets` returns the
+    packets instead. `quantised` takes 6 bytes a vertex instead of 12. `partial` sends only vertices that moved by more
+    than this (mm). `heartbeat` is the time between two heartbeats (s), or `None`. `mtu` is 1024, or 64 for CAN-FD.
+    `unit` ("mm", "cm", "m", "in", "um") is that of the positions, by default millimetres.
 
-    `key`, 16 bytes, puts a tag on every packet, for the receiver with the id `receiver`. Frames can then be sent once the
-    receiver has reported its challenge: `wait`. For one without a way back give its `challenge`.
+    `key`, 16 bytes, adds a tag to every packet, for the receiver with the id `receiver`. Frames can then be sent once
+    the receiver has reported its challenge: `wait`. For a receiver without a return channel give its `challenge`.
     """
 
     _instead = "make one where frames are sent from"
@@ -79,7 +79,7 @@ class Sender(Bound):
     def send(self, positions: npt.ArrayLike, *, age: Optional[float] = None) -> Sent:
         """Sends a frame: positions of the mesh's vertices, captured `age` seconds ago.
 
-        Without `age` a frame counts as captured now, unless it equals the last in every bit.
+        Without `age` a frame counts as captured now, unless it equals the last one in every bit.
         """
         points = _arrays.points("positions", positions)
         count = self._tree._vertices
@@ -88,7 +88,7 @@ class Sender(Bound):
         return Sent(*self._native.send(points.tobytes(), age))
 
     def poll(self) -> None:
-        """Sends a heartbeat if one is due, and takes the receiver's statuses. Does not block."""
+        """Sends a heartbeat if one is due, and receives the receiver's statuses. Does not block."""
         self._native.poll()
 
     @property
@@ -97,7 +97,7 @@ class Sender(Bound):
         return self._native.is_ready()
 
     def wait(self, seconds: float = 2.0) -> None:
-        """Waits until frames can be sent. Raises `ConnectionError` where no genuine status comes in time."""
+        """Waits until frames can be sent. Raises `ConnectionError` if no authentic status arrives in time."""
         end = time.monotonic() + _arrays.number("seconds", seconds)
         self.poll()
         while not self.is_ready:
@@ -110,7 +110,7 @@ class Sender(Bound):
             self.poll()
 
     def play(self, frames: npt.ArrayLike, rate: float) -> Totals:
-        """Sends frames at `rate` a second, with heartbeats between."""
+        """Sends frames at `rate` a second, with heartbeats between them."""
         points = _arrays.points("frames", frames, 3)
         rate = _arrays.number("rate", rate)
         if not rate > 0:
@@ -127,7 +127,7 @@ class Sender(Bound):
         return self.totals
 
     def packets(self) -> list[bytes]:
-        """The packets since the last call, of a sender without `to`."""
+        """The packets since the last call, for a sender without `to`."""
         return self._native.packets()
 
     @property
@@ -147,7 +147,7 @@ class Sender(Bound):
 
     @property
     def acknowledged(self) -> Optional[int]:
-        """The last frame that the receiver reported as published."""
+        """The latest frame that the receiver has reported as published."""
         return self._native.way()[1]
 
 
@@ -159,6 +159,6 @@ def _tags(key: Optional[bytes], receiver: int, challenge: Optional[int]) -> Opti
     if not isinstance(key, (bytes, bytearray)):
         raise TypeError(f"key: bytes are needed, not {type(key).__name__}")
     if len(key) != 16:
-        # Not its content: it may be a key.
+        # The error does not quote the value, which may be a key.
         raise ValueError(f"key: {len(key)} bytes; give 16")
     return bytes(key), receiver, challenge

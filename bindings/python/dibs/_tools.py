@@ -1,4 +1,4 @@
-"""Instruments as rows of numbers: four of a sphere, seven of a capsule."""
+"""Instruments as rows of numbers: four for a sphere, seven for a capsule."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ._arrays import Floats
 
 
 def spheres(centres: npt.ArrayLike, radius: npt.ArrayLike) -> Floats:
-    """Rows x, y, z, radius, of one centre or several and one radius or one for each."""
+    """Rows x, y, z, radius, from one or several centres and one radius or one for each."""
     return _rows([_point("centres", centres)], radius)
 
 
 def capsules(starts: npt.ArrayLike, ends: npt.ArrayLike, radius: npt.ArrayLike) -> Floats:
-    """Rows x1, y1, z1, x2, y2, z2, radius, of one axis or several and one radius or one for each."""
+    """Rows x1, y1, z1, x2, y2, z2, radius, from one or several axes and one radius or one for each."""
     return _rows([_point("starts", starts), _point("ends", ends)], radius)
 
 
@@ -45,11 +45,11 @@ class Poses(NamedTuple):
     rows: Floats
     """(poses, tools, numbers of a tool)."""
     is_single: bool
-    """Given as one tool, not as an array of one pose."""
+    """Whether one tool was given instead of an array of poses."""
 
     @property
     def native(self) -> tuple[bytes, int, int]:
-        """Bytes, numbers of a tool, tools of a pose."""
+        """The bytes, the numbers per tool, and the tools per pose."""
         _, tools, numbers = self.rows.shape
         return self.rows.tobytes(), numbers, tools
 

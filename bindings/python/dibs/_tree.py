@@ -21,30 +21,30 @@ def _dtype(fields: list[tuple[str, str, int]]) -> np.dtype[Any]:
 
 
 ANSWER = _dtype(_dibs.ANSWER)
-"""The record of an answer. Act on the first of `interval`. Lengths are in mm, coordinates are those of the mesh's file.
+"""The record of an answer. Act on the first of `interval`. Lengths are in mm, coordinates those of the mesh's file.
 
 `separation`: the distance from tool to surface; where the tool's axis crosses or is inside, less than 0 by the depth.
-`lower`: the lower end of what the search certifies; below `separation` where a budget ended, or by a depth's tolerance.
-`accuracy`: by how much either may be off, by rounding and by the error of the positions.
-`interval`: both ends with the accuracy. The first is negative infinity where the tool may be inside at any depth.
+`lower`: the search's certified lower bound; less than `separation` if a budget ended, or by a depth's tolerance.
+`accuracy`: largest error of either, from rounding and from the positions.
+`interval`: both bounds, including the accuracy. The first is negative infinity if the tool may be inside to any depth.
 `axis_distance`: from the tool's axis, a sphere's centre or a capsule's segment, to the surface; 0 where it crosses.
-`axis_parameter`: the pair's place along the axis, 0 at its start and 1 at its end; 0 for a sphere.
-`point_on_surface`, `point_on_tool`: the closest pair; where the axis crosses or is inside, of its deepest point.
-`direction`: the unit vector that leads out of the tissue; zero where there is none.
+`axis_parameter`: the pair's position along the axis, 0 at its start and 1 at its end; 0 for a sphere.
+`point_on_surface`, `point_on_tool`: the closest pair; if the axis crosses or is inside, that of its deepest point.
+`direction`: the unit vector that points out of the tissue; zero if undefined.
 `triangle`: the vertices of the surface's triangle, numbered as in the mesh. Three equal ones where the budget ended first.
 `barycentric`: their weights at `point_on_surface`, of sum 1.
 `label`: the triangle's label, or -1.
 `surface`, `tool`: the pair's surface in a `Scene` and tool in a chain, from 0.
-`side`, `side_reason`: of `Side`; and of `SIDE_REASONS`, why it is undefined.
-`coverage`: of `Coverage`, what the stretch rests on.
-`node_tests`, `triangle_tests`: what the search cost.
+`side`, `side_reason`: a `Side`; and an index of `SIDE_REASONS`, why it is undefined.
+`coverage`: a `Coverage`, how the stretch is known.
+`node_tests`, `triangle_tests`: the cost of the search.
 """
 CONTACT = _dtype(_dibs.CONTACT)
-"""The record of a contact. Fields with the names of an `ANSWER` are as there.
+"""The record of a contact. Fields with the names of an `ANSWER` have the same meaning.
 
 `pose`: the row of the tool, or of the chain.
-`separation`: the lower end of the pair's interval.
-`normal`: the unit vector that leads out of the tissue at the pair.
+`separation`: the lower bound of the pair's interval.
+`normal`: the unit vector that points out of the tissue at the pair.
 `velocity`: of the surface there, in mm/s; zero for a surface without velocities.
 `point_on_surface`, `point_on_tool`, `axis_parameter`, `triangle`, `barycentric`, `label`, `surface`, `tool`.
 """
@@ -69,7 +69,7 @@ class Coverage(IntEnum):
     PROVEN = 1
     """A bound on the stretch follows from measured surfaces."""
     ASSUMED = 2
-    """The tree cannot measure it: its stretch limit is taken to hold."""
+    """The tree cannot measure the stretch: its limit is assumed to hold."""
 
 
 class Contacts(NamedTuple):
@@ -79,8 +79,8 @@ class Contacts(NamedTuple):
     """Records of `CONTACT`, in the order of the poses, deepest first. Their `separation` is the lower end of the pair's
     interval, as the `lower` of an answer."""
     bound: npt.NDArray[np.float32]
-    """For each pose: every contact with a separation below is listed. The margin, unless there were too many, or the
-    budget ended."""
+    """For each pose: every contact with a separation below this is listed. It is the margin, unless there were too many
+    contacts, or the budget ended."""
 
 
 def _tests(budget: Optional[int]) -> int:
@@ -97,9 +97,9 @@ def _tests(budget: Optional[int]) -> int:
 
 
 class Scene:
-    """Several surfaces, whose closest pair with a tool is wanted: of organs, or of the parts of one.
+    """Several surfaces, of organs or of the parts of one, that are searched for the closest pair with a tool.
 
-    `surfaces` are `Surface`s, or `Tree`s, at rest. Field `surface` of a record counts them, from 0.
+    `surfaces` are `Surface`s, or `Tree`s for their rest shapes. Field `surface` of a record is the index, from 0.
     """
 
     def __init__(self, surfaces: Iterable[Union[Surface, Tree]]) -> None:
@@ -133,7 +133,7 @@ class Scene:
 
 
 class Surface:
-    """The surface of a tree at one moment, measured once for any number of queries: `Tree.surface`."""
+    """The surface of a tree at one moment, from `Tree.surface`. It is measured once, for any number of queries."""
 
     def __init__(
         self,
@@ -150,7 +150,7 @@ class Surface:
 
     @property
     def stretch(self) -> Optional[float]:
-        """The largest stretch of any triangle, against the rest shape; `None` where the tree cannot measure it."""
+        """The largest stretch of any triangle relative to the rest shape; `None` if the tree cannot measure it."""
         return self._native.stretch()
 
     def query(self, tools: npt.ArrayLike, *, budget: Optional[int] = None) -> npt.NDArray[Any]:
@@ -226,7 +226,7 @@ class Tree:
 
     @property
     def origin(self) -> Floats:
-        """The point of the mesh's file that the tree's own coordinates count from. Queries subtract it."""
+        """The point of the mesh's file that the tree's own coordinates are relative to. Queries subtract it."""
         return np.array(self._native.origin())
 
     @property
@@ -239,16 +239,16 @@ class Tree:
     def surface(
         self, positions: Optional[npt.ArrayLike] = None, *, velocities: Optional[npt.ArrayLike] = None
     ) -> Surface:
-        """The surface with these positions, one for each vertex of the mesh; without, at rest.
+        """The surface with these positions, one for each vertex of the mesh; by default at rest.
 
-        `velocities`, in mm/s and one for each vertex, give contacts the field `velocity`, which is zero without.
+        `velocities`, in mm/s and one for each vertex, set the field `velocity` of contacts, which is zero without them.
 
-        Raises `ValueError` where it is stretched beyond the tree's limits: distances on it could be wrong.
+        Raises `ValueError` if it is stretched beyond the tree's limits, because distances on it could be wrong.
         """
         return self.rest if positions is None and velocities is None else Surface(self, positions, velocities)
 
     def stretch(self, positions: npt.ArrayLike) -> Optional[float]:
-        """The largest stretch of any triangle of a surface, against the rest shape."""
+        """The largest stretch of any triangle of a surface relative to the rest shape."""
         return Surface(self, positions).stretch
 
     def query(
@@ -260,12 +260,12 @@ class Tree:
     ) -> npt.NDArray[Any]:
         """The closest pair of each pose and a surface: an array of `ANSWER`.
 
-        `tools` has a row for each pose: x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. With
-        three dimensions, (poses, tools, 4 or 7), each pose is a chain of tools, which field `tool` counts from 0: its
-        answer is the closest pair of any, its interval that of all. `surface` is an array of positions, or a `Surface`,
-        which is measured once for several calls; by default the rest shape. `budget` bounds the node tests of each
-        tool, of which an exact triangle test counts as 8. The
-        poses are answered on all cores, without Python's lock.
+        `tools` has a row for each pose: x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule.
+        With three dimensions, (poses, tools, 4 or 7), each pose is a chain of tools, and field `tool` is an index in
+        it: the answer is the closest pair of any tool, and its interval covers all tools. `surface` is an array of
+        positions, or a `Surface`, which is measured once for several calls; by default the rest shape. `budget` limits
+        the node tests of each tool, where an exact triangle test counts as 8. Poses are answered on all cores, without
+        Python's lock.
         """
         return self._surface(surface).query(tools, budget=budget)
 
@@ -278,9 +278,9 @@ class Tree:
         budget: Optional[int] = None,
         label: Optional[int] = None,
     ) -> Contacts:
-        """All locally closest pairs of each pose and a surface whose separation is at most `margin`: up to 64 of each
-        tool. The arguments are those of `query`. With a `label`, those of its triangles alone, as if the others were not
-        there, so that its margin holds beside a part that is nearer."""
+        """All locally closest pairs of each pose and a surface with a separation of at most `margin`: up to 64 of each
+        tool. The other arguments are those of `query`. With a `label` only the contacts of its triangles, as if the
+        others did not exist: a nearer part of the surface then does not hide them."""
         return self._surface(surface).contacts(tools, margin, budget=budget, label=label)
 
     def _surface(self, surface: Union[Surface, npt.ArrayLike, None]) -> Surface:

@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyConnectionError, PyFileNotFoundError, PyOSError, PyValu
 use std::fmt::Display;
 use std::io::ErrorKind;
 
-/// Advice that the library words for the command line, and its words here.
+/// Advice for the command line in the library's errors, and the same for Python.
 const ADVICE: [(&str, &str); 14] = [
     ("`dibs build --orient` turns them", "orient=True turns them"),
     ("with --orient", "with orient=True"),
@@ -26,7 +26,7 @@ const ADVICE: [(&str, &str); 14] = [
     ("`dibs stretch MESH MOTION --limits FILE` writes one", "`MotionStretch.limits` makes one"),
 ];
 
-/// A sentence of the library with the names that things have here.
+/// A sentence of the library with Python's names of the options.
 pub fn sentence(of_library: impl Display) -> String {
     let mut sentence = of_library.to_string();
     for (there, here) in ADVICE {
@@ -40,7 +40,7 @@ pub fn value(sentence: &str) -> PyErr {
     PyValueError::new_err(self::sentence(sentence))
 }
 
-/// A file that cannot be read is an `OSError`; one that is wrong is a `ValueError`.
+/// A file that cannot be read is an `OSError`; a file with wrong content is a `ValueError`.
 pub fn read(error: &ReadError) -> PyErr {
     let text = error.to_string();
     match &error.kind {
@@ -60,7 +60,7 @@ pub fn build(error: &BuildError) -> PyErr {
     }
 }
 
-/// A line that does not open is an `OSError`.
+/// A line that cannot be opened is an `OSError`.
 pub fn target(error: &TargetError) -> PyErr {
     match error {
         TargetError::Open { .. } => PyOSError::new_err(error.to_string()),

@@ -1,4 +1,4 @@
-//! A controller's loop: packets in, answers out.
+//! A controller's loop: from packets to answers.
 
 use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -24,13 +24,13 @@ use crate::tracker::{Admitted, Filter, List, Listed, Tracked, listed, motion, na
 use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, error, invalid};
 
-/// As much as any tree needs.
+/// Enough for any tree.
 const STACK: usize = dibs_nostd::format::MAX_STACK;
 
-/// Places for opened nodes.
+/// Room for opened nodes.
 const OPENED: usize = 256;
 
-/// What the two ends of a loop refer to.
+/// Data that the two ends of a loop refer to.
 struct Memory {
     tree: Arc<Owned>,
     state: AtomicU32,
@@ -54,8 +54,8 @@ impl Memory {
     }
 }
 
-/// The bus's end and the control tick's.
-/// Every frame may have a pose. Those that have none are as if no frame could, to the bit.
+/// The bus's end and the control tick's. Every frame may have a pose; frames without one behave bit for bit as if poses
+/// did not exist.
 struct Pair<'m, I: Index, R: Rows<Poses = ()>> {
     bus: Bus<'m, 'm, I, NoMac, Posed<R>>,
     guard: guard::Guard<'m, 'm, I, STACK, OPENED, Posed<R>, OPENED>,
@@ -80,7 +80,7 @@ impl<'m, I: Index, R: Rows<Poses = ()>> Pair<'m, I, R> {
     }
 }
 
-/// A pair of either width, for frames of vertices or of nodes.
+/// A pair for either index width, for frames of vertices or of nodes.
 enum Ends<'m> {
     Narrow(Box<Pair<'m, u16, Vertices>>),
     Wide(Box<Pair<'m, u32, Vertices>>),
@@ -96,7 +96,7 @@ self_cell::self_cell!(
     }
 );
 
-/// `$body` with the ends of any kind.
+/// Evaluates `$body` with the ends of any kind.
 macro_rules! with_ends {
     ($guard:expr, $pair:ident => $body:expr) => {
         $guard.lock().with_dependent_mut(|_, ends| match ends {
@@ -171,7 +171,7 @@ impl Guard {
         })
     }
 
-    /// Positions in the mesh's order, when they were so, and the mesh's rotation and shift.
+    /// Positions in the mesh's order, their time of capture, and the mesh's rotation and translation.
     #[pyo3(signature = (positions, pose, captured, now))]
     fn frame(
         &self,
@@ -183,7 +183,8 @@ impl Guard {
     ) -> PyResult<()> {
         let (origin, captured, now) = (self.tree.origin, Millis(captured), Millis(now));
         let pose = pose.map(|(rotation, shift)| {
-            // Both frames count from the tree's origin.
+            // The pose is given in the file's coordinates and converted to the tree's, which are relative to its
+            // origin.
             let rotation = DQuat::from_array(rotation);
             let shift = DVec3::from(shift) + (rotation.normalize() * origin - origin);
             (rotation.as_quat(), shift.as_vec3())
@@ -227,7 +228,7 @@ impl Guard {
         status.map(|status| PyBytes::new(py, status))
     }
 
-    /// Each event, with its count since the start.
+    /// Each event with its count since the start.
     fn counters(&self) -> Vec<(&'static str, u32)> {
         let counters = with_ends!(self, pair => *pair.bus.counters());
         Event::ALL.into_iter().map(|event| (event.name(), counters.of(event))).collect()
@@ -237,7 +238,7 @@ impl Guard {
         with_ends!(self, pair => pair.bus.register());
     }
 
-    /// The answer for a tool's numbers; without them that of a tool without a pose.
+    /// The answer for a tool's numbers; `None` stands for a tool without a pose.
     fn closest(&self, py: Python<'_>, tool: Option<&[u8]>, now: u32) -> PyResult<Answer> {
         let (origin, now) = (self.tree.origin, Millis(now));
         let tool = tool.map(|tool| AnyTool::of(&bytes::doubles(tool), origin)).transpose();
@@ -263,7 +264,7 @@ impl Guard {
         let (origin, now) = (self.tree.origin, Millis(now));
         let tool = AnyTool::of(&bytes::doubles(tool), origin);
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
-        // A thread that waits for the list lets the one that has it come back to Python.
+        // While a thread waits for the list, it releases Python, so that the thread that holds the list can return.
         let list = self.contacts.lock_py_attached(py);
         let mut list = list.unwrap_or_else(PoisonError::into_inner);
         let contacts = &mut **list;
@@ -276,7 +277,7 @@ impl Guard {
         Ok((Answer { answer, tree: Arc::clone(&self.tree) }, listed(py, contacts, &self.tree)))
     }
 
-    /// The answer, and the motion that a filter admits of a command; none where no surface is trusted.
+    /// The answer, and the motion that a filter admits; `None` if no surface is trusted.
     fn admit(
         &self,
         py: Python<'_>,

@@ -39,7 +39,7 @@ impl Mesh {
         Self::new(py.detach(check).map_err(invalid)?, is_to_turn)
     }
 
-    /// The mesh of which another one's methods said this, in this process or another.
+    /// Restores a mesh from the results of another mesh's methods, in this process or another.
     #[staticmethod]
     fn restored(
         positions: &[u8],
@@ -86,7 +86,7 @@ impl Mesh {
         serde_json::to_string(&self.import.report).map_err(invalid)
     }
 
-    /// The labels of the file's groups, and the groups in JSON, where they were asked for.
+    /// The labels of the file's groups, and the groups in JSON, if they were requested.
     fn groups<'py>(&self, py: Python<'py>) -> PyResult<Option<(Bound<'py, PyByteArray>, String)>> {
         let Some(groups) = &self.import.groups else { return Ok(None) };
         let named = serde_json::to_string(&groups.groups).map_err(invalid)?;
@@ -141,7 +141,7 @@ impl Mesh {
 }
 
 impl Mesh {
-    /// A mesh, turned outwards where that is asked for.
+    /// A mesh, with its triangles flipped outwards if requested.
     pub fn new(mut import: Import, is_to_turn: bool) -> PyResult<Self> {
         let turned =
             if is_to_turn { Some(orient(&mut import.mesh).map_err(invalid)?) } else { None };
@@ -149,7 +149,7 @@ impl Mesh {
     }
 }
 
-/// How to read, and whether to turn the mesh outwards.
+/// The reading options, and whether to flip the mesh outwards.
 fn options(reading: Reading) -> PyResult<(ReadOptions, bool)> {
     let (unit, weld_tolerance, strict, largest_component, origin, is_to_turn, groups) = reading;
     let unit = unit.as_deref().map(self::unit).transpose()?;

@@ -63,7 +63,7 @@ pub fn read_motion<'py>(
     Ok(frames(py, &motion.frames, origin, motion.rate))
 }
 
-/// A generated heart with its motion, or a brain, which has none.
+/// A generated heart with its motion, or a brain without one.
 #[pyfunction]
 pub fn generate<'py>(
     py: Python<'py>,

@@ -1,4 +1,4 @@
-//! Answers as the records of a structured array.
+//! Encodes answers as the records of a structured array.
 
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::{Contact, Coverage, Interval, NoSide, Proximity, Side};
@@ -6,10 +6,10 @@ use dibs_nostd::{Contact, Coverage, Interval, NoSide, Proximity, Side};
 use crate::error;
 use crate::tree::Owned;
 
-/// The name, type and numbers of a record's fields, in their order.
+/// For each field of a record: its name, its type, and its number of values.
 pub type Fields = [(&'static str, &'static str, usize)];
 
-/// An answer. [`push_answer`] writes it.
+/// The fields of an answer, as [`push_answer`] writes it.
 pub const ANSWER: &Fields = &[
     ("separation", "<f4", 1),
     ("lower", "<f4", 1),
@@ -32,7 +32,7 @@ pub const ANSWER: &Fields = &[
     ("coverage", "u1", 1),
 ];
 
-/// A contact. [`push_contact`] writes it.
+/// The fields of a contact, as [`push_contact`] writes it.
 pub const CONTACT: &Fields = &[
     ("pose", "<u4", 1),
     ("surface", "<u4", 1),
@@ -62,12 +62,12 @@ const REASONS: [NoSide; 7] = [
     NoSide::NonManifold,
 ];
 
-/// A sentence for each value of `side_reason`: none for 0.
+/// A sentence for each value of `side_reason`; empty for 0.
 pub fn reasons() -> Vec<String> {
     [String::new()].into_iter().chain(REASONS.map(error::sentence)).collect()
 }
 
-/// Appends an answer, of a pair of these numbers: the surface's and the tool's.
+/// Appends the answer for the pair of these indices: the surface's and the tool's.
 pub fn push_answer(out: &mut Vec<u8>, found: &Proximity, tree: &Owned, pair: [usize; 2]) {
     let (side, reason) = match found.side {
         Side::Outside => (0, 0),
@@ -125,7 +125,7 @@ fn floats(out: &mut Vec<u8>, numbers: &[f32]) {
 
 /// A point in the coordinates of the mesh's file.
 fn point(out: &mut Vec<u8>, point: Vec3, origin: DVec3) {
-    // A sum with zero would lose the sign of -0.
+    // Adding zero would lose the sign of -0.
     let local = point.as_dvec3();
     let point = if origin == DVec3::ZERO { local } else { origin + local };
     out.extend(point.to_array().into_iter().flat_map(f64::to_le_bytes));

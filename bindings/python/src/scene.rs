@@ -1,4 +1,4 @@
-//! Queries on the surfaces of a scene: one surface or several.
+//! Queries on one or several surfaces.
 
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ use crate::tool::{Chunk, Poses};
 /// Poses that one query object answers.
 const CHUNK: usize = 128;
 
-/// Poses between two looks for an interrupt.
+/// Poses between two checks for an interrupt.
 const BLOCK: usize = 1 << 16;
 
-/// Bytes of tools, numbers of a tool, tools of a pose.
+/// The bytes of all tools, the numbers per tool, and the tools per pose.
 type Tools<'a> = (&'a [u8], usize, usize);
 
 /// The closest pair of each pose.
@@ -34,7 +34,7 @@ pub fn query<'py>(
     Ok(PyByteArray::new(py, &found.concat()))
 }
 
-/// The contacts of each pose, and for each pose the bound below which all are listed.
+/// The contacts of each pose, and for each pose the bound below which the list is complete.
 #[pyfunction]
 pub fn contacts<'py>(
     py: Python<'py>,
@@ -50,7 +50,7 @@ pub fn contacts<'py>(
     Ok([records, bounds].map(|bytes| PyByteArray::new(py, &bytes.concat())))
 }
 
-/// Answers chunks of poses on all cores, without Python's lock.
+/// Answers chunks of poses on all cores, without holding Python's lock.
 fn in_blocks<T: Send>(
     py: Python<'_>,
     (bytes, width, chain): Tools<'_>,
@@ -75,8 +75,8 @@ fn in_blocks<T: Send>(
 
 /// Surfaces, and the budget of each pair of a tool and a surface.
 ///
-/// The pairs are searched one by one: `Query::closest_in_scene` would pass over a far tool, which it may only if the tools
-/// of a chain touch each other, and takes surfaces of one index width and one origin.
+/// The pairs are searched one by one: `Query::closest_in_scene` may skip a far tool only if the tools of a chain touch
+/// each other, and requires that all surfaces have one index width and one origin.
 struct Scene {
     surfaces: Vec<Py<Surface>>,
     budget: Budget,
@@ -87,7 +87,7 @@ impl Scene {
         Self { surfaces, budget: Budget::new(tests) }
     }
 
-    /// The surfaces with their numbers.
+    /// The surfaces with their indices.
     fn surfaces(&self) -> impl Iterator<Item = (usize, &Surface)> {
         self.surfaces.iter().map(Py::get).enumerate()
     }
@@ -140,7 +140,7 @@ impl Scene {
     }
 }
 
-/// The closest pair of a pose so far. Interval, accuracy and tests are those of all its pairs.
+/// The closest pair of a pose so far. Interval, accuracy and tests cover all of its pairs.
 #[derive(Clone, Copy)]
 struct Closest {
     surface: usize,
@@ -149,7 +149,7 @@ struct Closest {
 }
 
 impl Closest {
-    /// The closer of two, the first of equal ones.
+    /// The closer of two pairs, or the first of equally close ones.
     fn or_closer(self, other: Self) -> Self {
         let (one, two) = (self.found, other.found);
         let mut closer = if two.separation < one.separation { other } else { self };
@@ -158,7 +158,7 @@ impl Closest {
         closer.found.coverage = one.coverage.or_weaker(two.coverage);
         closer.found.node_tests = one.node_tests.saturating_add(two.node_tests);
         closer.found.triangle_tests = one.triangle_tests.saturating_add(two.triangle_tests);
-        // Where a budget left the side of one pair open, that pair may be the deepest.
+        // If a budget ended before the side of one pair was known, that pair may be the deepest.
         let cut_short = Side::Undefined(NoSide::CutShort);
         if [one.side, two.side].contains(&cut_short) {
             closer.found.side = cut_short;

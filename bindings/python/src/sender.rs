@@ -1,4 +1,4 @@
-//! The imaging side: frames of a surface become packets, and go to a controller.
+//! The imaging side: encodes frames of a surface as packets, and sends them to a controller.
 
 use std::io;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -17,7 +17,7 @@ use crate::mesh::unit;
 use crate::tree::{Tree, of_any_width};
 use crate::{bytes, error, invalid};
 
-/// A line, or the packets for somebody who carries them.
+/// A line; or a collection of packets for a caller who transports them.
 enum Outlet {
     Line(Line),
     Packets(Vec<Vec<u8>>),
@@ -39,16 +39,16 @@ impl Transport for Outlet {
     }
 }
 
-/// A sender of packets of any largest size.
+/// A sender with any packet size.
 trait AnySender: Send {
     fn send(&mut self, positions: &[Vec3], age: Option<Duration>) -> Result<Sent, SendError>;
     fn poll(&mut self) -> Result<(), SendError>;
     fn totals(&self) -> Totals;
     /// Whether frames can be sent.
     fn is_ready(&self) -> bool;
-    /// The receiver's counters, as it last reported them.
+    /// The receiver's counters from its last status.
     fn counters(&self) -> Counters;
-    /// Frames on their way, and the last that the receiver acknowledged.
+    /// Number of frames in flight, and the latest frame that the receiver acknowledged.
     fn way(&self) -> (u32, Option<u32>);
     fn outlet(&mut self) -> &mut Outlet;
 }
@@ -186,7 +186,7 @@ impl Sender {
         self.lock().way()
     }
 
-    /// The packets since the last call, where no line takes them.
+    /// The packets since the last call, if there is no line.
     fn packets<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         match self.lock().outlet() {
             Outlet::Packets(packets) => {
@@ -203,7 +203,7 @@ impl Sender {
     }
 }
 
-/// A sender without tags, or with them once the receiver's challenge is known.
+/// A sender without tags, or with tags once the receiver's challenge is known.
 fn sender_of<const MTU: usize>(
     outlet: Outlet,
     order: SurfaceOrder,

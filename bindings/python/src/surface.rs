@@ -12,19 +12,19 @@ use pyo3::prelude::*;
 use crate::tool::{AnyTool, Chunk};
 use crate::tree::{Owned, of_any_width};
 
-/// As much as any tree needs, and more than one: batches of subtrees take 128 more entries.
+/// Enough for any tree, including the 128 more entries of a batched search.
 const STACK: usize = dibs_nostd::format::MAX_STACK;
 
-/// Contacts of a tool and a surface that are listed.
+/// Largest number of contacts of a tool and a surface.
 pub const MOST_CONTACTS: usize = 64;
 
-/// A tree, where its vertices are, and how fast they move.
+/// A tree with the positions and velocities of its vertices.
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Surface {
     pub tree: Arc<Owned>,
     pub rows: SurfaceRows,
     pub velocities: Option<Vec<Vec3>>,
-    /// `None` where the tree has no rest metric to measure with.
+    /// `None` if the tree has no rest metric to measure it with.
     pub stretch: Option<MeasuredStretch>,
 }
 
@@ -47,7 +47,7 @@ impl Surface {
         }
     }
 
-    /// Finds the closest pair of each tool. `found` takes it with the tool's pose and number.
+    /// Finds the closest pair of each tool. `found` receives it with the pose and the tool's index.
     pub fn closest(
         &self,
         chunk: Chunk<'_>,
@@ -69,8 +69,8 @@ impl Surface {
         Ok(())
     }
 
-    /// Finds the contacts of each tool, or only those of a label. `found` takes them with the tool's pose and number, and the bound below which
-    /// all are listed.
+    /// Finds the contacts of each tool, or only those of a label. `found` receives them with the pose, the tool's
+    /// index, and the bound below which the list is complete.
     pub fn contacts(
         &self,
         chunk: Chunk<'_>,

@@ -5,7 +5,8 @@ use dibs_nostd::{Capsule, Sphere};
 
 use crate::bytes;
 
-/// A tool in the coordinates of a mesh's file, which f32 may not hold: a sphere's four numbers, or a capsule's seven.
+/// A tool in the coordinates of a mesh's file, which may be too large for f32: four numbers of a sphere, or seven of a
+/// capsule.
 pub type Numbers<'a> = &'a [f64];
 
 /// A tool in the coordinates of a tree.
@@ -15,7 +16,7 @@ pub enum AnyTool {
 }
 
 impl AnyTool {
-    /// The tool for a tree with this origin, which f64 subtracts.
+    /// Converts a tool to the coordinates of a tree with this origin, which is subtracted in f64.
     pub fn of(numbers: Numbers<'_>, origin: DVec3) -> Result<Self, String> {
         let local = |at: usize| (DVec3::from_slice(&numbers[at..]) - origin).as_vec3();
         let tool = match numbers.len() {
@@ -27,12 +28,12 @@ impl AnyTool {
     }
 }
 
-/// The numbers of consecutive poses, each a chain of tools.
+/// The tools of consecutive poses, each a chain.
 pub struct Poses {
     numbers: Vec<f64>,
-    /// Numbers of a tool.
+    /// Numbers per tool.
     width: usize,
-    /// Tools of a pose.
+    /// Tools per pose.
     chain: usize,
     /// The number of the first pose.
     pub first: usize,
@@ -43,7 +44,7 @@ impl Poses {
         Self { numbers: bytes::doubles(bytes), width, chain, first }
     }
 
-    /// Chunks of so many poses.
+    /// Chunks of this many poses.
     pub fn chunks(&self, poses: usize) -> Vec<Chunk<'_>> {
         let pose = self.width * self.chain;
         let chunks = self.numbers.chunks(pose * poses).enumerate();
@@ -77,13 +78,13 @@ impl<'a> Chunk<'a> {
         self.first
     }
 
-    /// Each tool, with its pose within the chunk and its number within its chain.
+    /// Each tool, with its pose within the chunk and its index within its chain.
     pub fn tools(self) -> impl Iterator<Item = (usize, usize, Numbers<'a>)> {
         let tools = self.numbers.chunks_exact(self.width).enumerate();
         tools.map(move |(number, tool)| (number / self.chain, number % self.chain, tool))
     }
 
-    /// An error of a tool.
+    /// The error of a tool.
     pub fn wrong(&self, pose: usize, tool: usize, error: impl std::fmt::Display) -> String {
         let row = self.first + pose;
         if self.chain == 1 {

@@ -19,10 +19,10 @@ use crate::tool::AnyTool;
 use crate::tree::{Owned, Tree, View};
 use crate::{bytes, invalid};
 
-/// As much as any tree needs.
+/// Enough for any tree.
 const STACK: usize = dibs_nostd::format::MAX_STACK;
 
-/// Places for opened nodes.
+/// Room for opened nodes.
 const OPENED: usize = 4_096;
 
 type TheTracker<'t, I> = dibs_nostd::Tracker<'t, I, STACK, OPENED, OPENED>;
@@ -40,7 +40,7 @@ impl<'t, I: Index> Ticks<'t, I> {
         Self { tree, trackers: Vec::new(), odometer: Odometer::new(tree), last: None }
     }
 
-    /// Makes the trackers of so many tools, and measures how far the surface has moved since the last tick.
+    /// Makes the trackers for this many tools, and measures how far the surface has moved since the last tick.
     fn begin<'s>(
         &mut self,
         now: &'s Py<Surface>,
@@ -60,7 +60,7 @@ impl<'t, I: Index> Ticks<'t, I> {
     }
 }
 
-/// The ticks of either width.
+/// The ticks for either index width.
 enum OfWidth<'t> {
     Narrow(Ticks<'t, u16>),
     Wide(Ticks<'t, u32>),
@@ -74,7 +74,7 @@ self_cell::self_cell!(
     }
 );
 
-/// `$body` with the ticks of either width.
+/// Evaluates `$body` with the ticks of either index width.
 macro_rules! with_ticks {
     ($ticks:expr, $of_width:ident => $body:expr) => {
         lock($ticks).with_dependent_mut(|_, ticks| match ticks {
@@ -95,7 +95,7 @@ fn lock(ticks: &Mutex<OnTree>) -> MutexGuard<'_, OnTree> {
     ticks.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Refuses the surface of another tree.
+/// Fails for the surface of another tree.
 fn check(surface: &Surface, tree: &Arc<Owned>) -> PyResult<()> {
     if Arc::ptr_eq(&surface.tree, tree) || surface.tree.bytes() == tree.bytes() {
         Ok(())
@@ -122,7 +122,7 @@ pub struct Tracker {
 /// A list of contacts.
 pub type List = Contacts<MOST_CONTACTS, 16_384>;
 
-/// Its records and bound.
+/// The records and the bound of a list.
 pub type Listed<'py> = (Bound<'py, PyByteArray>, f32);
 
 pub fn listed<'py>(py: Python<'py>, list: &List, tree: &Owned) -> Listed<'py> {
@@ -158,7 +158,7 @@ impl Tracker {
         if let Some(instructions) = instructions {
             options = options.budget(Budget::for_instructions(instructions, cost));
         }
-        // A thread that waits for the list lets the one that has it come back to Python.
+        // While a thread waits for the list, it releases Python, so that the thread that holds the list can return.
         let list = self.contacts.lock_py_attached(py);
         let mut list = list.unwrap_or_else(PoisonError::into_inner);
         let contacts = &mut **list;
@@ -208,7 +208,7 @@ impl Tracked {
         PyByteArray::new(py, &record)
     }
 
-    /// Whether the side is the last tick's, the reason for a whole query, and the motion (mm) since the last tick.
+    /// Whether the side is the last tick's, why the tick was a whole query, and the motion (mm) since the last tick.
     fn facts(&self) -> (bool, Option<&'static str>, Option<f32>) {
         let reason = self.found.fallback.map(|fallback| match fallback {
             Fallback::Start => "start",
@@ -252,8 +252,8 @@ impl Filter {
         Ok(Self { ticks: on(tree), filter, tree: Arc::clone(&tree.0) })
     }
 
-    /// `tools`: seven numbers each. `command`: reference point, translation, rotation. `tissue`: period, speed, error.
-    /// `rows`: seven numbers each.
+    /// `tools` and `rows`: seven numbers each. `command`: reference point, translation, rotation. `tissue`: period,
+    /// speed, error.
     fn admit(
         &self,
         py: Python<'_>,
@@ -315,7 +315,7 @@ pub fn motion(command: [[f64; 3]; 3], origin: DVec3) -> Motion {
     Motion::new((about - origin).as_vec3(), translation.as_vec3(), rotation.as_vec3())
 }
 
-/// An admitted motion for Python.
+/// Converts an admitted motion for Python.
 pub fn record(admitted: filter::Admitted) -> Admitted {
     (
         admitted.motion.translation.to_array(),

@@ -13,13 +13,13 @@ use crate::error::sentence;
 use crate::surface::Surface;
 use crate::{bytes, invalid};
 
-/// A view of either width.
+/// A view for either index width.
 pub enum View<'a> {
     Narrow(dibs_nostd::Tree<'a, u16>),
     Wide(dibs_nostd::Tree<'a, u32>),
 }
 
-/// `$body` with `$tree` of either width.
+/// Evaluates `$body` with `$tree` of either index width.
 macro_rules! of_any_width {
     ($view:expr, $tree:ident => $body:expr) => {
         match $view {
@@ -39,10 +39,10 @@ self_cell::self_cell!(
     }
 );
 
-/// A tree, and the numbers of its vertices.
+/// A tree, and the mesh vertices of its rows.
 pub struct Owned {
     validated: Validated,
-    /// The mesh's vertex of each row.
+    /// The mesh vertex of each row.
     pub order: Vec<u32>,
     pub origin: DVec3,
 }
@@ -57,7 +57,7 @@ impl Owned {
         self.validated.borrow_owner()
     }
 
-    /// Vertices of the tree's mesh.
+    /// Number of vertices of the tree's mesh.
     pub fn vertices(&self) -> usize {
         of_any_width!(self.view(), tree => tree.file_vertex_count() as usize)
     }
@@ -104,7 +104,7 @@ impl Tree {
         summary.warnings().map(sentence).collect()
     }
 
-    /// The surface with these positions, or at rest, whose vertices move at these velocities.
+    /// The surface with these positions, or at rest; its vertices move at these velocities.
     fn surface(
         &self,
         py: Python<'_>,
@@ -129,7 +129,7 @@ impl Tree {
             let stretch = match rows.stretch {
                 Ok(measured) => Some(measured),
                 Err(StretchError::NoMetric) => None,
-                // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
+                // Beyond the stretch limit a distance could be wrong, so the surface is refused.
                 Err(error) => {
                     return Err(invalid(format!(
                         "{error}; build the tree with a larger stretch, or with limits that allow it"
@@ -146,7 +146,7 @@ impl Tree {
     fn velocities(&self, of_mesh: &[u8]) -> PyResult<Vec<Vec3>> {
         let of_mesh = bytes::points(of_mesh);
         if let Ok(nodes) = of_any_width!(self.0.view(), tree => Nodes::of(tree)) {
-            // The velocity of a vertex is the mean of its nodes', as its position is.
+            // The velocity of a vertex is a weighted mean of its nodes' velocities, as its position is.
             let of_nodes: Vec<Vec3> = of_mesh.iter().map(|velocity| velocity.as_vec3()).collect();
             let surface = nodes.surface(of_nodes.as_slice());
             return match surface.len() {
@@ -176,7 +176,7 @@ impl Tree {
     }
 }
 
-/// Why bytes are no tree.
+/// What bytes are that are not a tree.
 fn what_it_is(bytes: &[u8], error: &FormatError) -> String {
     match Format::of(bytes, "") {
         Ok(format) if !bytes.starts_with(b"DIBS") => {

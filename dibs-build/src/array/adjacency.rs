@@ -9,24 +9,24 @@ use super::flatten::put;
 use crate::Mesh;
 use crate::leaf::StoredTriangle;
 
-/// Angles closer than this, in radians, have no order.
+/// Two angles (radians) closer than this count as equal.
 const COINCIDENT: f64 = 1e-9;
 
 /// A triangle at an edge.
 #[derive(Clone, Copy)]
 struct User {
     row: u32,
-    /// Number of the edge in it.
+    /// Index of the edge in the triangle: 0 to 2.
     edge: usize,
-    /// It runs along the edge from the lower vertex to the higher.
+    /// Whether the triangle runs along the edge from the lower vertex number to the higher.
     is_forward: bool,
 }
 
 /// The adjacency section; `None` for a surface without sides: two triangles run along their common edge in the same
 /// direction.
 ///
-/// More than two triangles at an edge are pairs, each around a wedge of the solid at rest, as where two solids touch.
-/// Where they are not, the surface is cut there.
+/// At an edge of more than two triangles, as where two solids touch, neighbours are the two triangles around each wedge
+/// of the solid at rest. Where they do not form such pairs, the edge is a border.
 pub(super) fn adjacency<I: Index>(mesh: &Mesh, triangles: &[StoredTriangle]) -> Option<Vec<u8>> {
     let mut users: HashMap<(u32, u32), Vec<User>> = HashMap::with_capacity(2 * triangles.len());
     for (row, placed) in (0..).zip(triangles) {
@@ -57,7 +57,8 @@ pub(super) fn adjacency<I: Index>(mesh: &Mesh, triangles: &[StoredTriangle]) -> 
     Some(bytes)
 }
 
-/// The pairs of triangles around an edge between which the solid lies; none if they do not face each other in turn.
+/// The pairs of triangles around an edge with the solid between them; none if the triangles do not alternate in
+/// direction.
 fn wedges<I: Index>(
     mesh: &Mesh,
     triangles: &[StoredTriangle],
@@ -75,7 +76,7 @@ fn wedges<I: Index>(
     };
     let mut around: Vec<(f64, User)> = users.iter().map(|user| (angle(user), *user)).collect();
     around.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // The solid is before a forward triangle, in the sense of rotation around the edge.
+    // Rotating around the edge, the solid ends at a forward triangle: each pair starts with a backward one.
     let first = around.iter().position(|(_, user)| !user.is_forward).unwrap_or_default();
     around.rotate_left(first);
     let pairs: Vec<_> = around.as_chunks::<2>().0.to_vec();
@@ -95,7 +96,7 @@ fn wedges<I: Index>(
     }
 }
 
-/// Whether a reader finds each of two triangles across the edge of the other, by the lower bits of their rows.
+/// Whether a reader can tell the rows of both triangles from the others at the edge by their low 16 bits.
 fn is_unique<I: Index>(users: &[User], one: User, other: User) -> bool {
     let is_found = |row: u32| {
         let alike = users.iter().filter(|user| user.row % (1 << 16) == row % (1 << 16));

@@ -12,7 +12,7 @@ use dibs_nostd::{FormatError, Index, Tree, TriangleRow, VertexTable};
 use crate::error::BuildError;
 use crate::write_atomically;
 
-/// A tree as bytes, with the facts that a host needs.
+/// A tree as bytes, with the data that a host needs.
 #[derive(Clone, Debug)]
 pub struct BuiltTree {
     pub(super) bytes: Vec<u8>,
@@ -37,23 +37,22 @@ pub struct Summary {
     pub stack: u32,
     /// Bits of an index.
     pub index_bits: u32,
-    /// The stretch limit: the largest, where triangles have their own.
+    /// The stretch limit; where triangles have their own, the largest.
     pub stretch: f32,
     /// The least stretch limit of any triangle, or tetrahedron.
     pub least_stretch_limit: f32,
     /// Triangles that the controller's stretch check refuses even at rest, because they are too small for its
-    /// arithmetic. With any, no frame is ever published.
+    /// arithmetic. If there is any, no frame is ever published.
     pub unmeasurable: u32,
     /// The vertices of the first of them, by the mesh's numbers.
     pub first_unmeasurable: Option<[u32; 3]>,
-    /// Whether radii were measured across triangles (else along edges, or through a [volume](Self::volume)).
+    /// Whether radii were measured across triangles. If not: along edges, or through a [volume](Self::volume).
     pub surface_paths: bool,
-    /// Roots: surfaces that share no vertex.
+    /// Roots: one for each part of the surface that shares no vertex with another.
     pub roots: u32,
     /// Radius of the largest root's sphere at rest, in the mesh's unit.
     pub root_radius: f32,
-    /// The corners of the box around the vertices at rest, least and largest; `None` without the rest shape, or nodes that
-    /// carry it.
+    /// The corners of the box around the vertices at rest; `None` if the tree has neither a rest shape nor nodes.
     pub bounding_box: Option<[[f32; 3]; 2]>,
     /// Mean length of the triangles' sides at rest.
     pub mean_edge: Option<f64>,
@@ -63,15 +62,15 @@ pub struct Summary {
     pub origin: [f64; 3],
     /// The unit of the mesh's file, if the builder was told: `mm`, `cm`, `m`, `in` or `um`. The tree is in millimetres.
     pub unit: Option<&'static str>,
-    /// Vertices of the mesh's file, those of no triangle too: positions of a frame.
+    /// Vertices of the mesh's file, including those of no triangle: positions of a frame.
     pub file_vertices: u32,
-    /// Triangles of the mesh's file, those too that were dropped.
+    /// Triangles of the mesh's file, including those that were dropped.
     pub file_triangles: u32,
     /// Identity of the mesh, as vertex packets carry it.
     pub mesh_id: u32,
     /// Flash that a query reads: nodes and triangles.
     pub query_bytes: usize,
-    /// The same, for each triangle.
+    /// The same, for each triangle of the surface.
     pub query_bytes_per_triangle: f64,
     /// Flash of the adjacency, from which sides are found; 0 if the surface has none.
     pub adjacency_bytes: usize,
@@ -95,7 +94,8 @@ pub struct VolumeSummary {
     pub nodes: u32,
     /// Tetrahedra.
     pub tetrahedra: u32,
-    /// The most that a vertex moves for each millimetre of a node: 1 without vertices outside of the volume.
+    /// The largest displacement of a vertex for a displacement of one millimetre of the nodes: 1 if no vertex is
+    /// outside of the volume.
     pub amplification: f32,
     /// Flash of nodes, tetrahedra and weights, part of the tree's.
     pub flash_bytes: usize,
@@ -107,13 +107,13 @@ pub struct VolumeSummary {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct ModesSummary {
-    /// Modes: weights of a frame.
+    /// Number of modes: weights of a frame.
     pub count: usize,
     /// Largest distance of any vertex from the motion that they were fitted to, in any frame.
     pub position_error: f32,
     /// Root mean square of that distance.
     pub rms_error: f32,
-    /// Part of the recorded range by which a weight may exceed it, at either end.
+    /// Fraction of the recorded range by which a weight may exceed it, at either end.
     pub margin: f32,
     /// Recorded shapes that the stretch bound starts from.
     pub anchors: usize,
@@ -123,10 +123,10 @@ pub struct ModesSummary {
     pub flash_bytes_per_vertex: f64,
 }
 
-/// Least extent (mm) of a surface that is no mistake: an organ in metres that is taken for one in millimetres has less.
+/// Least extent (mm) of a plausible surface: an organ in metres that is read as millimetres is smaller.
 const LEAST_SIZE: f32 = 1.0;
 
-/// Largest such extent (mm): an organ in micrometres has more.
+/// Largest plausible extent (mm): an organ in micrometres that is read as millimetres is larger.
 const LARGEST_SIZE: f32 = 10_000.0;
 
 impl Summary {
@@ -142,7 +142,7 @@ impl Summary {
         sentence.into_iter().chain(self.implausible())
     }
 
-    /// A warning of a size that no organ has: lengths were read in another unit than theirs.
+    /// The warning for a size that no organ has, which means that the lengths are in another unit.
     fn implausible(&self) -> Option<String> {
         let [low, high] = self.bounding_box?;
         let size = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
@@ -189,7 +189,7 @@ impl BuiltTree {
         8 * self.index_bytes as u32
     }
 
-    /// The tree, if its indices have the width of `I`.
+    /// The tree, if its indices are of type `I`.
     ///
     /// # Errors
     /// [`FormatError::Width`] otherwise.
@@ -197,7 +197,7 @@ impl BuiltTree {
         Tree::from_bytes(&self.bytes)
     }
 
-    /// Puts one value a mesh vertex into the order of the tree's rows.
+    /// Reorders one value per mesh vertex into the order of the tree's rows.
     ///
     /// # Panics
     /// If `of_mesh` does not have a value for each of the mesh's vertices.
@@ -212,8 +212,8 @@ impl BuiltTree {
         self.origin
     }
 
-    /// Positions in the file's coordinates (mm), one a mesh vertex, as the tree's vertex table: less the
-    /// [origin](Self::origin), rounded to f32 only then, in the order of the rows.
+    /// Converts positions in the file's coordinates (mm), one a mesh vertex, to rows of the tree's vertex table:
+    /// relative to the [origin](Self::origin), then rounded to f32, in the order of the rows.
     ///
     /// # Panics
     /// If `of_mesh` does not have a position for each of the mesh's vertices.
@@ -362,7 +362,7 @@ fn mean_edge<I: Index>(tree: &Tree<'_, I>) -> Option<f64> {
     Some(sum / (3.0 * f64::from(tree.triangle_count())))
 }
 
-/// Whether the stretch check can pass a triangle at rest; true where there is nothing to check with.
+/// Whether the stretch check can pass a triangle at rest; true for a tree without a metric.
 fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
     let Some(metric) = tree.metric(row) else { return true };
     let corners = tree.corners(TriangleRow(row)).and_then(|c| row_of(c, |v| tree.rest_position(v)));
@@ -382,7 +382,7 @@ fn is_measurable<I: Index>(tree: &Tree<'_, I>, row: u32) -> bool {
     }
 }
 
-/// A value for each corner; `None` if one has none.
+/// A value for each corner; `None` if any corner has none.
 fn row_of<T>(corners: [u32; 3], of: impl Fn(u32) -> Option<T>) -> Option<[T; 3]> {
     let [a, b, c] = corners.map(of);
     Some([a?, b?, c?])

@@ -1,4 +1,4 @@
-//! From a tree of sections to the flat array: ordered, rounded up, written.
+//! From a tree of sections to the flat array: order, upward rounding, bytes.
 
 // Requirement: A-02
 
@@ -20,7 +20,7 @@ use crate::leaf::{self, StoredTriangle};
 use crate::nodes::{Embedding, encode};
 use crate::rest::LimitRatios;
 
-/// A tree in the order of its array.
+/// A tree in array order.
 #[derive(Debug)]
 struct Flat {
     /// Pin, radius and link of each node.
@@ -32,8 +32,8 @@ struct Flat {
 }
 
 impl Flat {
-    /// Nodes breadth first, so that children follow their parents and siblings are one run; leaves
-    /// depth first, so that neighbours on the surface are neighbours in the tables.
+    /// Nodes are breadth first, so that children follow their parents and siblings are contiguous; leaves are depth
+    /// first, so that neighbours on the surface are neighbours in the tables.
     fn new(mesh: &Mesh, roots: &[Cluster]) -> Self {
         let mut flat = Self { nodes: Vec::new(), triangles: Vec::new(), stack: 1 };
         let mut leaves = Vec::new();
@@ -76,7 +76,7 @@ impl Flat {
     }
 }
 
-/// Options and facts that the bytes record beside the nodes.
+/// Options and data that are stored in the tree beside its nodes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Facts<'a> {
     pub paths: PathKind,
@@ -95,7 +95,7 @@ pub(crate) struct Facts<'a> {
     pub embedding: Option<&'a Embedding>,
 }
 
-/// The bytes of a tree, and the mesh vertex of each row.
+/// The bytes of a tree, and the mesh vertex of each row of the vertex table.
 pub(crate) fn flatten<I: Index>(
     mesh: &Mesh,
     roots: &[Cluster],
@@ -209,7 +209,7 @@ fn vertex_order(mesh: &Mesh, triangles: &[StoredTriangle]) -> Vec<u32> {
     corners.filter(|&v| !std::mem::replace(&mut seen[v as usize], true)).collect()
 }
 
-/// The metric of each triangle, marked where it continues the previous one.
+/// The metric of each triangle, with a mark if it shares an edge with the previous one.
 fn metrics(mesh: &Mesh, triangles: &[StoredTriangle], facts: Facts<'_>) -> Vec<u8> {
     let of = |placed: StoredTriangle| {
         let corners = mesh.corners(placed.centre_first());
@@ -239,8 +239,9 @@ fn metrics(mesh: &Mesh, triangles: &[StoredTriangle], facts: Facts<'_>) -> Vec<u
     rows.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect()
 }
 
-/// Whether a triangle can join the previous one. The shared edge takes the lower of its two roundings, which is safe
-/// for both. If that makes the stretch of a nearly flat triangle too large, the join is refused.
+/// Whether a triangle can join the previous one. Both then store the smaller of the two rounded squares of their shared
+/// edge, which is safe for both. If that makes the computed stretch of a nearly flat triangle too large, the join is
+/// refused.
 fn share_edge(before: &mut [f32; 3], row: &mut [f32; 3], join: Join, ratios: &LimitRatios) -> bool {
     if row[0] == 0.0 || before[2] == 0.0 {
         return false;
@@ -268,14 +269,14 @@ fn openness_of([first, between, second]: [f32; 3]) -> f32 {
     1.0 - between.abs() / (first.abs() * second).sqrt()
 }
 
-/// The length of one radius code: the largest radius takes nearly the largest code.
+/// The radius that one code unit stands for: the largest radius takes nearly the largest code.
 fn radius_unit<I: Index>(flat: &Flat) -> f32 {
     let largest = flat.nodes.iter().map(|&(_, radius, _)| radius).fold(0.0, f64::max);
-    // One part in a million covers the rounding of the unit to f32.
+    // One part in a million covers the rounding of this unit to f32.
     (largest / f64::from(I::MAX_RADIUS_CODE) * (1.0 + 1e-6)) as f32
 }
 
-/// The least code whose radius, as the controller computes it, is not below `radius`.
+/// The least code whose radius, as the controller computes it, is at least `radius`.
 fn code(radius: f64, unit: f32) -> u32 {
     if radius == 0.0 {
         return 0;

@@ -15,16 +15,16 @@ const SURFACE_ROUNDING: f64 = 21.0;
 const EDGE_ROUNDING: f64 = 7.0;
 const U: f64 = 1.0 / 16_777_216.0;
 
-/// Squared edge lengths between which no product of the check overflows or loses digits to underflow
-/// (the larger is divided by the square of the tree's limit).
+/// Limits of squared edge lengths for which no product of the check overflows or loses digits to underflow. (The larger
+/// limit is divided by the square of the tree's limit.)
 const LEAST_SQUARED: f64 = 1e-14;
 const LARGEST_SQUARED: f64 = 1e18;
 
-/// The metric of one triangle with these corners at rest, the centre first. The lowest bit of its second number is
+/// The metric of one triangle with these corners at rest, the centre first. The lowest bit of its second number holds
 /// `is_reversed`.
 ///
-/// `ratio` is its stretch limit as a part of the tree's, which is `stretch`. Roundings are downwards, so the metric is
-/// never too large. It is zeros, which no triangle passes, if f32 arithmetic cannot measure the triangle.
+/// `ratio` is its stretch limit over the tree's, which is `stretch`. Numbers are rounded down, so the metric is never
+/// too large. It is all zeros, which no triangle passes, if f32 arithmetic cannot measure the triangle.
 pub(crate) fn metric(
     corners: [Vec3; 3],
     is_reversed: bool,
@@ -54,7 +54,7 @@ pub(crate) fn metric(
     }
 }
 
-/// The largest number with this lowest bit that is not above `x`, which is not negative; 0 for 0.
+/// The largest number not above `x` with this lowest bit; 0 for 0. `x` is not negative.
 pub(crate) fn with_lowest_bit(x: f32, bit: bool) -> f32 {
     if x == 0.0 || has_lowest_bit(x) == bit { x } else { x.next_down() }
 }

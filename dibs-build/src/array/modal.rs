@@ -11,8 +11,8 @@ use crate::modes::{self, ModalFit, ModalMotion, ModesError};
 impl BuiltTree {
     /// The same tree with the first `count` modes of a fitted motion: `dibs-nostd`'s `docs/format.md`, section 7.
     ///
-    /// Errors and stretch are those of the surface as the controller computes it, at every recorded frame. A weight may
-    /// exceed its recorded range by a quarter of it ([`modes::MARGIN`](crate::modes::MARGIN)).
+    /// Errors and stretch are measured on the surface as the controller computes it, at every recorded frame. A weight
+    /// may exceed its recorded range by a quarter of that range ([`modes::MARGIN`](crate::modes::MARGIN)).
     ///
     /// Cost: linear in modes, frames and vertices; seconds at most.
     ///
@@ -36,7 +36,7 @@ impl BuiltTree {
         Ok(Self { bytes, motion: Some(motion), order: self.order.clone(), ..*self })
     }
 
-    /// The motion that the modes were fitted to, as their weights; `None` for a tree without modes.
+    /// The weights of the motion that the modes were fitted to; `None` for a tree without modes.
     #[must_use]
     pub fn modal_motion(&self) -> Option<&ModalMotion> {
         self.motion.as_ref()

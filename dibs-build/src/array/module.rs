@@ -50,8 +50,7 @@ pub mod {name} {{
     pub type Tree = ::dibs_nostd::Tree<'static, Index>;
 
 {guard}
-    /// Two buffers for the vertices as they are now, 24 bytes of RAM a vertex: one is read while the bus fills
-    /// the other.
+    /// Two buffers for the current vertices, 24 bytes of RAM a vertex: one is read while the bus fills the other.
     pub type Frames = ::dibs_nostd::Frames<VERTICES>;
 
     /// The bus's end of the buffers.
@@ -78,9 +77,9 @@ pub mod {name} {{
         }}
     }}
 
-    /// The same for a surface that moves between frames: with a third buffer, 36 bytes of RAM a vertex.
+    /// The same for a surface that is extrapolated between frames: with a third buffer, 36 bytes of RAM a vertex.
     pub mod continuous {{
-        /// Three buffers for the vertices: the frame published last, the one before, and the one that arrives.
+        /// Three buffers for the vertices: the latest published frame, the one before, and the frame that is arriving.
         pub type Frames = ::dibs_nostd::Frames<{{ super::VERTICES }}, 3>;
 
         /// The bus's end of the buffers.
@@ -90,7 +89,7 @@ pub mod {name} {{
         pub type Reader = ::dibs_nostd::FrameReader<'static>;
 
         ::dibs_nostd::if_bus! {{
-            /// Publishes frames that are complete and within the stretch limit, and measures the surface beyond them.
+            /// Publishes frames that are complete and within the stretch limit, and measures their extrapolation.
             pub type Receiver = ::dibs_nostd::Assembler<
                 'static,
                 ::dibs_nostd::StretchMonitor<'static, super::Index, 2>,
@@ -157,7 +156,7 @@ fn extent_source(bounds: [[f32; 3]; 2]) -> String {
     )
 }
 
-/// Nothing for a tree in the file's own coordinates.
+/// Empty if the tree is in the file's own coordinates.
 fn origin_source([x, y, z]: [f64; 3]) -> String {
     if [x, y, z] == [0.0; 3] {
         return String::new();
@@ -259,7 +258,7 @@ fn embedded_source(nodes: u32) -> String {
     pub const NODES: usize = {nodes};
 
     ::dibs_nostd::if_nodes! {{
-    /// The types for a surface that {nodes} nodes move: its frames are theirs.
+    /// The types for a surface that {nodes} nodes move: a frame holds the nodes' positions.
     pub mod embedded {{
         use super::NODES;
 

@@ -1,4 +1,4 @@
-//! The solids of a surface of several parts: which closed part bounds one, and which are its cavities.
+//! The solids of a surface of several parts: which closed part is an outer shell, and which are its cavities.
 
 // Requirement: S-02
 
@@ -9,10 +9,10 @@ use crate::Mesh;
 use crate::leaf::StoredTriangle;
 use crate::orient::{volume, winds};
 
-/// Stands for the solid of a part that bounds none.
+/// In place of a solid's number, for a part that bounds no solid.
 const OPEN: u32 = u32::MAX;
 
-/// One root's part of the surface.
+/// The part of the surface below one root.
 struct Part {
     /// The row of its first triangle.
     first: u32,
@@ -22,9 +22,9 @@ struct Part {
     volume: Option<f64>,
 }
 
-/// The solids section: for each root its first triangle, and the root of the shell around its solid. A closed part that
-/// faces outwards is such a shell. One that faces inwards is a cavity of the smallest of those that hold it at rest; if
-/// none does, it bounds no solid, as an open part.
+/// The solids section: for each root its first triangle, and the root of the outer shell of its solid. A closed part
+/// that faces outwards is an outer shell. A closed part that faces inwards is a cavity of the smallest outer shell
+/// around it at rest; if there is none, it bounds no solid, as an open part does.
 pub(super) fn solids<I: Index>(
     mesh: &Mesh,
     counts: impl Iterator<Item = u32>,
@@ -55,7 +55,7 @@ pub(super) fn solids<I: Index>(
     rows.flat_map(u32::to_le_bytes).collect()
 }
 
-/// The smallest closed part facing outwards that another part lies in.
+/// The smallest closed part facing outwards that contains another part.
 fn holder(mesh: &Mesh, parts: &[Part], root: usize) -> Option<usize> {
     let [vertex, ..] = mesh.triangles[parts[root].triangles[0]];
     let point = mesh.positions[vertex as usize].as_dvec3();

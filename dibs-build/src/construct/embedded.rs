@@ -1,4 +1,4 @@
-//! Sections of a surface that a volume carries: pins and splits by distances through the volume.
+//! Sections of a surface that a volume moves: pins and splits by distances through the volume.
 
 use glam::DVec3;
 
@@ -9,7 +9,7 @@ use super::{Cluster, Constructor, Content, PARALLEL_ABOVE, split};
 use crate::error::BuildError;
 use crate::nodes::VolumePaths;
 
-/// Rounds of the centre's approximation: its error is a part of one over their number.
+/// Iterations for the centre of the enclosing ball: the relative error is one over their number.
 const ROUNDS: u32 = 64;
 
 /// Vertices near the centre that are tried as pins.
@@ -47,7 +47,7 @@ impl Constructor<'_> {
 fn pin(paths: &VolumePaths<'_>, section: &Section) -> Pin {
     let vertices = &section.vertices;
     let at = |vertex: u32| paths.position(vertex);
-    // Badoiu and Clarkson's: a step towards the farthest vertex, shorter each time.
+    // Badoiu and Clarkson's iteration: a step towards the farthest vertex, shorter each time.
     let mut centre = vertices.iter().map(|&v| at(v)).sum::<DVec3>() / vertices.len() as f64;
     for round in 2..ROUNDS {
         let from = |&v: &u32| at(v).distance_squared(centre);
@@ -70,8 +70,8 @@ fn pin(paths: &VolumePaths<'_>, section: &Section) -> Pin {
     best.unwrap_or(Pin { vertex: vertices[0], radius: f64::INFINITY })
 }
 
-/// The two halves of a section. Where distances are straight a plane across the longest direction cuts it; a volume with
-/// folds is cut between two far seeds, which parts the walls of a fold.
+/// The two halves of a section. In a box, where all distances are straight lines, a plane across the longest direction
+/// cuts it. In a volume with folds the cut is midway between two far seeds, which separates the walls of a fold.
 fn sides(
     paths: &VolumePaths<'_>,
     mesh: &[[u32; 3]],

@@ -24,7 +24,7 @@ pub(crate) use section::Surface;
 use section::{Searches, Section};
 pub(crate) use widen::widen;
 
-/// How sections are pinned, measured and split.
+/// How sections are pinned and split, and their radii measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Construction {
@@ -60,7 +60,7 @@ impl Cluster {
 
 #[derive(Debug)]
 pub(crate) enum Content {
-    /// Mostly two after construction, more once it is widened.
+    /// A binary tree after construction, except above the parts of a split leaf; more children after widening.
     Inner(Vec<Cluster>),
     /// Triangles that are connected by edges.
     Leaf(Vec<u32>),
@@ -74,23 +74,23 @@ pub(crate) struct Constructor<'a> {
     /// Called with the number of triangles that reached their leaf.
     pub progress: &'a (dyn Fn(usize) + Sync),
     done: AtomicUsize,
-    /// Arcs that searches looked at.
+    /// Arcs that searches looked at: the work done.
     work: AtomicUsize,
-    /// Memory for searches that no thread is using.
+    /// Search memory that no thread is using.
     idle: Mutex<Vec<Searches>>,
 }
 
-/// Sections at this depth are halved, which bounds the depth.
+/// From this depth on sections are halved, so that the tree is not deeper.
 const MAX_DEPTH: u32 = 64;
 
-/// Most arcs that searches look at, for each triangle and level of a balanced tree: three times those of a closed surface.
-/// More take triangles that are connected at random, or edges of hundreds of triangles.
+/// Most arcs that searches may look at, for each triangle and level of a balanced tree: three times the number of a
+/// closed surface. Only triangles that are connected at random, or share edges by the hundred, need more.
 const MOST_ARCS: usize = 768;
 
-/// The same where paths stay in their section, which a closed surface's take a twentieth of.
+/// The same where paths stay in their section: a closed surface needs a twentieth of this.
 const MOST_ARCS_RESTRICTED: usize = 256;
 
-/// And as many more, so that no small mesh is refused.
+/// Added to these limits, so that no small mesh is refused.
 const MOST_ARCS_LEAST: usize = 4_000_000;
 
 /// Sections of fewer triangles stay on one thread.
@@ -124,7 +124,7 @@ impl<'a> Constructor<'a> {
         self.check_work().map(|()| roots)
     }
 
-    /// The tree of a section, which is part of the section `around` it: that one's sphere, and whether its parts meet nearby.
+    /// The tree of a section. `around` is its parent section, the parent's sphere, and whether the parent is connected.
     fn cluster(
         &self,
         section: &Section,
@@ -154,7 +154,7 @@ impl<'a> Constructor<'a> {
         }
         let sides = self.split(section, &mut searches, depth);
         let [left, right] = sides.map(|triangles| Section::new(self.surface.mesh, triangles));
-        // A child's search starts at its border, at the vertex farthest from the child's seed.
+        // A child's search starts at its vertex that is farthest from the child's seed: at its border.
         let borders = [(&left, 0), (&right, 1)].map(|(side, seed)| {
             let seen_from = &searches.seeds[seed];
             let by_distance = |a: &&u32, b: &&u32| {
@@ -174,8 +174,8 @@ impl<'a> Constructor<'a> {
         Ok(Cluster { pin: pin.vertex, radius: pin.radius, content })
     }
 
-    /// One leaf; or one for each part that edges connect, and one for each triangle whose stretch measurement would be
-    /// ill-conditioned in a common leaf.
+    /// One leaf; or several: one for each part that edges connect, and one for each triangle whose stretch measurement
+    /// would be ill-conditioned in a common leaf.
     fn leaves(
         &self,
         section: &Section,
@@ -236,7 +236,7 @@ impl<'a> Constructor<'a> {
         }
     }
 
-    /// Whether all searches together look at more arcs than they may does not depend on the threads.
+    /// Fails once all searches together have looked at too many arcs; when does not depend on the threads.
     fn check_work(&self) -> Result<(), BuildError> {
         let triangles = self.surface.mesh.triangles.len();
         let levels = triangles.max(2).ilog2() as usize + 1;

@@ -1,8 +1,8 @@
 //! The paper's construction, kept beside the default for comparison.
 //!
 //! Bowyer & Rodriguez y Baena 2014, "construction": the pin is the vertex nearest to the middle of the section's
-//! coordinate ranges; a plane normal to the main axis of its vertices' covariance cuts the section, through the middle
-//! of their projections; a part that is not contiguous with the rest of its side is an orphan and goes to the sibling.
+//! coordinate ranges. A plane normal to the main axis of the vertices' covariance cuts the section through the middle
+//! of their projections. A part that is not contiguous with the rest of its side is an orphan and goes to the sibling.
 
 use glam::{DMat3, DVec3};
 
@@ -53,8 +53,8 @@ pub(crate) fn split(surface: &Surface<'_>, section: &Section, even: bool) -> [Ve
     if sides.iter().all(|side| contiguous_parts(surface, side).len() == 1) {
         sides
     } else {
-        // Moved orphans left a half not contiguous, which section-restricted paths require: peel one triangle off
-        // instead.
+        // After orphans have moved, a half is no longer contiguous, which section-restricted paths require: split off
+        // one triangle instead.
         peel(surface, section)
     }
 }

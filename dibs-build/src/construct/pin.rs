@@ -9,14 +9,14 @@ pub(crate) struct Pin {
     pub radius: f64,
 }
 
-/// In sections of at most this many vertices each is tried.
+/// In sections of at most this many vertices each vertex is tried as the pin.
 const TRY_ALL: usize = 12;
 
-/// Most times that the centre is improved.
+/// Most iterations that improve the centre.
 const ROUNDS: usize = 4;
 
-/// The geodesic centre, approximately: two sweeps find far seeds; the centre is the vertex with the least larger
-/// distance to them; then it is improved with the vertices farthest from it. Any vertex of the mesh may be the pin.
+/// The geodesic centre, approximately. Two sweeps find two far seeds; the centre is the vertex whose larger distance to
+/// them is smallest; it is then improved with the vertices farthest from it. Any vertex of the mesh may be the pin.
 /// `start` is a vertex of the section, preferably at its border.
 ///
 /// Leaves the distances from the two seeds in `searches.seeds`.
@@ -34,7 +34,7 @@ pub(crate) fn geodesic_centre(
     searches.search_seed(1, surface, section, second.vertex);
     let first = first.vertex;
     if second.reached < section.vertices.len() {
-        // Its parts meet only far off: there is no sphere of its own.
+        // The section's parts are not connected nearby: it gets no sphere of its own.
         return Pin { vertex: first, radius: f64::INFINITY };
     }
     if section.vertices.len() <= TRY_ALL {
@@ -63,7 +63,7 @@ pub(crate) fn geodesic_centre(
     best
 }
 
-/// The vertices around the middle between the two seeds, each with its larger distance to them.
+/// The vertices about midway between the two seeds, each with its larger distance to them.
 fn between_seeds(searches: &Searches) -> Vec<(u32, f64)> {
     let settled = searches.seeds[0].settled();
     let larger = |v: u32| (v, to_seeds(searches, v));
@@ -78,13 +78,13 @@ fn nearest(candidates: &[(u32, f64)]) -> Option<u32> {
     candidates.iter().min_by(order).map(|&(vertex, _)| vertex)
 }
 
-/// The larger distance of a vertex to the seeds: no radius around it is smaller.
+/// The larger distance of a vertex to the seeds: a lower bound on the radius around it.
 fn to_seeds(searches: &Searches, vertex: u32) -> f64 {
     let [first, second] = &searches.seeds;
     first.get(vertex).max(second.get(vertex))
 }
 
-/// The best of the section's own vertices.
+/// The pin with the smallest radius among all vertices of the section.
 fn best_of_all(surface: &Surface<'_>, section: &Section, searches: &mut Searches) -> Pin {
     let least = |&v: &u32| (v, to_seeds(searches, v));
     let mut candidates: Vec<(u32, f64)> = section.vertices.iter().map(least).collect();

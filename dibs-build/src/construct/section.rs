@@ -29,13 +29,13 @@ pub(crate) struct Surface<'a> {
     pub graph: &'a Graph,
     /// Whether paths must stay inside the section (the paper) or may leave it.
     pub restricted: bool,
-    /// The paths through the volume that carries the surface, in place of those along it.
+    /// The paths through the volume that moves the surface, used instead of those along it.
     pub volume: Option<&'a VolumePaths<'a>>,
 }
 
-/// Most arcs, for each vertex of a section, that a search may look at for paths outside the section around it. A section
-/// whose parts only meet farther off keeps the sphere of the section around: where triangles are connected at random most
-/// sections are of that kind, and each would search the whole mesh.
+/// Most arcs, for each vertex of a section, that a search may look at for paths outside the parent section. A section
+/// whose parts only meet farther off keeps its parent's sphere: where triangles are connected at random, most sections
+/// are of that kind, and each would search the whole mesh.
 const ROUNDABOUT: usize = 256;
 const ROUNDABOUT_LEAST: usize = 4096;
 
@@ -43,23 +43,23 @@ const ROUNDABOUT_LEAST: usize = 4096;
 #[derive(Debug)]
 pub(crate) struct Searches {
     members: Members,
-    /// Distances from the two far seeds.
+    /// Distances from the two far seeds of a split.
     pub seeds: [Distances; 2],
     /// Distances from any other source.
     pub other: Distances,
 }
 
-/// The section that is searched, and the section around it.
+/// The section that is searched, and its parent.
 #[derive(Debug)]
 struct Members {
-    /// The latest section, or section around it, in which each vertex was found.
+    /// The latest section or parent, by number, in which each vertex was found.
     latest: Vec<u32>,
     section: u32,
-    /// The number of the section around it; zero for the whole mesh.
+    /// The parent's number; zero for the whole mesh.
     around: u32,
-    /// The vertices of the section and of the section around it, in ascending order.
+    /// The vertices of the section and of its parent, in ascending order.
     lists: [Vec<u32>; 2],
-    /// Whether a search may leave the section around.
+    /// Whether a search may leave the parent section.
     may_leave: bool,
 }
 
@@ -83,8 +83,8 @@ impl Searches {
         self.seeds.iter_mut().chain([&mut self.other]).map(Distances::take_arcs_seen).sum()
     }
 
-    /// Makes `section` the target of searches. Paths stay in the section `around` it if that is connected: paths
-    /// outside are hardly ever shorter, and take more than half of a search's time.
+    /// Makes `section` the target of searches. Paths stay in the parent section `around` if that is connected: paths
+    /// outside it are hardly ever shorter, and take more than half of a search's time.
     pub fn enter(&mut self, section: &Section, around: Option<&Section>) {
         let members = &mut self.members;
         members.may_leave = true;
@@ -102,7 +102,7 @@ impl Searches {
         }
     }
 
-    /// Keeps the searches of the entered section in the section around it.
+    /// From now on searches of the entered section stay in its parent.
     pub fn stay(&mut self) {
         self.members.may_leave = false;
     }

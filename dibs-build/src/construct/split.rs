@@ -3,16 +3,17 @@
 use super::section::{Searches, Section, Surface};
 use crate::leaf::connected_by_edges;
 
-/// Each side of a split gets at least this share of the triangles, which bounds the depth.
+/// Each side of a split gets at least this fraction of the triangles, which bounds the depth.
 const LEAST_SHARE: f64 = 0.05;
 
-/// Sections up to this size are mended after their split. Larger ones are mended further down the tree, in less time.
+/// After the split of a section up to this size, triangles that are cut off from their side move to the other. Larger
+/// sections are mended further down the tree, in less time.
 const MEND_BELOW: usize = 64;
 
-/// Each triangle goes to the nearer of the two far seeds that the pin's search left in `searches`.
+/// Assigns each triangle to the nearer of the two far seeds that the search for the pin left in `searches`.
 ///
-/// Unlike a plane, this separates the two walls of a fold, which are near in space and far along the surface. `even`
-/// forces halves.
+/// Unlike a plane, this separates the two walls of a fold, which are close in space and far apart along the surface.
+/// With `even` each side gets half of the triangles.
 pub(crate) fn by_geodesic(
     surface: &Surface<'_>,
     section: &Section,
@@ -20,13 +21,13 @@ pub(crate) fn by_geodesic(
     even: bool,
 ) -> [Vec<u32>; 2] {
     let [first, second] = &searches.seeds;
-    // Vertices that no seed reached go to neither; an infinite distance must not make a NaN.
+    // Vertices that no seed reached are assigned to neither; the difference of two infinite distances would be NaN.
     let reached = |distance: f64| distance.min(f64::from(f32::MAX));
     let nearer = |v: u32| reached(first.get(v)) - reached(second.get(v));
     by_key(&surface.mesh.triangles, section, nearer, even)
 }
 
-/// Each triangle goes to the side of its vertices' key, by the sign of their sum.
+/// Assigns each triangle to a side by the sign of the sum of its vertices' keys.
 pub(super) fn by_key(
     mesh: &[[u32; 3]],
     section: &Section,
@@ -49,8 +50,8 @@ pub(super) fn by_key(
     }
 }
 
-/// The largest part that edges connect, and the rest: border triangles that touch their side only at a corner. They go
-/// to the other side, or each would become a separate leaf.
+/// The largest part that edges connect, and the rest: border triangles that touch their side only at a corner. Those
+/// move to the other side; otherwise each would become a separate leaf.
 fn mainland(mesh: &[[u32; 3]], side: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let mut parts = connected_by_edges(mesh, side);
     let sizes = parts.iter().map(Vec::len).enumerate();
@@ -59,7 +60,7 @@ fn mainland(mesh: &[[u32; 3]], side: &[u32]) -> (Vec<u32>, Vec<u32>) {
     (mainland, parts.concat())
 }
 
-/// Divides by the sign of the key, and gives either side at least `least_share` of the triangles.
+/// Divides by the sign of the key; either side gets at least `least_share` of the triangles.
 pub(crate) fn at_zero(mut keyed: Vec<(f64, u32)>, least_share: f64) -> [Vec<u32>; 2] {
     keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let count = keyed.len();

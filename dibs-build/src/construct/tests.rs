@@ -1,4 +1,4 @@
-//! The work of a construction, counted in arcs that its searches look at, on meshes made to cost much.
+//! The work of a construction, counted in arcs that its searches look at, on meshes chosen to be expensive.
 
 // Requirement: M-04
 
@@ -10,7 +10,7 @@ use crate::geodesic::{Graph, Topology};
 use crate::rest::{LimitRatios, Paths};
 use crate::{Mesh, generate};
 
-/// Arcs seen for each triangle, by searches and in the graph; and whether the mesh was refused for them.
+/// Arcs seen for each triangle, by searches and in the graph; and whether the mesh was refused because of them.
 fn work(mesh: &Mesh, construction: Construction) -> (usize, bool) {
     let topology = Topology::new(mesh);
     let is_paper = construction == Construction::Paper;
@@ -55,7 +55,7 @@ fn around(count: u32, is_ring: bool) -> Mesh {
     mesh(positions, (0..count).map(corners).collect())
 }
 
-/// Two hubs that all triangles have one of.
+/// Two hub vertices; every triangle has one of them as a corner.
 fn bipyramid(count: u32) -> Mesh {
     let rim = count / 2;
     let hubs = [Vec3::Z * 30.0, Vec3::Z * -30.0];
@@ -100,7 +100,7 @@ fn random(vertices: u32, count: u32) -> Mesh {
     mesh(positions, (0..count).map(corners).collect())
 }
 
-/// A ribbon whose triangles grow by as much each: a plane through its middle cuts off its end.
+/// A ribbon of triangles, each larger than the previous by a factor: a plane through its middle cuts off its end.
 fn growing(count: u32) -> Mesh {
     let at = |row: u32| 1e-9 * 1e17_f32.powf(row as f32 / (count / 2) as f32);
     let sides = |row| [1.0, -1.0].map(|side| Vec3::new(1.0, 0.01 * side, 0.0) * at(row));
@@ -128,7 +128,7 @@ fn no_mesh_costs_ten_times_the_work_of_a_well_formed_one() {
         ("random", random(2_000, 16_000), false),
         ("densely random", random(500, 24_000), false),
     ] {
-        // The paper's takes a third of the time.
+        // The paper's construction takes a third of the time.
         for (construction, most) in [(Construction::Geodesic, 10), (Construction::Paper, 3)] {
             let (found, is_refused) = work(&mesh, construction);
             println!(

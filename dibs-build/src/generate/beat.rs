@@ -11,11 +11,11 @@ const RATE: f64 = 1.2;
 
 /// One control frame, as a deformation of the shape at end diastole.
 struct Control {
-    /// Share of the radius that the left ventricle's inside loses.
+    /// Fraction of the radius that the left ventricle's inner wall loses.
     contraction: f64,
-    /// Share of the distance from the left ventricle's axis that the right free wall loses.
+    /// Fraction of the distance from the left ventricle's axis that the right free wall loses.
     right_contraction: f64,
-    /// Share of the length that is lost.
+    /// Fraction of the length that is lost.
     shortening: f64,
     /// Rotation of the apex against the base, radians.
     twist: f64,
@@ -26,11 +26,11 @@ const MID_SYSTOLE: Control =
 const END_SYSTOLE: Control =
     Control { contraction: 0.29, right_contraction: 0.11, shortening: 0.12, twist: 0.24 };
 
-/// The motion of the generated [`heart`](super::heart()) at any points, say at the nodes of a volume that carries it: one
-/// cycle from their places (mm) at end diastole, which are frame 0.
+/// The motion of the generated [`heart`](super::heart()) at any points, say at the nodes of a volume that moves it: one
+/// cycle from their positions (mm) at end diastole, which are frame 0.
 ///
-/// The three control positions of a point are joined by a parabola, along which it moves with the
-/// phase `(1 - cos(2 pi t)) / 2`: sinusoidally, from end diastole to end systole and back.
+/// A point moves on the parabola through its three control positions, with the phase `(1 - cos(2 pi t)) / 2`:
+/// sinusoidally, from end diastole to end systole and back.
 ///
 /// ```
 /// use dibs_build::{Volume, generate};
@@ -54,7 +54,7 @@ pub fn beat(rest: &[Vec3]) -> Motion {
         .map(|frame| {
             let turn = std::f64::consts::TAU * frame as f64 / FRAMES as f64;
             let phase = (1.0 - libm::cos(turn)) / 2.0;
-            // Lagrange's weights of the nodes 1/2 and 1; that of 0 is the rest to 1.
+            // Lagrange weights of the parabola's points at 1/2 and 1; the weight at 0 is one minus their sum.
             let middle = 4.0 * phase * (1.0 - phase);
             let end = phase * (2.0 * phase - 1.0);
             controls
@@ -70,14 +70,14 @@ pub fn beat(rest: &[Vec3]) -> Motion {
 
 impl Control {
     fn place(&self, point: DVec3) -> DVec3 {
-        // The muscle thickens because its inside moves inwards more than its outside.
+        // The muscle thickens because its inner wall moves inwards more than its outer wall.
         let level = LEFT.level(point) / 0.92;
         let square = level * level;
         let inward = 1.0 / (1.0 + (square * square) * (square * square));
         let right = smooth_step(point.x / 60.0);
         let radius = 1.0 - self.contraction * inward - self.right_contraction * right;
         let height = point.z / BASE;
-        // Apex and base turn in opposite directions, the base less.
+        // Apex and base rotate in opposite directions, the base less.
         let angle = self.twist * (0.75 - height);
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
         let flat = DVec2::new(cos, sin).rotate(point.truncate()) * radius;

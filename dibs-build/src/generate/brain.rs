@@ -44,8 +44,8 @@ pub fn brain(triangles: u32) -> Result<Mesh, GenerateError> {
                 GenerateError::Stuck { surface: "brain", asked: triangles, reached }
             })
         };
-    // An octahedron becomes a smooth brain with few triangles; the folds then stretch them, so that remeshing mostly
-    // splits.
+    // Start with a smooth brain of few triangles, made from an octahedron. The folds then stretch the triangles, so
+    // that remeshing mostly splits.
     let corners = DVec3::AXES.into_iter().chain(DVec3::AXES.map(|axis| -axis)).collect();
     let faces = (0..8u32).map(|octant| {
         let [x, y, z] = [0, 1, 2].map(|axis| axis + 3 * ((octant >> axis) & 1));
@@ -68,7 +68,7 @@ pub fn brain(triangles: u32) -> Result<Mesh, GenerateError> {
 struct Cortex {
     /// Mean distance between neighbouring sulci, mm.
     spacing: f64,
-    /// Depth of the folds, as a share of the final one.
+    /// Depth of the folds, as a fraction of the final depth.
     depth: f64,
 }
 
@@ -83,7 +83,7 @@ impl Cortex {
         Self { spacing, depth: 1.0 }
     }
 
-    /// Distance of the surface from the centre in the unit `direction`.
+    /// Distance of the surface from the centre along the unit vector `direction`.
     fn radius(&self, direction: DVec3) -> f64 {
         let hull = 1.0 / (direction / AXES).length();
         // The underside is flatter than the top.
@@ -94,7 +94,7 @@ impl Cortex {
         }
         let place = direction * hull;
 
-        // Sulci run along the zeros of a noise; over its slope, it is the distance to them in mm.
+        // Sulci run along the zeros of a noise; its value over its slope is the distance to them in mm.
         let (value, slope) = self.folds(place);
         let across = slope - direction * slope.dot(direction);
         let width = 0.34 * self.spacing;
@@ -112,11 +112,11 @@ impl Cortex {
         hull - self.depth * (sulcus * sulcus + fissure * fissure).sqrt()
     }
 
-    /// The noise whose zeros are the sulci: two lattices at an angle, so that neither shows.
+    /// The noise whose zeros are the sulci: two lattices at an angle, so that neither is visible.
     fn folds(&self, place: DVec3) -> (f64, DVec3) {
         let scale = 1.0 / (1.5 * self.spacing);
         let (one, one_slope) = noise(1, place * scale);
-        // A rotation with rational entries.
+        // A rotation matrix with rational entries.
         let turn = glam::DMat3::from_cols(
             DVec3::new(2.0, 1.0, -2.0) / 3.0,
             DVec3::new(-2.0, 2.0, -1.0) / 3.0,
@@ -128,20 +128,20 @@ impl Cortex {
 }
 
 impl Surface for Cortex {
-    /// Projects along the direction from the centre, so that triangles that do not overlap as seen from there never do.
+    /// Projects from the centre, so that triangles that do not overlap as seen from it never intersect.
     fn project(&self, point: DVec3) -> (DVec3, DVec3) {
         let direction = point.normalize();
         (direction * self.radius(direction), direction)
     }
 
-    /// Aligns with the direction from the centre, not the normals: if it is positive everywhere, the surface cannot cut
-    /// itself.
+    /// Alignment with the direction from the centre instead of the normals: if it is positive everywhere, the surface
+    /// cannot cut itself.
     fn alignment(&self, corners: [DVec3; 3], directions: [DVec3; 3]) -> f64 {
         area_vector(corners).normalize_or_zero().dot(directions[0])
     }
 
     const PROJECTS_TO_NORMALS: bool = false;
 
-    /// The walls of the sulci are about 4 times as steep as they are wide.
+    /// The walls of the sulci have a slope of about 4: 4 mm of depth for 1 mm of width.
     const LEAST_ALIGNMENT: f64 = 0.08;
 }

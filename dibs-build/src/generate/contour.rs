@@ -43,7 +43,7 @@ pub(super) fn contour(
                     let (a, b) = (base + offset(a), base + offset(b));
                     let (a, b) = (a.min(b), a.max(b));
                     *crossings.entry((a, b)).or_insert_with(|| {
-                        // Clamped off the grid's nodes, so that no triangle has zero area.
+                        // Kept away from the grid's nodes, so that no triangle has zero area.
                         let t = (values[a] / (values[a] - values[b])).clamp(0.05, 0.95);
                         points.push(at(a).lerp(at(b), t));
                         points.len() as u32 - 1

@@ -11,7 +11,7 @@ pub(super) struct HalfEdges {
     pub normals: Vec<DVec3>,
     origin: Vec<u32>,
     twin: Vec<u32>,
-    /// For each vertex one half-edge that leaves it; `DEAD` where the vertex is gone.
+    /// For each vertex one half-edge that leaves it; `DEAD` for a removed vertex.
     leaving: Vec<u32>,
     alive: usize,
 }
@@ -50,17 +50,17 @@ impl HalfEdges {
         self.alive
     }
 
-    /// One more than the largest half-edge, dead ones included.
+    /// One more than the largest half-edge's number, removed ones included.
     pub fn edge_count_bound(&self) -> u32 {
         self.origin.len() as u32
     }
 
-    /// Whether `h` is the half-edge that stands for its edge.
+    /// Whether `h` represents its edge: of two twins only one does.
     pub fn stands_for_edge(&self, h: u32) -> bool {
         self.origin[h as usize] != DEAD && h < self.twin[h as usize]
     }
 
-    /// The vertices of all triangles that are alive.
+    /// The vertices of all triangles that are not removed.
     pub fn triangles(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         self.origin.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).filter(|t| t[0] != DEAD)
     }
@@ -81,7 +81,7 @@ impl HalfEdges {
         self.points[a as usize].distance(self.points[b as usize])
     }
 
-    /// Whether the vertex still exists.
+    /// Whether the vertex is not removed.
     pub fn is_alive(&self, vertex: u32) -> bool {
         self.leaving[vertex as usize] != DEAD
     }
@@ -174,7 +174,7 @@ impl HalfEdges {
         shared == 2 && self.degree(c) > 3 && self.degree(d) > 3
     }
 
-    /// Merges the start of `h` into its end, moved to `point`; two triangles go.
+    /// Merges the start of `h` into its end, moved to `point`; two triangles are removed.
     pub fn collapse(&mut self, h: u32, point: DVec3, normal: DVec3) {
         let t = self.twin[h as usize];
         let ([a, b], [c, d]) = (self.ends(h), self.facing(h));
@@ -198,7 +198,7 @@ impl HalfEdges {
         self.alive -= 2;
     }
 
-    /// Points and triangles without the gaps of removed ones.
+    /// Points and triangles, renumbered without the removed ones.
     pub fn into_parts(self) -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let mut renumbered = vec![DEAD; self.points.len()];
         let mut points = Vec::new();

@@ -13,7 +13,7 @@ const TRIANGLES: RangeInclusive<u32> = 320..=1_000_000;
 
 /// Height at which the base is cut, mm; the apex is at -10.
 pub(super) const BASE: f64 = 86.0;
-/// Outside of the left ventricle: centre and semi-axes of an ellipsoid about the z axis.
+/// Outer surface of the left ventricle: centre and semi-axes of an ellipsoid about the z axis.
 pub(super) const LEFT: Ellipsoid =
     Ellipsoid { centre: DVec3::new(0.0, 0.0, 66.0), axes: DVec3::new(34.0, 34.0, 76.0) };
 const LEFT_CAVITY: Ellipsoid =
@@ -46,11 +46,11 @@ const RIGHT_CAVITY: Ellipsoid =
 /// ```
 pub fn heart(triangles: u32) -> Result<MovingMesh, GenerateError> {
     check("heart", triangles, TRIANGLES)?;
-    // The surface measures about 43,000 mm^2; the rough start has a few times the requested triangles.
+    // The surface measures about 43,000 mm^2; the first, rough mesh has a few times the requested triangles.
     let step = (43_000.0 / f64::from(triangles)).sqrt().clamp(0.8, 3.0);
     let (low, high) = (DVec3::new(-38.0, -47.0, -14.0), DVec3::new(63.0, 38.0, 90.0));
     let mut mesh = contour(wall, low, high, step);
-    // A coarse mesh is made from a finer one that lies well on the rims of the walls.
+    // A coarse mesh is made from a finer one, which follows the rims of the walls closely.
     for count in [triangles.max(4000), triangles] {
         mesh = remesh(mesh.0, &mesh.1, &Wall, count as usize).map_err(|reached| {
             GenerateError::Stuck { surface: "heart", asked: triangles, reached }
@@ -123,11 +123,11 @@ impl Surface for Wall {
 
     const PROJECTS_TO_NORMALS: bool = true;
 
-    /// 0, because a triangle may bridge the rim of a thin wall at right angles to the surface on both sides.
+    /// Zero, because a triangle may bridge the rim of a thin wall at right angles to the surface on both sides.
     const LEAST_ALIGNMENT: f64 = 0.0;
 }
 
-/// By central differences.
+/// Gradient by central differences.
 fn gradient(point: DVec3) -> DVec3 {
     const STEP: f64 = 1e-4;
     DVec3::AXES

@@ -36,8 +36,8 @@ pub struct MovingMesh {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GenerateError {
-    /// A closed triangle mesh has an even number of triangles, and a shape needs a least number to
-    /// be recognisable.
+    /// The number is odd (a closed triangle mesh has an even number of triangles), or outside the range in which the
+    /// shape is recognisable.
     #[error(
         "a generated {surface} cannot have {asked} triangles: \
          ask for an even number from {least} to {most}, the nearest is {nearest}"
@@ -47,14 +47,14 @@ pub enum GenerateError {
         surface: &'static str,
         /// The number requested.
         asked: u32,
-        /// The nearest valid number (the smaller of two).
+        /// The nearest valid number; of two, the smaller.
         nearest: u32,
         /// The smallest valid number.
         least: u32,
         /// The largest valid number.
         most: u32,
     },
-    /// The mesh could not be brought to the requested number without folding it over.
+    /// The mesh could not be brought to the requested number without a fold.
     #[error(
         "the generated {surface} got stuck at {reached} triangles instead of {asked}: \
          ask for a slightly different number"
@@ -69,7 +69,7 @@ pub enum GenerateError {
     },
 }
 
-/// Counts in `range`, whose ends are even, are valid if they are even.
+/// Fails unless `asked` is even and within `range`, whose ends are even.
 fn check(
     surface: &'static str,
     asked: u32,

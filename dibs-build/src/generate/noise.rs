@@ -35,7 +35,7 @@ pub(super) fn noise(seed: u32, point: DVec3) -> (f64, DVec3) {
 fn lattice_gradient(seed: u32, at: IVec3) -> DVec3 {
     let mut bits = seed;
     for coordinate in at.to_array() {
-        // Two rounds of a multiply-xorshift mixer for each coordinate.
+        // Two steps of a multiply-xorshift mixer for each coordinate.
         bits = (bits ^ coordinate as u32).wrapping_mul(0x7feb_352d);
         bits = (bits ^ (bits >> 15)).wrapping_mul(0x846c_a68b);
         bits ^= bits >> 16;

@@ -11,23 +11,24 @@ pub(super) trait Surface {
     /// The point of the surface near `point`, and a unit vector for [`Self::alignment`].
     fn project(&self, point: DVec3) -> (DVec3, DVec3);
 
-    /// Whether those vectors are the surface's outward normals. If not, the mesh's normals define the tangent planes.
+    /// Whether the vectors of [`Self::project`] are the surface's outward normals. If not, the mesh's normals define
+    /// the tangent planes.
     const PROJECTS_TO_NORMALS: bool;
 
-    /// Alignment of a triangle with the surface, given those vectors at its corners: 1 if it lies on the surface, 0 at
-    /// right angles to it, negative if turned over.
+    /// Alignment of a triangle with the surface, given those vectors at its corners: 1 if the triangle is tangent to
+    /// it, 0 at right angles, negative if turned over.
     fn alignment(&self, corners: [DVec3; 3], normals: [DVec3; 3]) -> f64;
 
-    /// The alignment below which no triangle is made worse.
+    /// A step may not worsen a triangle whose alignment would be below this.
     const LEAST_ALIGNMENT: f64;
 }
 
-/// Rounds of remeshing towards the count, and of polishing once it is met.
+/// Passes of remeshing towards the count, and of polishing after that.
 const ROUNDS: usize = 6;
 const POLISH: usize = 4;
 
-/// Spreads exactly `triangles` (even) over `surface`, starting from any closed mesh of it. The error is the count
-/// reached, if the surface does not admit so few.
+/// Covers `surface` with exactly `triangles` (even) triangles, starting from any closed mesh of it. The error is the
+/// count reached, if the surface does not admit so few.
 pub(super) fn remesh(
     points: Vec<DVec3>,
     triangles: &[[u32; 3]],
@@ -87,9 +88,8 @@ impl<S: Surface> Remesher<'_, S> {
         self.surface.alignment(self.corners(triangle), normals)
     }
 
-    /// Whether the triangles of a fan may have their first corner at `point` instead, with this
-    /// `normal`: none may lie worse on the surface or, if `shapely`, have an angle below 10 degrees,
-    /// unless one did before.
+    /// Whether the first corner of a fan's triangles may move to `point` with this `normal`: no triangle may become
+    /// worse aligned with the surface or, if `shapely`, have an angle below 10 degrees, unless one did before.
     fn fits<I: Iterator<Item = [u32; 3]>>(
         &self,
         fan: impl Fn() -> I,
@@ -105,7 +105,7 @@ impl<S: Surface> Remesher<'_, S> {
                 cosine = cosine.max(smallest_angle_cosine([point, p, q]));
             }
         }
-        // The previous state is examined only if needed: this is the inner loop.
+        // The previous state is examined only if needed, because this is the inner loop.
         let aligned = alignment >= S::LEAST_ALIGNMENT
             || fan().any(|triangle| self.alignment(triangle) <= alignment);
         aligned
@@ -114,7 +114,7 @@ impl<S: Surface> Remesher<'_, S> {
     }
 
     fn split_longer_than(&mut self, limit: f64) {
-        // A pass halves the longest edges: from a rough start several are needed.
+        // A pass halves the longest edges; a rough start needs several.
         for _ in 0..8 {
             let mut edges = self.edges();
             edges.retain(|&(length, _)| length > limit);
@@ -122,7 +122,7 @@ impl<S: Surface> Remesher<'_, S> {
                 break;
             }
             for (length, h) in edges.into_iter().rev() {
-                // A split may reuse half-edges: an edge whose length changed waits for the next pass.
+                // A split may reuse half-edges; an edge whose length changed is split in the next pass.
                 if self.mesh.length(h) == length {
                     self.split(h);
                 }
@@ -213,7 +213,7 @@ impl<S: Surface> Remesher<'_, S> {
                     flips += 1;
                 }
             }
-            // The last few are left to the next round.
+            // Once few edges flip, the rest is left to the next pass.
             if flips * 1000 <= self.mesh.triangle_count() {
                 break;
             }

@@ -16,7 +16,7 @@ fn corners(positions: &[Vec3], triangle: [u32; 3]) -> [DVec3; 3] {
     triangle.map(|vertex| positions[vertex as usize].as_dvec3())
 }
 
-/// Closed, manifold, oriented alike, of one component and genus 0, facing outwards.
+/// Asserts that the mesh is closed, manifold, consistently oriented, of one component and genus 0, and faces outwards.
 fn assert_sound(mesh: &Mesh, triangles: u32) {
     assert_eq!(mesh.triangles.len(), triangles as usize);
     assert!(mesh.positions.iter().all(|position| position.is_finite()));
@@ -38,7 +38,7 @@ fn assert_sound(mesh: &Mesh, triangles: u32) {
         }
     }
     assert!(facing.keys().all(|&(from, to)| facing.contains_key(&(to, from))), "open border");
-    // Also refuses vertices that no triangle uses.
+    // This also fails for vertices that no triangle uses.
     assert!((0..component.len()).all(|vertex| root(&component, vertex) == 0), "not connected");
     let edges = facing.len() / 2;
     assert_eq!(mesh.positions.len() + mesh.triangles.len() - edges, 2, "Euler characteristic");
@@ -174,7 +174,7 @@ fn a_heart_is_of_human_size_and_ejects_blood() {
     let low = mesh.positions.iter().copied().reduce(Vec3::min).unwrap();
     let high = mesh.positions.iter().copied().reduce(Vec3::max).unwrap();
     assert!((80.0..110.0).contains(&(high - low).z), "{}", high - low);
-    // The muscle's volume stays, give or take a quarter, while the cavities shrink.
+    // The muscle keeps its volume to within a quarter, while the cavities shrink.
     let muscle = |frame: &[Vec3]| volume(frame, &mesh.triangles);
     let share = muscle(&motion.frames[12]) / muscle(&mesh.positions);
     assert!((0.75..1.25).contains(&share), "{share}");
@@ -189,7 +189,7 @@ fn a_heart_beats_within_its_stretch_limit() {
         assert_eq!(motion.frames[0], mesh.positions);
         let mut moved = 0f32;
         for (index, frame) in motion.frames.iter().enumerate() {
-            // Each frame, and halfway to the next one, around the cycle.
+            // Each frame, and the midpoint to the next one, around the cycle.
             let next = &motion.frames[(index + 1) % motion.frames.len()];
             let between: Vec<Vec3> = frame.iter().zip(next).map(|(a, b)| a.midpoint(*b)).collect();
             for now in [frame, &between] {
@@ -238,7 +238,8 @@ fn a_brain_is_folded() {
             (b - a).cross(c - a).length() / 2.0
         })
         .sum();
-    // A smooth body has 36 pi V^2 = A^3 at best, and an ellipsoid of these axes little more.
+    // A body of volume V has at least the area of a ball, the cube root of 36 pi V^2; an ellipsoid of these axes has
+    // little more.
     let volume = volume(&mesh.positions, &mesh.triangles);
     let smooth = (36.0 * std::f64::consts::PI * volume * volume).cbrt();
     assert!(area > 1.25 * smooth, "{area} {smooth}");
@@ -259,7 +260,7 @@ fn invalid_counts_name_the_nearest_valid_one() {
     );
 }
 
-/// Fixed, to detect a change of the shapes, or a machine that gives other bits.
+/// Detects a change of the shapes, or a machine whose arithmetic gives other bits.
 #[test]
 fn the_shapes_are_these_to_the_last_bit() {
     let MovingMesh { mesh, motion } = heart(1000).unwrap();

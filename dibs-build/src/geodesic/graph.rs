@@ -3,11 +3,11 @@
 //! Its arcs are the mesh's edges and, for [`Paths::Surface`], *chords*: straight lines across a strip of triangles that
 //! is unfolded into a plane. Both are paths on the surface, so no distance is under-estimated.
 //!
-//! If triangles have their own stretch limits, lengths are weighted by the ratio of each limit to the largest, so a path
-//! grows to at most the largest limit times its weighted length. An edge stretches no more than any of its triangles,
-//! so its weighted length is the least in any of them; a chord's is the sum of its parts in each triangle. Lengths are
-//! those of the triangles' [rest shapes](RestShape), which the stretch check measures too; no chord crosses a flat
-//! triangle, whose rest shape does not fit its neighbours'.
+//! If triangles have their own stretch limits, lengths are weighted by the ratio of each limit to the largest, so a
+//! path grows to at most the largest limit times its weighted length. An edge stretches no more than any of its
+//! triangles, so its weighted length is the least in any of them; a chord's is the sum over the triangles that it
+//! crosses. Lengths are those of the triangles' [rest shapes](RestShape), which the stretch check measures too. No
+//! chord crosses a flat triangle, whose rest shape does not fit those of its neighbours.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ use crate::Mesh;
 use crate::rest::{LimitRatios, Paths, RestShape};
 use crate::rounding::round_up;
 
-/// Arcs from each vertex, in compressed rows. Lengths are weighted, at rest, and rounded up.
+/// Arcs from each vertex, in compressed rows. Lengths are weighted lengths at rest, rounded up.
 #[derive(Debug)]
 pub(crate) struct Graph {
     start: Vec<u32>,
@@ -71,31 +71,31 @@ impl Graph {
     }
 }
 
-/// Allowance for the f64 rounding of a strip's unfolding, as a part of a length.
+/// Allowance for the f64 rounding of a strip's unfolding, relative to the length.
 const UNFOLDING: f64 = 1e-12;
 
 /// Sine of the angle between a chord and an edge below which their crossing point is uncertain.
 const GRAZING: f64 = 1e-5;
 
-/// Allowance for the rounding of the crossing point otherwise, as a part of the chord: some 10 units of
-/// 2^-53, over [`GRAZING`].
+/// Otherwise the allowance for the rounding of the crossing point, relative to the chord: some 10 units of 2^-53, over
+/// [`GRAZING`].
 const CROSSING: f64 = 1e-9;
 
-/// The search for all vertices that one vertex sees across a strip of unfolded triangles.
+/// The search for all vertices that are visible from one vertex across a strip of unfolded triangles.
 struct Unfolding<'a> {
     mesh: &'a Mesh,
     topology: &'a Topology,
     paths: Paths,
     ratios: &'a LimitRatios,
-    /// Whether each triangle's rest shape does not fit its neighbours'.
+    /// Whether each triangle is flat, so that its rest shape does not fit those of its neighbours.
     flat: &'a [bool],
     source: u32,
-    /// The edges between the source and the last unfolded triangle, each with the ratio of the triangle before it.
+    /// The edges from the source to the last unfolded triangle, each with the limit ratio of the triangle before it.
     crossed: Vec<([DVec2; 2], f64)>,
     found: &'a mut Vec<(u32, f64)>,
 }
 
-/// An unfolded edge and the part of it that the source sees: the directions from `low` to `high`.
+/// An unfolded edge and the interval of it that is visible from the source: the directions from `low` to `high`.
 struct Window {
     edge: [(u32, DVec2); 2],
     low: DVec2,
@@ -135,12 +135,12 @@ impl Unfolding<'_> {
         }
         let last = self.ratios.ratio(last);
         let mut ratio = last;
-        // From the end to the source, as parts of the chord.
+        // From the end to the source, as fractions of the chord.
         let (mut weighted, mut from) = (0.0, 1.0);
         for &([a, b], before) in self.crossed.iter().rev() {
             let across = end.perp_dot(b - a);
             if across.abs() <= GRAZING * length * (b - a).length() {
-                // The crossing point is uncertain, so count all of the chord at the largest ratio.
+                // The crossing point is uncertain: weight the whole chord with the largest ratio.
                 return length * self.crossed.iter().map(|&(_, ratio)| ratio).fold(last, f64::max);
             }
             let at = (a.perp_dot(b - a) / across).clamp(0.0, from);

@@ -1,4 +1,4 @@
-//! Shortest paths from one vertex: Dijkstra's algorithm, stopped once a section is reached.
+//! Shortest paths from one vertex: Dijkstra's algorithm, stopped once all vertices of a section are reached.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -8,18 +8,19 @@ use super::Graph;
 /// Distances of one search, kept until the next one with the same memory.
 #[derive(Debug)]
 pub(crate) struct Distances {
-    /// For each vertex its distance, and the run that it is from.
+    /// For each vertex its distance, and the number of the search that found it.
     rows: Vec<(f64, u32)>,
     run: u32,
-    /// Distance and vertex in one number, so that one comparison orders them.
+    /// Distance and vertex packed in one number, so that one comparison orders both.
     heap: BinaryHeap<Reverse<u128>>,
-    /// Vertices in the order in which they were settled.
+    /// Vertices in the order in which their distances became final.
     settled: Vec<u32>,
-    /// Arcs looked at by searches and not yet taken: the work done.
+    /// Arcs looked at since the last call of `take_arcs_seen`: the work done.
     arcs_seen: usize,
 }
 
-/// A vertex has many arcs if it has so many times those that could be wanted: a look-up takes about as long as so many.
+/// A vertex with this many times more arcs than allowed vertices is a hub: looking up each vertex among its arcs is
+/// then faster than trying every arc.
 const HUB: usize = 8;
 
 impl Distances {
@@ -41,7 +42,7 @@ impl Distances {
         }
     }
 
-    /// Arcs that the searches with this memory looked at since the last call.
+    /// Arcs that searches with this memory looked at since the last call.
     pub fn take_arcs_seen(&mut self) -> usize {
         std::mem::take(&mut self.arcs_seen)
     }
@@ -51,14 +52,13 @@ impl Distances {
         &self.settled
     }
 
-    /// Searches from `source` until `wanted` vertices that satisfy `is_wanted` are settled, or all reachable ones;
-    /// `allowed` limits the vertices on paths; `only`, if given, lists the allowed ones in ascending order. The search ends
-    /// after `most` arcs.
+    /// Searches from `source` until `wanted` vertices that satisfy `is_wanted` are final, or all reachable ones. Paths
+    /// use only vertices that are `allowed`; `only`, if given, lists these in ascending order. The search ends after
+    /// `most` arcs.
     ///
-    /// Cost: at a vertex of many arcs the vertices of `only` are looked up among them, so the arcs that leave a section take
-    /// no time.
+    /// Cost: at a hub the vertices of `only` are looked up among its arcs, so arcs that leave a section take no time.
     ///
-    /// Returns the farthest of the wanted vertices, and its distance.
+    /// Returns the wanted vertex with the largest distance.
     #[allow(clippy::too_many_arguments)]
     pub fn search(
         &mut self,
@@ -116,12 +116,12 @@ impl Distances {
     }
 }
 
-/// Orders by distance, then by vertex: distances are not negative, so their bits sort as they do.
+/// Key that orders by distance, then by vertex: the bits of numbers that are not negative are ordered as the numbers.
 fn key(distance: f64, vertex: u32) -> Reverse<u128> {
     Reverse(u128::from(distance.to_bits()) << 32 | u128::from(vertex))
 }
 
-/// The last vertex of a search.
+/// The last wanted vertex of a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Farthest {
     pub vertex: u32,

@@ -7,7 +7,7 @@ use crate::Mesh;
 pub(crate) struct Topology {
     start: Vec<u32>,
     around: Vec<u32>,
-    /// Across from each corner of each triangle.
+    /// For each corner of each triangle, the triangle across the opposite edge.
     opposite: Vec<[u32; 3]>,
 }
 
@@ -37,7 +37,7 @@ impl Topology {
         &self.around[self.start[v] as usize..self.start[v + 1] as usize]
     }
 
-    /// The two corners of a triangle besides `vertex`, in the triangle's order.
+    /// The two corners of a triangle other than `vertex`, in the triangle's order.
     pub fn others(&self, mesh: &Mesh, triangle: u32, vertex: u32) -> [u32; 2] {
         let [a, b, c] = mesh.triangles[triangle as usize];
         if a == vertex {
@@ -49,14 +49,14 @@ impl Topology {
         }
     }
 
-    /// The corner of a triangle besides `a` and `b`.
+    /// The corner of a triangle other than `a` and `b`.
     pub fn apex(&self, mesh: &Mesh, triangle: u32, a: u32, b: u32) -> u32 {
         let corners = mesh.triangles[triangle as usize];
         corners.into_iter().find(|&v| v != a && v != b).unwrap_or(corners[0])
     }
 
-    /// The triangle across an edge of exactly two triangles; `None` at a border, and at an edge of more: no chord crosses
-    /// that, since `n` triangles at an edge have `n^2` chords.
+    /// The triangle across an edge of exactly two triangles; `None` at a border, and at an edge of more triangles. No
+    /// chord crosses such an edge, since `n` triangles there would have `n^2` chords.
     pub fn across(&self, mesh: &Mesh, triangle: u32, a: u32, b: u32) -> Option<u32> {
         let corners = mesh.triangles[triangle as usize];
         let edge = corners.into_iter().position(|v| v != a && v != b)?;
@@ -65,10 +65,10 @@ impl Topology {
     }
 }
 
-/// No triangle.
+/// Stands for no triangle.
 const NONE: u32 = u32::MAX;
 
-/// For each corner of each triangle, the other triangle at the edge across from it where there is exactly one.
+/// For each corner of each triangle, the other triangle at the opposite edge if there is exactly one.
 fn opposite(mesh: &Mesh) -> Vec<[u32; 3]> {
     let ends = |[a, b, c]: [u32; 3]| [(b, c), (c, a), (a, b)];
     let mut edges: Vec<((u32, u32), u32, u8)> = Vec::with_capacity(3 * mesh.triangles.len());

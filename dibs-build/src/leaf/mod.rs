@@ -1,4 +1,4 @@
-//! Leaves: the sets of triangles that form them, and their order.
+//! Leaves: the sets of triangles that form them, and the order of their triangles.
 
 mod order;
 mod patch;

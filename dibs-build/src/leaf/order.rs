@@ -1,8 +1,8 @@
 //! The order of a leaf's triangles and of their corners, for the controller's stretch check.
 //!
 //! A triangle is measured along two of its edges, from one of its first two corners, its centre. If the first of these
-//! edges is the second edge of the previous triangle, in either direction ([`Join`]), the controller holds two corners
-//! and one edge already. The order with the fewest starts is chosen.
+//! edges is the second edge of the previous triangle, in either direction ([`Join`]), the controller has already loaded
+//! two corners and one edge. The order with the fewest starts is chosen.
 //!
 //! The first triangle's corners and the others' third corners are all of the leaf's vertices: a query tests only
 //! these to reject the leaf.
@@ -12,12 +12,12 @@ use dibs_nostd::format::{Join, MAX_LEAF_TRIANGLES, PathKind};
 use crate::Mesh;
 use crate::rest::{RestShape, openness};
 
-/// A triangle of the mesh, and its corners in stored order: rotated, which keeps the orientation.
+/// A triangle of the mesh, and its corners in stored order: a rotation of the mesh's, which keeps the orientation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoredTriangle {
     pub triangle: u32,
     pub corners: [u32; 3],
-    /// The centre is the second corner, not the first. Never so for a start.
+    /// Whether the centre is the second corner instead of the first. Always false for a start.
     pub is_reversed: bool,
 }
 
@@ -38,7 +38,7 @@ impl StoredTriangle {
     }
 }
 
-/// Orders the triangles of each leaf. The first one may join the last one of the leaf before.
+/// Orders the triangles of each leaf. A leaf's first triangle may join the last one of the previous leaf.
 pub(crate) fn order<'a>(
     mesh: &Mesh,
     leaves: impl IntoIterator<Item = &'a [u32]>,
@@ -57,7 +57,7 @@ pub(crate) fn order<'a>(
 }
 
 /// The triangles of a leaf that even its best order measures from a corner below 3 degrees, although they have a wider
-/// one. Alone in a leaf they are measured from the wider corner.
+/// corner. Alone in a leaf they are measured from the wider corner.
 pub(crate) fn ill_conditioned(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
     let choices = choices(mesh, leaf);
     if !choices.iter().any(Choice::is_ill_conditioned) {
@@ -68,30 +68,30 @@ pub(crate) fn ill_conditioned(mesh: &Mesh, leaf: &[u32]) -> Vec<u32> {
     bad.map(|choice| choice.stored.triangle).collect()
 }
 
-/// The cost of storing a triangle in one way; an order costs their sum.
+/// The cost of storing a triangle in one way; the cost of an order is the sum.
 type Cost = u32;
 
-/// The costs of a start and of a flip: the instructions that the check takes beyond those for a triangle in a fan,
-/// approximately.
+/// The costs of a start and of a flip: approximately the instructions that the check takes beyond those for a triangle
+/// in a fan.
 const START: Cost = 4 << 8;
 const FLIP: Cost = 1 << 8;
-/// Most that a pointed corner costs. Eight of them cost less than a flip, so that openness decides only between orders
-/// of equal joins.
+/// Largest cost of a sharp corner. Eight of them cost less than a flip, so that openness decides only between orders
+/// with equal joins.
 const POINTED_MOST: f64 = 31.0;
-/// The cost of a measurement from a corner below 18 degrees, if the triangle has a wider one. It outweighs all joins.
+/// The cost of a measurement from a corner below 18 degrees, if there is a wider one: more than all joins of a leaf.
 const UNFIT: Cost = 1 << 16;
-/// The cost of a measurement from a corner below 3 degrees: the stretch is off by a thousandth.
+/// The cost of a measurement from a corner below 3 degrees, where the stretch has an error of a thousandth.
 const ILL_CONDITIONED: Cost = 1 << 24;
 
 /// A way to store one of a leaf's triangles.
 #[derive(Clone, Copy, Debug)]
 struct Choice {
     stored: StoredTriangle,
-    /// The cost of its centre.
+    /// The cost of measuring from its centre.
     cost: Cost,
-    /// The triangle's bit among the leaf's.
+    /// The triangle's bit in a set of the leaf's triangles.
     bit: usize,
-    /// Bits of the triangles that have its first corner, and of the triangles that have its second.
+    /// Bits of the triangles that contain its first corner, and of those that contain its second.
     with_first: usize,
     with_second: usize,
 }
@@ -101,7 +101,7 @@ impl Choice {
         self.cost >= ILL_CONDITIONED
     }
 
-    /// Its cost after the triangle `before`; `None` if it cannot follow that.
+    /// Its cost after the triangle `before`; `None` if it cannot follow that triangle.
     fn after(&self, before: Option<StoredTriangle>) -> Option<Cost> {
         Some(match self.stored.join(before)? {
             Join::Fan => self.cost,
@@ -155,21 +155,21 @@ fn choices(mesh: &Mesh, leaf: &[u32]) -> Vec<Choice> {
     choices
 }
 
-/// Most ways to store a leaf's triangles.
+/// Largest number of ways to store the triangles of one leaf.
 const CHOICES: usize = 6 * MAX_LEAF_TRIANGLES as usize;
 
-/// The cheapest order of a set of triangles that ends with a given choice: its cost, and the choice before the last.
+/// The cheapest order of a set of triangles that ends with a given choice: its cost, and its last choice but one.
 #[derive(Clone, Copy)]
 struct Best {
     cost: Cost,
     before: u32,
 }
 
-/// No such order.
+/// For a set that has no such order.
 const NONE: Best = Best { cost: Cost::MAX, before: 0 };
 
-/// The best order of every set of a leaf's triangles, by the bits of the set and the last choice, by Held and Karp's
-/// dynamic programming: each extends an order of one triangle less.
+/// The best order for each set of a leaf's triangles and each last choice, by Held and Karp's dynamic programming: it
+/// extends the best order of one triangle less.
 struct Orders(Vec<[Best; CHOICES]>);
 
 impl Orders {
@@ -177,7 +177,7 @@ impl Orders {
         Self(vec![[NONE; CHOICES]; 1 << MAX_LEAF_TRIANGLES])
     }
 
-    /// The cheapest order of a leaf between a stored triangle and a leaf of these choices.
+    /// The cheapest order of a leaf, after the triangle `before` and ahead of a leaf with the choices `next`.
     fn best(
         &mut self,
         leaf: &[Choice],
@@ -191,7 +191,7 @@ impl Orders {
                 self.offer(choice.bit, at, cost, at);
             }
         }
-        // Pairs of choices that may follow each other, other than by a start, with their cost.
+        // Pairs of choices that may follow each other without a start, with their cost.
         let mut joins = Vec::new();
         for (last, before) in leaf.iter().enumerate() {
             for (at, choice) in leaf.iter().enumerate() {
@@ -234,7 +234,7 @@ impl Orders {
         order
     }
 
-    /// Offers an order of this set that ends with the choice `at`, after `before`.
+    /// Records an order of this set that ends with the choice `at`, after `before`, if it is cheaper.
     fn offer(&mut self, set: usize, at: usize, cost: Cost, before: usize) {
         let best = &mut self.0[set][at];
         if cost < best.cost {
@@ -243,7 +243,7 @@ impl Orders {
     }
 }
 
-/// The last choice of the cheapest order, including the cost `to_come`.
+/// The last choice of the cheapest order, where `to_come` is the cost after it.
 fn cheapest(lasts: &[Best], to_come: impl Fn(usize) -> Cost) -> Option<(usize, Cost)> {
     let possible = lasts.iter().enumerate().filter(|(_, best)| best.cost != Cost::MAX);
     possible.map(|(at, best)| (at, best.cost + to_come(at))).min_by_key(|&(_, cost)| cost)

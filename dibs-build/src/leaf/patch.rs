@@ -1,6 +1,6 @@
 //! Patches: triangles that edges connect.
 
-/// The parts of a set of triangles that edges connect, in the order of their first triangles.
+/// The parts of a set of triangles that edges connect, ordered by their first triangles.
 ///
 /// Cost: quadratic in the set, which is hardly larger than a leaf.
 pub(crate) fn connected_by_edges(mesh: &[[u32; 3]], triangles: &[u32]) -> Vec<Vec<u32>> {
@@ -28,7 +28,7 @@ fn are_neighbours(a: [u32; 3], b: [u32; 3]) -> bool {
 mod tests {
     use super::*;
 
-    /// A fan of four around vertex 0, a lone triangle, and one that touches the fan at a vertex only.
+    /// A fan of four triangles around vertex 0, an isolated triangle, and one that touches the fan at a vertex only.
     const MESH: [[u32; 3]; 6] =
         [[0, 1, 2], [0, 3, 4], [3, 0, 2], [4, 5, 0], [7, 8, 9], [5, 10, 11]];
 

@@ -62,14 +62,14 @@ fn to_rows<T: Copy>(order: &[u32], of_mesh: &[T]) -> Vec<T> {
     order.iter().map(|&vertex| of_mesh[vertex as usize]).collect()
 }
 
-/// A shape whose stretch was measured.
+/// A shape whose stretch has been measured.
 struct Anchor {
     weights: Vec<f32>,
     sigma: f32,
     triangle: u32,
 }
 
-/// The modal surface as the controller computes it.
+/// The modal surface, evaluated as the controller does.
 struct Shapes<'a, I> {
     tree: Tree<'a, I>,
     modes: Modes<'a>,
@@ -94,8 +94,8 @@ impl<'a, I: Index> Shapes<'a, I> {
         Ok((round_up(largest.sqrt()), round_up((sum / points as f64).sqrt())))
     }
 
-    /// The rest shape and recorded frames with their stretch, evenly sampled if there are too many; and the frames
-    /// beyond the limit.
+    /// The rest shape and the recorded frames within the limit, with their stretch, evenly sampled if there are too
+    /// many; and the frames beyond the limit.
     fn anchors(&self, recorded: &[Vec<f32>]) -> Result<(Vec<Anchor>, Vec<usize>), ModesError> {
         let anchor = |weights: &[f32]| match measure_stretch(&self.tree, &self.at(weights)?) {
             Ok(measured) => Ok(Some(Anchor {
@@ -124,7 +124,7 @@ impl<'a, I: Index> Shapes<'a, I> {
 /// The contents of a tree's section of modes.
 struct Section {
     modes: Vec<QuantisedMode>,
-    /// Smallest and largest weight, a mode.
+    /// Smallest and largest weight of each mode.
     ranges: Vec<[f32; 2]>,
     growths: Vec<f64>,
     unit: f64,
@@ -135,7 +135,7 @@ struct Section {
 }
 
 impl Section {
-    /// The section before any measurement, with the rest shape as its only anchor.
+    /// The section before any measurement: the rest shape is its only anchor.
     fn new(modes: Vec<QuantisedMode>, growths: Vec<f64>, weights: &[Vec<f32>]) -> Self {
         let ranges: Vec<[f32; 2]> = (0..modes.len()).map(|mode| range(weights, mode)).collect();
         let at_rest = Anchor { weights: vec![0.0; modes.len()], sigma: 1.0, triangle: 0 };
@@ -145,7 +145,7 @@ impl Section {
         Self { modes, ranges, growths, unit, slack: 0.0, position_error, rms_error, anchors }
     }
 
-    /// The slack of the stretch bound, for the rounding of positions, anchors and points between two anchors.
+    /// Sets the slack of the stretch bound: for the rounding of positions, anchors, and points between two anchors.
     fn allow_for_rounding(&mut self, rest: &[Vec3], triangles: &Triangles) {
         let weights = || self.ranges.iter().map(largest);
         let axis = evaluation_error(rest, &self.modes, self.unit, weights());
@@ -190,7 +190,7 @@ fn put(bytes: &mut Vec<u8>, values: &[f32]) {
     values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
 }
 
-/// The recorded weights of a mode, 0 among them, and the margin at both ends.
+/// The range of a mode's recorded weights and 0, with the margin added at both ends.
 fn range(weights: &[Vec<f32>], mode: usize) -> [f32; 2] {
     let of_frames = || weights.iter().map(|weights| weights[mode]);
     let (low, high) = (of_frames().fold(0.0, f32::min), of_frames().fold(0.0, f32::max));
@@ -198,7 +198,7 @@ fn range(weights: &[Vec<f32>], mode: usize) -> [f32; 2] {
     [low - margin, high + margin]
 }
 
-/// The largest weight of a range.
+/// The largest magnitude of a weight in a range.
 fn largest([low, high]: &[f32; 2]) -> f64 {
     f64::from(high.max(-low))
 }

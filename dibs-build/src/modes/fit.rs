@@ -8,15 +8,15 @@ use rayon::prelude::*;
 use super::{MAX_FRAMES, ModalError, ModesError};
 use crate::{Mesh, Motion};
 
-/// A direction with less than this part of the motion's energy counts as rounding: one millionth of the motion's size,
-/// squared.
+/// A direction with less than this fraction of the motion's energy counts as rounding: a millionth of the motion's
+/// size, squared.
 const NOISE: f64 = 1e-12;
 
 /// The displacement modes of a recorded motion, by energy, the largest first.
 ///
 /// The displacements of all frames from the rest shape are decomposed (proper orthogonal decomposition, by the
 /// snapshots' small Gram matrix: Sirovich, Quart. Appl. Math. 45, 1987), with equal weight for each vertex: no other
-/// `k` fields leave a smaller RMS error. A mode's largest weight in any frame is 1. The same input gives the
+/// `k` fields leave a smaller RMS error. A mode's largest weight in any frame is 1. The same input always gives the
 /// same modes.
 ///
 /// ```
@@ -30,7 +30,7 @@ const NOISE: f64 = 1e-12;
 /// ```
 #[derive(Clone, Debug)]
 pub struct ModalFit {
-    /// Displacement of each mesh vertex at weight 1, a mode.
+    /// For each mode the displacement of each mesh vertex at weight 1.
     pub(super) modes: Vec<Vec<DVec3>>,
     /// Positions of the rest shape and of the recorded frames, in the mesh's order.
     pub(super) rest: Vec<Vec3>,
@@ -74,7 +74,7 @@ impl ModalFit {
         Ok(Self { modes, rest, frames, errors })
     }
 
-    /// Error of the first `k` modes over all frames and vertices, for each `k` from 1 on, before rounding.
+    /// Error of the first `k` modes over all frames and vertices, for each `k` from 1 on, before the modes are rounded.
     #[must_use]
     pub fn errors(&self) -> &[ModalError] {
         &self.errors
@@ -109,8 +109,8 @@ fn decompose(displacements: &[Vec<DVec3>]) -> Vec<Vec<DVec3>> {
         .take_while(significant)
         .take(MAX_MODES)
         .map(|i| {
-            // The weights are `sqrt(value) u`, the mode `sum of u_f d_f / sqrt(value)`: scaled so that
-            // the largest weight is 1, and positive.
+            // The weights are `sqrt(value) u`, and the mode is the sum of `u_f d_f / sqrt(value)`. Both are scaled so
+            // that the largest weight is 1, and positive.
             let u = eigen.eigenvectors.column(i);
             let peak =
                 u.iter().fold(0.0, |peak: f64, w| if w.abs() > peak.abs() { *w } else { peak });
@@ -125,7 +125,7 @@ fn decompose(displacements: &[Vec<DVec3>]) -> Vec<Vec<DVec3>> {
         .collect()
 }
 
-/// The errors that remain after each mode is taken out of the displacements.
+/// The error that remains after each mode is subtracted from the displacements.
 fn errors(mut left: Vec<Vec<DVec3>>, modes: &[Vec<DVec3>]) -> Vec<ModalError> {
     (1..)
         .zip(modes)

@@ -14,13 +14,13 @@ pub struct Triangles {
 
 /// One triangle at rest.
 struct Shape {
-    /// The tree's stretch limit over the triangle's: the factor by which its stretch counts more.
+    /// The tree's stretch limit over the triangle's: its stretch is multiplied by this.
     strictness: f64,
     measure: Measure,
 }
 
 enum Measure {
-    /// Length of the first edge, and the second edge along and across it.
+    /// Length of the first edge, and the components of the second edge along and across the first.
     Surface { x1: f64, x2: f64, y2: f64 },
     /// Lengths of the edges.
     Edges([f64; 3]),
@@ -49,7 +49,7 @@ impl Triangles {
         Some(Self { corners, shapes })
     }
 
-    /// Most that a displacement adds to the stretch of any triangle: the largest norm of its gradient.
+    /// Upper bound on what a displacement adds to the stretch of any triangle: the largest norm of its gradient.
     pub fn growth(&self, displacement: &[DVec3]) -> f64 {
         let growths = self.corners.iter().zip(&self.shapes).map(|(corners, shape)| {
             let [a, b, c] = corners.map(|row| displacement[row as usize]);
@@ -58,7 +58,7 @@ impl Triangles {
         growths.fold(0.0, f64::max)
     }
 
-    /// Most that moving every vertex by at most `error` can add to the stretch of any triangle.
+    /// Upper bound on what moving every vertex by at most `error` adds to the stretch of any triangle.
     pub fn growth_of_error(&self, error: f64) -> f64 {
         let growths =
             self.shapes.iter().map(|shape| shape.strictness * shape.measure.of_error(error));
@@ -67,8 +67,7 @@ impl Triangles {
 }
 
 impl Measure {
-    /// Norm of the gradient (or, for edges, the largest relative change) that takes the rest edges to
-    /// these.
+    /// Norm of the gradient that maps the rest edges to these; for edge paths the largest relative change of an edge.
     fn norm(&self, f1: DVec3, f2: DVec3) -> f64 {
         match *self {
             Self::Surface { x1, x2, y2 } => {
@@ -85,8 +84,8 @@ impl Measure {
         }
     }
 
-    /// The same if both ends of every edge move by at most `error`: `|p| <= 2 e / x1`, and `|q| <= (2 e + |p| |x2|) /
-    /// y2`; the norm is at most that of both together.
+    /// Upper bound of that norm if both ends of every edge move by at most `error`: `|p| <= 2 e / x1`, `|q| <= (2 e +
+    /// |p| |x2|) / y2`, and the norm is at most `hypot(|p|, |q|)`.
     fn of_error(&self, error: f64) -> f64 {
         match *self {
             Self::Surface { x1, x2, y2 } => {

@@ -37,20 +37,20 @@ pub struct ModalError {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ModalMotion {
-    /// One weight a mode, for each recorded frame, ready to be sent.
+    /// For each recorded frame one weight a mode, ready to be sent.
     pub weights: Vec<Vec<f32>>,
     /// Frames that stretch the surface beyond the tree's limit: a receiver rejects them.
     pub beyond_limit: Vec<usize>,
 }
 
-/// Part of the recorded range by which a mode's weight may exceed it, at either end.
+/// Fraction of the recorded range by which a mode's weight may exceed it, at either end.
 pub const MARGIN: f32 = 0.25;
 
 /// Why modes cannot be fitted to a motion or added to a tree.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModesError {
-    /// The motion is of another mesh.
+    /// The motion does not fit the mesh.
     #[error(transparent)]
     Mismatch(#[from] MotionMismatchError),
     /// No frame, or too many.
@@ -70,7 +70,7 @@ pub enum ModesError {
     /// Every frame is the rest shape.
     #[error("no vertex of the motion leaves the rest shape: there is no mode to fit")]
     Still,
-    /// No mode, or more than the motion has.
+    /// No mode, or more modes than the motion has.
     #[error(
         "{asked} modes cannot be had: the motion has {available}, and a tree holds 1 to {MAX_MODES}"
     )]
@@ -89,10 +89,10 @@ pub enum ModesError {
     /// The stretch of the rest shape or of a frame cannot be measured.
     #[error("the stretch of the modal surface cannot be measured: {0}")]
     Stretch(dibs_nostd::StretchError),
-    /// Modes so large or so small that 16 bits do not distinguish them.
+    /// A mode is so large or so small that 16 bits do not represent it, or is a combination of others.
     #[error("the modes of this motion cannot be told apart: ask for fewer")]
     Degenerate,
-    /// The modes do not pass their own validation: a defect of the builder.
+    /// The modes fail their validation: a defect of the builder.
     #[error("the builder made modes that its own checker rejects ({0}); please report this motion")]
     Invalid(#[from] dibs_nostd::modes::ModesError),
     /// The tree with its modes cannot be written.

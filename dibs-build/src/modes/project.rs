@@ -24,7 +24,7 @@ use super::ModesError;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Projector {
-    /// Displacement of each row at weight 1, a mode.
+    /// For each mode the displacement of each row at weight 1.
     modes: Vec<Vec<DVec3>>,
     rest: Vec<DVec3>,
     normal: Cholesky<f64, Dyn>,
@@ -58,7 +58,7 @@ impl Projector {
         Ok(Self { modes, rest, normal })
     }
 
-    /// The weights for these positions (mm), in the tree's vertex order. They may be out of the modes' range: check
+    /// The weights for these positions (mm), in the tree's vertex order. They may be outside of the modes' range: check
     /// them with `dibs_nostd::modes::Modes::check`.
     ///
     /// # Panics

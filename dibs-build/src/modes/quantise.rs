@@ -18,7 +18,7 @@ impl QuantisedMode {
     }
 }
 
-/// Rounds a mode to 16 bits; `None` if that leaves zeros only, or f32 cannot hold its scale.
+/// Rounds a mode to 16 bits; `None` if only zeros are left, or f32 cannot hold its scale.
 pub fn quantise(mode: &[DVec3]) -> Option<QuantisedMode> {
     let largest = mode.iter().map(|d| d.abs().max_element()).fold(0.0, f64::max);
     let step = f64::from((largest / f64::from(i16::MAX)) as f32);
@@ -29,15 +29,14 @@ pub fn quantise(mode: &[DVec3]) -> Option<QuantisedMode> {
     Some(QuantisedMode { rows: mode.iter().map(|d| d.to_array().map(code)).collect(), step })
 }
 
-/// Unit of a displacement sum (mm), a power of two: the largest sum takes 27 bits of it, or one
-/// less.
+/// Unit of a displacement sum (mm), a power of two: the largest sum takes 26 or 27 bits.
 pub fn unit(modes: &[QuantisedMode], largest_weights: impl Iterator<Item = f64>) -> f64 {
     let steps = modes.iter().map(|mode| mode.step * 32_768.0);
     let reach: f64 = steps.zip(largest_weights).map(|(step, weight)| step * weight).sum();
     (reach / 2.0_f64.powi(27)).log2().ceil().exp2()
 }
 
-/// Gain of a mode in fixed point, exact: a step over a power of two.
+/// Gain of a mode in fixed point, exact: its step over the unit, which is a power of two.
 pub fn gain(mode: &QuantisedMode, unit: f64) -> f32 {
     (mode.step / unit * f64::from(1_u32 << FRACTION_BITS)) as f32
 }

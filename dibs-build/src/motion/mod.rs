@@ -11,7 +11,7 @@ use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
-/// The files of a series that are there; `None` of a path that names none.
+/// The files of a series that exist; `None` if the path does not name a series.
 pub(crate) fn series_files(path: &Path) -> Option<Vec<PathBuf>> {
     let files = series::Series::named(path)?.files().unwrap_or_default();
     Some(files.into_iter().map(|(_, file)| file).collect())
@@ -19,23 +19,23 @@ pub(crate) fn series_files(path: &Path) -> Option<Vec<PathBuf>> {
 
 impl Motion {
     /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices x 3, or a numbered series of mesh files,
-    /// named as `heart_%03d.vtp` (`%d` takes numbers with or without zeros before them). The mesh's
-    /// [origin](crate::Mesh::origin) is zero: [`read_around`](Self::read_around) serves others. How many frames a second
-    /// were recorded no format says but the PC2 files of [`write_pc2`](Self::write_pc2): else [`rate`](Self::rate) is 0.
+    /// named as `heart_%03d.vtp` (`%d` takes numbers with or without leading zeros). The mesh's
+    /// [origin](crate::Mesh::origin) must be zero; for others see [`read_around`](Self::read_around). Only the PC2
+    /// files of [`write_pc2`](Self::write_pc2) state the frames a second; for others [`rate`](Self::rate) is 0.
     ///
     /// # Errors
-    /// [`ReadError`], one sentence that names the file, the offending element and the remedy; of a series also where
-    /// a number is missing, or a frame has other triangles than the first.
+    /// [`ReadError`], one sentence that names the file, the offending element and the remedy. For a series also where a
+    /// number is missing, or a frame has other triangles than the first.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ReadError> {
         Self::read_around(path, None, DVec3::ZERO)
     }
 
-    /// As [`read`](Self::read), a motion whose lengths are in `unit`, of a mesh with this [origin](crate::Mesh::origin):
-    /// positions become millimetres, from the origin, and are rounded to f32 only then. `None` means millimetres, or the
+    /// As [`read`](Self::read), for a motion in `unit` of a mesh with this [origin](crate::Mesh::origin): positions are
+    /// converted to millimetres relative to the origin, and only then rounded to f32. `None` means millimetres, or the
     /// unit that the files of a series state.
     ///
     /// # Errors
-    /// As [`read`](Self::read); also for a frame so far from the origin that f32 does not hold its shape.
+    /// As [`read`](Self::read). Also for a frame so far from the origin that f32 does not hold its shape.
     pub fn read_around(
         path: impl AsRef<Path>,
         unit: impl Into<Option<Unit>>,
@@ -58,8 +58,8 @@ impl Motion {
             .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
     }
 
-    /// One frame that comes without a file: positions in `unit`, as a motion of a mesh with this
-    /// [origin](crate::Mesh::origin) has them. Errors name it by its number.
+    /// Converts one frame that is not in a file: positions in `unit` become positions (mm) relative to the mesh's
+    /// [origin](crate::Mesh::origin). Errors name the frame by its number.
     ///
     /// ```
     /// use dibs_build::glam::{DVec3, Vec3};
@@ -72,8 +72,8 @@ impl Motion {
     /// ```
     ///
     /// # Errors
-    /// [`ReadErrorKind::NonFinite`] names the first vertex with a coordinate that f32 does not hold; also for a frame so far
-    /// from the origin that f32 does not hold its shape.
+    /// [`ReadErrorKind::NonFinite`] names the first vertex with a coordinate that f32 does not hold. Also for a frame
+    /// so far from the origin that f32 does not hold its shape.
     pub fn frame_around(
         positions: &[[f64; 3]],
         number: usize,
@@ -84,7 +84,7 @@ impl Motion {
     }
 }
 
-/// The error of a file that begins as no motion: where its extension is known, that of its reader.
+/// The error for a file that does not begin as a motion: of the reader that its extension names, if any.
 fn unknown(path: &Path, bytes: &[u8]) -> ReadErrorKind {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     match extension.to_ascii_lowercase().as_str() {

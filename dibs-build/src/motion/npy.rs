@@ -1,7 +1,7 @@
 //! NumPy arrays of frames x vertices x 3, as `numpy.save` writes them.
 //!
-//! Our own reader, although `npyz` and `ndarray-npy` exist: both bring a grammar's compiler and numbers of any length
-//! to read one line of three keys.
+//! Our own reader, although `npyz` and `ndarray-npy` exist: both depend on a parser generator and big integers to read
+//! one line of three keys.
 
 use crate::Motion;
 use crate::read::{Endian, Place, ReadErrorKind, Scalar, excerpt};
@@ -35,7 +35,7 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
         )));
     }
     let numbers = scalar.read_all(data, order);
-    // In Fortran's order the first index runs fastest.
+    // In Fortran order the first index varies fastest.
     let index = |frame: usize, vertex: usize, axis: usize| {
         if is_fortran {
             frame + frames * (vertex + vertices * axis)
@@ -52,14 +52,14 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
     Ok(Motion { frames, rate: 0.0, origin: place.origin, faces: Vec::new() })
 }
 
-/// What follows a key of the header, which is a Python dictionary.
+/// The text after a key of the header, which is a Python dictionary.
 fn value<'a>(header: &'a str, key: &str) -> Result<&'a str, ReadErrorKind> {
     let after = header.split_once(&format!("'{key}'")).map(|(_, after)| after.trim_start());
     let value = after.and_then(|after| after.strip_prefix(':')).map(str::trim_start);
     value.ok_or_else(|| wrong(format!("its header has no '{key}'")))
 }
 
-/// `'<f8'`: the order of the bytes, the kind of number, and its bytes.
+/// The type of the numbers, such as `'<f8'`: byte order, kind of number, and its size in bytes.
 fn kind(value: &str) -> Result<(Scalar, Endian), ReadErrorKind> {
     let descr = value.trim_start_matches('\'').split('\'').next().unwrap_or_default();
     let order = if descr.starts_with('>') { Endian::Big } else { Endian::Little };
@@ -80,7 +80,7 @@ fn kind(value: &str) -> Result<(Scalar, Endian), ReadErrorKind> {
     Ok((scalar, order))
 }
 
-/// `(25, 5138, 3)`: the frames, and the vertices of each.
+/// The number of frames, and of vertices in each, from a shape such as `(25, 5138, 3)`.
 fn shape(value: &str) -> Result<[usize; 2], ReadErrorKind> {
     let inner = value.strip_prefix('(').and_then(|value| value.split_once(')'));
     let (inner, _) = inner.ok_or_else(|| wrong("its header has no shape".to_owned()))?;

@@ -1,8 +1,8 @@
 //! PC2 point cache files, as animation tools write them.
 //!
 //! Layout, little-endian: `POINTCACHE2\0`, i32 version 1, i32 points, f32 start frame, f32 frames per sample, i32
-//! samples, then samples x points x 3 f32. Nothing in it says how many frames a second has. So this crate's own files
-//! say it after the last sample, where other readers do not look: `DIBSRATE`, f32 frames a second.
+//! samples, then samples x points x 3 f32. The format does not state the frames a second. So this crate's own files
+//! append them after the last sample, where other readers do not look: `DIBSRATE`, f32 frames a second.
 
 use crate::frames::{check_faces, check_mesh_size};
 use crate::read::{Place, ReadError, ReadErrorKind, file};
@@ -16,7 +16,7 @@ pub(super) const MAGIC: &[u8; 12] = b"POINTCACHE2\0";
 const HEADER: usize = 32;
 const POINT: usize = 12;
 const RATE: &[u8; 8] = b"DIBSRATE";
-/// Frames per sample: each is one.
+/// Frames per sample: each sample is one frame.
 const SAMPLING: f32 = 1.0;
 
 /// A motion that does not fit a mesh.
@@ -35,7 +35,7 @@ pub enum MotionMismatchError {
         /// Vertices of the frame.
         found: usize,
     },
-    /// A frame is far smaller than the mesh, or has other triangles.
+    /// A frame is far smaller or larger than the mesh, or has other triangles.
     #[error("frame {frame} of the motion: {error}")]
     Frame {
         /// The first such frame, counted from 0.
@@ -43,7 +43,7 @@ pub enum MotionMismatchError {
         /// What is wrong with it.
         error: FrameError,
     },
-    /// The motion counts from another origin.
+    /// The motion is relative to another origin.
     #[error(
         "the motion counts from {found} and the mesh from {expected}; read the motion around the origin of the mesh"
     )]
@@ -56,7 +56,8 @@ pub enum MotionMismatchError {
 }
 
 impl Motion {
-    /// Reads a PC2 file of a mesh whose [origin](Mesh::origin) is zero; [`read_around`](Self::read_around) serves others.
+    /// Reads a PC2 file of a mesh whose [origin](Mesh::origin) is zero; for others see
+    /// [`read_around`](Self::read_around).
     ///
     /// # Errors
     /// [`ReadError`] for a file that is not PC2, is shorter than it claims, or has a coordinate that is not finite.
@@ -71,8 +72,8 @@ impl Motion {
     /// Writes a PC2 file.
     ///
     /// # Errors
-    /// [`WriteError`], also when frames differ in length, and for an origin that is not zero, since the file's numbers are
-    /// of single precision; the file is complete or untouched.
+    /// [`WriteError`]. Also when frames differ in length, and for an origin that is not zero, since the file's numbers
+    /// are of single precision. The file is complete or untouched.
     pub fn write_pc2(&self, path: impl AsRef<Path>) -> Result<(), WriteError> {
         let path = path.as_ref();
         let fail = |kind| WriteError { path: path.to_path_buf(), kind };
@@ -107,8 +108,8 @@ impl Motion {
         })
     }
 
-    /// Checks that every frame has one position for each of the mesh's vertices, from the mesh's origin, is a quarter to
-    /// eight times its size, and has the mesh's triangles where its files have faces.
+    /// Checks that every frame has one position for each of the mesh's vertices, relative to the mesh's origin, is a
+    /// quarter to eight times its size, and has the mesh's triangles where its files have faces.
     ///
     /// # Errors
     /// [`MotionMismatchError`] for another origin, or the first frame that does not fit.
@@ -147,8 +148,8 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
     if version != 1 || points == 0 || samples == 0 {
         return Err(ReadErrorKind::NotPc2);
     }
-    // The product of the counts is compared with the file's size before it is used. A few bytes after the last frame are
-    // no other one.
+    // The product of the counts is compared with the file's size before it is used. A few bytes after the last frame
+    // are allowed, but not another frame.
     let length = frame_bytes.saturating_mul(samples);
     let rate = usize::try_from(length).ok().and_then(|length| rate(data.get(length..)?));
     let after = (data.len() as u64).checked_sub(length);
@@ -172,7 +173,7 @@ pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind
     Ok(Motion { frames, rate: rate.unwrap_or(0.0), origin: place.origin, faces: Vec::new() })
 }
 
-/// The frames a second that stand after the last sample.
+/// The frames a second, from the bytes after the last sample.
 fn rate(after: &[u8]) -> Option<f32> {
     let rate = after.strip_prefix(RATE)?;
     let rate = f32::from_le_bytes(*rate.as_array()?);

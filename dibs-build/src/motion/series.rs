@@ -5,17 +5,17 @@ use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
 
-/// Files of one name but for a number.
+/// Files whose names differ only in a number.
 pub(super) struct Series<'a> {
     path: &'a Path,
     before: &'a str,
     after: &'a str,
-    /// Digits of a number that zeros fill up; any where it is not said.
+    /// Digits that a number is padded to with leading zeros; `None` for any.
     width: Option<usize>,
 }
 
 impl<'a> Series<'a> {
-    /// The series that a file's name with `%d` or `%03d` means.
+    /// The series that a file name with `%d` or `%03d` stands for.
     pub fn named(path: &'a Path) -> Option<Self> {
         let name = path.file_name()?.to_str()?;
         let (before, rest) = name.split_once('%')?;
@@ -25,13 +25,13 @@ impl<'a> Series<'a> {
         (is_number && !path.exists()).then_some(Self { path, before, after, width })
     }
 
-    /// The name of a number that no file has.
+    /// The path of a number's file, whether it exists or not.
     fn file(&self, number: u64, width: usize) -> PathBuf {
         let Self { before, after, .. } = self;
         self.path.with_file_name(format!("{before}{number:0width$}{after}"))
     }
 
-    /// The numbers that there are and their files, in their order.
+    /// The numbers that exist and their files, in ascending order.
     pub fn files(&self) -> Result<Vec<(u64, PathBuf)>, std::io::Error> {
         let folder = self.path.parent().filter(|folder| *folder != Path::new(""));
         let mut files = Vec::new();
@@ -41,7 +41,7 @@ impl<'a> Series<'a> {
             let digits = digits.and_then(|digits| digits.strip_suffix(self.after));
             let digits = digits.filter(|digits| digits.bytes().all(|digit| digit.is_ascii_digit()));
             let Some(digits) = digits else { continue };
-            // Zeros fill up the width that is asked for, or any.
+            // Leading zeros may only pad to the requested width, if one is given.
             let is_filled = digits.len() > 1 && digits.starts_with('0');
             let fits = self
                 .width

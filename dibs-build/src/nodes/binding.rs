@@ -15,15 +15,15 @@ use crate::rounding::round_up;
 pub(crate) struct Embedding {
     /// The nodes as a tree stores them.
     pub nodes: Vec<Vec3>,
-    /// The tetrahedra in the order of their latest nodes, which is that in which frames arrive.
+    /// The tetrahedra ordered by their last node, which is the order in which frames complete them.
     pub tetrahedra: Vec<[u32; 4]>,
-    /// The volume's number of each.
+    /// The volume's index of each tetrahedron.
     order: Vec<usize>,
-    /// The limit of each as a part of the tree's; empty if all have that.
+    /// The limit of each tetrahedron over the tree's; empty if all have the tree's limit.
     ratios: Vec<f64>,
     pub is_box: bool,
     pub vertices: Vec<Bound>,
-    /// Whether a vertex is outside of its tetrahedron, so that weights are signed.
+    /// Whether any vertex is outside of its tetrahedron, so that weights are signed.
     pub is_signed: bool,
     /// Largest distance (mm) of a vertex from its position in the mesh, caused by rounding its weights.
     pub error: f64,
@@ -33,7 +33,8 @@ pub(crate) struct Embedding {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
     pub tetrahedron: u32,
-    /// Parts of [`WHOLE`], to which they sum up. The first three can be [stored](Embedding::stored).
+    /// Fractions in units of 1 / [`WHOLE`], whose sum is 1. The first three fit the 16 bits of a
+    /// [stored](Embedding::stored) weight.
     pub weights: [i32; 4],
 }
 
@@ -43,13 +44,13 @@ impl Bound {
         self.weights.iter().any(|&weight| weight < 0)
     }
 
-    /// The sum of the sizes of its weights.
+    /// The sum of the weights' magnitudes.
     fn sizes(&self) -> u32 {
         self.weights.iter().map(|weight| weight.unsigned_abs()).sum()
     }
 }
 
-/// A vertex's place: its tetrahedron, its barycentric coordinates there, and the distance from it.
+/// The tetrahedron that a vertex is bound to, its barycentric coordinates there, and its distance from it.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     tetrahedron: u32,
@@ -58,7 +59,7 @@ struct Place {
 }
 
 impl Place {
-    /// Of a vertex that nothing reads.
+    /// For a vertex that no triangle uses.
     const NONE: Self = Self { tetrahedron: 0, weights: [0.0, 0.0, 0.0, 1.0], distance: 0.0 };
 }
 
@@ -82,7 +83,7 @@ impl Embedding {
             false => Place::NONE,
         };
         let places: Vec<Place> = mesh.positions.par_iter().zip(&is_used).map(place).collect();
-        // Written so that a distance of NaN binds none.
+        // Written so that a distance of NaN counts as beyond.
         let is_beyond =
             |place: &&Place| place.distance > 0.0 && !(place.distance <= volume.within());
         if let Some(first) = places.iter().position(|place| is_beyond(&place)) {
@@ -116,8 +117,8 @@ impl Embedding {
         Ok(embedding)
     }
 
-    /// Limits the stretch of all tetrahedra, or of each by the volume's numbers, and returns the tree's limit: the largest,
-    /// at least what the controller's check tells from the rest shape.
+    /// Limits the stretch of all tetrahedra, or of each by the volume's numbers. Returns the tree's limit: the largest.
+    /// Limits are raised to the least that the controller can tell from the rest shape.
     pub fn limit(&mut self, stretch: f32, limits: Option<&[f32]>) -> Result<f32, VolumeError> {
         let mut own = Vec::new();
         for (tetrahedron, &number) in self.order.iter().enumerate() {
@@ -139,12 +140,12 @@ impl Embedding {
         self.ratios.is_empty()
     }
 
-    /// A tetrahedron's limit as a part of the tree's.
+    /// A tetrahedron's limit over the tree's.
     pub fn ratio(&self, tetrahedron: u32) -> f64 {
         self.ratios.get(tetrahedron as usize).copied().unwrap_or(1.0)
     }
 
-    /// The volume's number of a tetrahedron.
+    /// The volume's index of a tetrahedron.
     pub fn number(&self, tetrahedron: usize) -> usize {
         self.order[tetrahedron]
     }
@@ -155,7 +156,7 @@ impl Embedding {
         (if self.is_signed { signed } else { weight }) as u16
     }
 
-    /// The vertices at rest as the weights give them.
+    /// The rest positions of the vertices, computed from the weights.
     pub fn positions(&self) -> impl Iterator<Item = DVec3> {
         self.vertices.iter().map(|bound| {
             let corners = self.tetrahedra[bound.tetrahedron as usize];
@@ -179,11 +180,11 @@ impl Embedding {
     }
 }
 
-/// A tetrahedron for the location of points.
+/// A tetrahedron, prepared for locating points.
 #[derive(Debug)]
 pub(super) struct Cell {
     pub corners: [DVec3; 4],
-    /// From a position less the first corner to the weights of the others.
+    /// Maps a position relative to the first corner to the weights of the other three.
     inverse: DMat3,
 }
 
@@ -205,7 +206,7 @@ impl Cell {
         [a.min(b).min(c).min(d), a.max(b).max(c).max(d)]
     }
 
-    /// The distance of a position outside.
+    /// The distance from the tetrahedron to a position outside.
     fn distance(&self, position: DVec3) -> f64 {
         let [a, b, c, d] = self.corners;
         let faces = [[a, b, c], [a, b, d], [a, c, d], [b, c, d]];
@@ -213,13 +214,13 @@ impl Cell {
     }
 }
 
-/// The tetrahedra near each place.
+/// A uniform grid that finds the tetrahedra near a position.
 struct Grid {
     low: DVec3,
     /// Cells a millimetre.
     per_mm: DVec3,
     size: [usize; 3],
-    /// The tetrahedra whose box meets each cell.
+    /// The tetrahedra whose bounding box meets each cell.
     cells: Vec<Vec<u32>>,
 }
 
@@ -261,7 +262,7 @@ impl Grid {
         x + self.size[0] * (y + self.size[1] * z)
     }
 
-    /// The tetrahedron around a position, or the nearest one. Of several as near it is the one that extrapolates least.
+    /// The tetrahedron around a position, or the nearest one; of equally near ones the one that extrapolates least.
     fn place_of(&self, tetrahedra: &[Cell], position: DVec3) -> Place {
         let near = &self.cells[self.row(self.place(position))];
         let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
@@ -292,10 +293,11 @@ impl Grid {
     }
 }
 
-/// A vertex is not outside by less than a weight's unit.
+/// A vertex farther outside than this, in barycentric coordinates, counts as outside: one unit of a weight.
 const OUTSIDE: f64 = 1.0 / WHOLE as f64;
 
-/// Barycentric coordinates as parts of [`WHOLE`] with an exact sum, in steps of so many parts, each off by one step at most.
+/// Barycentric coordinates as multiples of `step` in units of 1 / [`WHOLE`], with an exact sum; each is off by one step
+/// at most.
 fn rounded(weights: [f64; 4], step: u32) -> [i32; 4] {
     let whole = (WHOLE / step) as i32;
     let exact = weights.map(|weight| weight * f64::from(whole));
@@ -308,11 +310,11 @@ fn rounded(weights: [f64; 4], step: u32) -> [i32; 4] {
         match sum.cmp(&whole) {
             std::cmp::Ordering::Less => rounded[at] += 1,
             std::cmp::Ordering::Equal => break,
-            // No weight that is not negative becomes so.
+            // Weights that are not negative stay so.
             std::cmp::Ordering::Greater => rounded[at] -= i32::from(rounded[at] != 0),
         }
     }
-    // A stored weight has 16 bits.
+    // A stored weight has 16 bits, so no stored weight may be the whole.
     for at in 0..3 {
         if rounded[at] == WHOLE as i32 {
             (rounded[at], rounded[3]) = (WHOLE as i32 - 1, 1);

@@ -8,7 +8,7 @@ use super::binding::Embedding;
 use super::volume::edges;
 use crate::rounding::{round_down, round_up};
 
-/// The section of a tree with this stretch limit, whose rows hold the mesh vertices `order`.
+/// The section of a tree with this stretch limit whose rows hold the mesh vertices `order`.
 pub(crate) fn encode(
     embedding: &Embedding,
     stretch: f32,
@@ -34,7 +34,7 @@ pub(crate) fn encode(
     for &vertex in order {
         let bound = &embedding.vertices[vertex as usize];
         bytes.extend((bound.tetrahedron as u16).to_le_bytes());
-        // The weights of the corners in the order in which the check has them.
+        // The weights in the order of the tetrahedron's corners in the stretch check.
         let corners = embedding.tetrahedra[bound.tetrahedron as usize];
         let of =
             |node: u32| (0..4).find(|&at| corners[at] == node).map_or(0, |at| bound.weights[at]);
@@ -46,25 +46,25 @@ pub(crate) fn encode(
     Ok(bytes)
 }
 
-/// The least stretch limit of a tetrahedron that the controller's check tells from the rest shape; `None` for a flat one.
+/// The least stretch limit of a tetrahedron that the controller can tell from the rest shape; `None` for a flat one.
 pub(crate) fn least_limit(corners: [DVec3; 4]) -> Option<f64> {
     let (_, _, openness) = path(corners);
     let least = (1.0 + 3.0 * MARGIN / openness).sqrt() * (1.0 + 1.0 / 65_536.0);
     (openness >= FLAT).then_some(least)
 }
 
-/// The least limit of any tetrahedron of a built volume: the tree's, where all have that.
+/// The least limit of any tetrahedron of a built volume; the tree's, if all have that.
 pub(crate) fn least_stretch_limit(nodes: &Nodes<'_>) -> f32 {
     let limit = |element| {
         let corners = nodes.element(element)?.map(|node| nodes.rest_position(node));
         let [a, b, c, d] = corners.map(|corner| corner.map(Vec3::as_dvec3));
-        // The core's limit is lower by the margin for its rounding: undone, to show the limit that the builder was given.
+        // The stored limit is lower by the margin for rounding; this restores the limit that the builder was given.
         let scale = 1.0 + MARGIN / openness(edges([a?, b?, c?, d?]));
         Some(f64::from(nodes.element_limit(element)?) * scale.sqrt())
     };
     let tree = nodes.stretch_limit();
     let least = (0..nodes.element_count()).filter_map(limit).fold(f64::INFINITY, f64::min);
-    // Rounded to what f32 is certain of: the two computations differ in the last digits.
+    // Rounded to the digits that are certain: the two computations differ in the last digits.
     let least = ((least * 1e5).round() / 1e5) as f32;
     if least < tree * (1.0 - 1e-5) { least } else { tree }
 }
@@ -74,13 +74,13 @@ struct Shape {
     corners: [u32; 4],
     /// Its edges along the path through the corners.
     edges: DMat3,
-    /// The least eigenvalue of the edges' products, scaled to a diagonal of ones.
+    /// The least eigenvalue of the edges' Gram matrix, scaled to a diagonal of ones.
     openness: f64,
-    /// Its limit as a part of the tree's.
+    /// Its limit over the tree's.
     ratio: f64,
 }
 
-/// The path through four corners whose edges are nearest to orthogonal: the corners' order, the edges, their openness.
+/// The path through four corners with the most orthogonal edges: the corners' order, the edges, and their openness.
 fn path(corners: [DVec3; 4]) -> ([usize; 4], DMat3, f64) {
     let along = |order: [usize; 4]| {
         let edges = edges(order.map(|at| corners[at]));
@@ -108,19 +108,19 @@ fn shapes(embedding: &Embedding, stretch: f32) -> Result<Vec<Shape>, VolumeError
     embedding.tetrahedra.iter().enumerate().map(shape).collect()
 }
 
-/// Even orders of the corners, of the two directions of each path one.
+/// The even permutations of the corners, one for each path regardless of its direction.
 const PATHS: [[usize; 4]; 6] =
     [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 0, 3, 2], [1, 2, 0, 3], [2, 0, 1, 3]];
 
-/// Squares of edges within which the check's products neither overflow nor underflow.
+/// Limits of squared edge lengths for which the check's products neither overflow nor underflow.
 const LEAST_SQUARED: f64 = 1e-4;
 const LARGEST_SQUARED: f64 = 1e8;
 
-/// The least openness of a tetrahedron: the check overestimates the stretch by one or two parts in a hundred there.
+/// The least openness of a tetrahedron: there the check overestimates the stretch by one or two per cent.
 const FLAT: f64 = 1e-4;
 
 impl Shape {
-    /// The squares of its edges, times that of its limit's part.
+    /// The squares of its edges, scaled by its limit ratio.
     fn squares(&self) -> [f64; 3] {
         self.columns().map(|edge| (edge * self.ratio).length_squared())
     }
@@ -135,8 +135,9 @@ impl Shape {
         [a, b, c, a + b, b + c, a + b + c].map(DVec3::length).into_iter().fold(0.0, f64::max)
     }
 
-    /// What the check compares: the edges' products, made smaller by its largest rounding, and the least volume. A shape
-    /// that is smaller by its limit's part is stretched by so much more, so that one limit serves all.
+    /// The numbers that the check compares with: the edges' Gram matrix, lowered by the largest rounding of the check,
+    /// and the least volume. The rest shape is scaled down by its limit ratio, which scales its stretch up, so that the
+    /// tree's limit serves all tetrahedra.
     fn numbers(&self, stretch: f32) -> [f32; 7] {
         let scale = 1.0 / (1.0 + MARGIN / self.openness);
         let [a, b, c] = self.columns().map(|edge| edge * self.ratio);
@@ -148,14 +149,15 @@ impl Shape {
     }
 }
 
-/// The least eigenvalue of the products of edges scaled to unit length: the square of their least singular value.
+/// The least eigenvalue of the Gram matrix of the edges scaled to unit length: the square of their least singular
+/// value.
 fn openness(edges: DMat3) -> f64 {
     let unit = DMat3::from_cols(
         edges.x_axis.normalize_or_zero(),
         edges.y_axis.normalize_or_zero(),
         edges.z_axis.normalize_or_zero(),
     );
-    // The largest eigenvalue of the inverse by squaring it; its Frobenius norm is not below that.
+    // The largest eigenvalue of the inverse, by repeated squaring; the Frobenius norm is an upper bound of it.
     let mut inverse = (unit.transpose() * unit).inverse();
     let mut scale = 0.0;
     for power in 0..6 {

@@ -1,4 +1,5 @@
-//! Lengths of paths through a volume: no vertex is farther from a pin than the largest stretch times such a length.
+//! Lengths of paths through a volume: no vertex is farther from a pin than the largest stretch times the length at
+//! rest.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -7,28 +8,28 @@ use glam::DVec3;
 
 use super::binding::{Cell, Embedding};
 
-/// The distances between vertices, straight where a line stays in the volume, else along its edges.
+/// The distances between vertices: straight where the line stays in the volume, otherwise along its edges.
 ///
-/// Both are upper bounds on the shortest path: each part of a path lies in one tetrahedron. Lengths in a tetrahedron with a
-/// limit of its own are as many times smaller as that is.
+/// Both are upper bounds on the shortest path: each part of a path lies in one tetrahedron. Where tetrahedra have their
+/// own limits, a length is weighted by the ratio of the tetrahedron's limit to the tree's.
 pub(crate) struct VolumePaths<'e> {
     embedding: &'e Embedding,
     /// The vertices at rest.
     positions: Vec<DVec3>,
     cells: Vec<Cell>,
-    /// The tetrahedron across the face that lacks each corner.
+    /// For each corner the tetrahedron across the opposite face.
     across: Vec<[Option<u32>; 4]>,
     /// The nodes at the other ends of each node's edges, and the edges' lengths.
     neighbours: Vec<Vec<(u32, f64)>>,
 }
 
-/// Far more than the rounding of a length in f64.
+/// Much more than the rounding of a length in f64.
 const ROUNDED_UP: f64 = 1.0 + 1e-9;
 
-/// More than the rounding of a point's place on a line, and far less than a length that matters.
+/// More than the rounding of a point's position on a line, and far less than a significant length.
 const ASTRAY: f64 = 1e-12;
 
-/// Most tetrahedra of a straight line: a line that runs along a face may turn back.
+/// Most tetrahedra that a straight line may cross: rounding may make a line along a face turn back.
 const MOST_CROSSED: usize = 256;
 
 impl<'e> VolumePaths<'e> {
@@ -49,7 +50,7 @@ impl<'e> VolumePaths<'e> {
                 }));
             }
         }
-        // Of an edge in several tetrahedra the shortest.
+        // Of an edge in several tetrahedra the shortest weighted length counts.
         for neighbours in &mut neighbours {
             neighbours.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
             neighbours.dedup_by_key(|(node, _)| *node);
@@ -58,7 +59,7 @@ impl<'e> VolumePaths<'e> {
         Self { embedding, positions, cells, across: across(tetrahedra), neighbours }
     }
 
-    /// Whether every straight line is a path.
+    /// Whether every straight line is a path through the volume.
     pub const fn is_straight_everywhere(&self) -> bool {
         self.embedding.is_box
     }
@@ -68,14 +69,14 @@ impl<'e> VolumePaths<'e> {
         self.positions[vertex as usize]
     }
 
-    /// The distance of each of these vertices from another one.
+    /// The distance of each of these vertices from another vertex.
     pub fn distances(&self, from: u32, to: &[u32]) -> Vec<f64> {
         let start = self.position(from);
         let straight = |&vertex: &u32| {
             let length = self.position(vertex).distance(start) * ROUNDED_UP;
             match self.embedding.is_box {
                 true if self.embedding.is_uniform() => length,
-                // No limit is larger than the tree's.
+                // A ratio of 1 is safe: no limit is larger than the tree's.
                 true => length * self.straight(from, vertex).unwrap_or(1.0),
                 false => self.straight(from, vertex).map_or(f64::NAN, |part| length * part),
             }
@@ -102,7 +103,7 @@ impl<'e> VolumePaths<'e> {
         distances
     }
 
-    /// The length of a path from a node of a tetrahedron to the farthest of another one.
+    /// The length of the longest shortest path from a node of a tetrahedron to another node.
     pub fn extent(&self, from: u32) -> f64 {
         let nodes = &self.embedding.nodes;
         let first = self.node(from);
@@ -110,7 +111,7 @@ impl<'e> VolumePaths<'e> {
             return nodes.iter().map(|node| node.as_dvec3().distance(first)).fold(0.0, f64::max)
                 * ROUNDED_UP;
         }
-        // Of nodes that tetrahedra have; others carry nothing.
+        // Only nodes of tetrahedra; others move nothing.
         let used = (0..).zip(&self.neighbours).filter(|(_, at)| !at.is_empty());
         let used: Vec<u32> = used.map(|(node, _)| node).collect();
         let along = self.along_edges(&[(from, 0.0)], &used);
@@ -122,7 +123,7 @@ impl<'e> VolumePaths<'e> {
         self.embedding.tetrahedra[bound.tetrahedron as usize]
     }
 
-    /// The part of the tree's limit at a vertex.
+    /// The ratio of the limit at a vertex to the tree's.
     fn ratio(&self, vertex: u32) -> f64 {
         self.embedding.ratio(self.embedding.vertices[vertex as usize].tetrahedron)
     }
@@ -131,14 +132,14 @@ impl<'e> VolumePaths<'e> {
         self.embedding.nodes[node as usize].as_dvec3()
     }
 
-    /// The mean part of the tree's limit along the straight line between two vertices; `None` unless it is known to stay in
-    /// the volume. From a vertex outside it leads to the vertex's tetrahedron first, and is part of that.
+    /// The mean limit ratio along the straight line between two vertices; `None` unless the line is known to stay in
+    /// the volume. From a vertex outside, the line first leads to the vertex's tetrahedron and counts as part of it.
     fn straight(&self, from: u32, to: u32) -> Option<f64> {
         let [a, b] = [from, to].map(|vertex| self.position(vertex));
         let [from, to] = [from, to].map(|vertex| &self.embedding.vertices[vertex as usize]);
         let [start, end] = [from, to].map(|bound| bound.tetrahedron);
         let (mut at, mut before, mut sum, mut counted) = (start, None, 0.0, 0.0);
-        // The part of the line at which it comes into the tetrahedron.
+        // The position on the line (0 to 1) where it enters the tetrahedron.
         let mut passed = if from.is_outside() { self.entry(start, a, b) } else { 0.0 };
         for _ in 0..MOST_CROSSED {
             let ratio = self.embedding.ratio(at);
@@ -147,17 +148,17 @@ impl<'e> VolumePaths<'e> {
             }
             let cell = &self.cells[at as usize];
             let (here, there) = (cell.weights(a), cell.weights(b));
-            // The first face that the line leaves through.
+            // The first face through which the line leaves.
             let leaves = (0..4).filter(|&corner| {
                 there[corner] < 0.0 && self.across[at as usize][corner] != before.or(Some(u32::MAX))
             });
             let part = |corner: usize| here[corner] / (here[corner] - there[corner]);
             let Some(out) = leaves.min_by(|&i, &j| part(i).total_cmp(&part(j))) else {
-                // The end is in this tetrahedron, too.
+                // The end is in this tetrahedron as well.
                 let is_in = !to.is_outside() && there.iter().all(|&weight| weight >= 0.0);
                 return is_in.then_some(sum + ratio * (1.0 - counted));
             };
-            // A line through an edge or a corner may go astray by rounding.
+            // Rounding may let a line through an edge or a corner leave its tetrahedra.
             let is_ahead = part(out) >= passed - ASTRAY && here[out] >= -ASTRAY;
             let next = self.across[at as usize][out].filter(|_| is_ahead)?;
             sum += ratio * (part(out) - counted);
@@ -166,8 +167,7 @@ impl<'e> VolumePaths<'e> {
         None
     }
 
-    /// The part of a line from outside at which it comes through the last plane of a tetrahedron's faces that it begins
-    /// beyond.
+    /// The position on a line from outside where it has crossed the planes of all faces that it starts beyond.
     fn entry(&self, tetrahedron: u32, from: DVec3, to: DVec3) -> f64 {
         let cell = &self.cells[tetrahedron as usize];
         let ends = cell.weights(from).into_iter().zip(cell.weights(to));
@@ -177,13 +177,13 @@ impl<'e> VolumePaths<'e> {
             .fold(0.0, f64::max)
     }
 
-    /// Dijkstra's distances of nodes along the volume's edges, until all `wanted` are known.
+    /// Dijkstra's distances of nodes along the volume's edges, until all `wanted` ones are known.
     fn along_edges(&self, starts: &[(u32, f64)], wanted: &[u32]) -> HashMap<u32, f64> {
         let mut found: HashMap<u32, f64> =
             wanted.iter().map(|&node| (node, f64::INFINITY)).collect();
         let mut left = wanted.len();
         let mut known: HashMap<u32, f64> = HashMap::new();
-        // Lengths are not negative, so their bits are in their order.
+        // The bits of lengths, which are not negative, are ordered as the lengths.
         let mut heap: BinaryHeap<Reverse<(u64, u32)>> =
             starts.iter().map(|&(node, length)| Reverse((length.to_bits(), node))).collect();
         while let Some(Reverse((bits, node))) = heap.pop() {
@@ -210,7 +210,7 @@ impl<'e> VolumePaths<'e> {
     }
 }
 
-/// The tetrahedron across the face that lacks each corner.
+/// For each tetrahedron and corner, the tetrahedron across the opposite face.
 fn across(tetrahedra: &[[u32; 4]]) -> Vec<[Option<u32>; 4]> {
     let mut sides: HashMap<[u32; 3], (u32, usize)> = HashMap::new();
     let mut across = vec![[None; 4]; tetrahedra.len()];

@@ -1,11 +1,11 @@
-//! A volume of tetrahedra, checked.
+//! A volume of tetrahedra that has passed its checks.
 
 use dibs_nostd::nodes::{MAX_ELEMENTS, MAX_NODES};
 use glam::{DMat3, DVec3, UVec3};
 
 use crate::Mesh;
 
-/// A coarse model: nodes, and tetrahedra that carry a surface. The nodes of its frames are in the order of these.
+/// A coarse model: nodes, and tetrahedra that move a surface. A frame lists the nodes in this order.
 ///
 /// ```
 /// use dibs_build::{Volume, generate};
@@ -20,11 +20,11 @@ pub struct Volume {
     tetrahedra: Vec<[u32; 4]>,
     /// Whether the tetrahedra fill a box, so that every straight line in it is a path through them.
     is_box: bool,
-    /// The distance (mm) from which vertices outside are bound.
+    /// The largest distance (mm) of vertices outside that are bound.
     within: f64,
 }
 
-/// Why a volume cannot carry a surface.
+/// Why a volume cannot move a surface.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
@@ -74,7 +74,7 @@ pub enum VolumeError {
         /// The tetrahedron.
         tetrahedron: usize,
     },
-    /// Parts that no face, edge or node joins.
+    /// Parts that no shared node connects.
     #[error("the volume has {parts} parts that share no node: join them, or build a tree for each")]
     Apart {
         /// Their number.
@@ -93,7 +93,7 @@ pub enum VolumeError {
         /// The largest distance from the volume (mm).
         distance: f64,
     },
-    /// A vertex that a thin tetrahedron would carry at the end of a lever: errors of its nodes would grow threefold.
+    /// A thin tetrahedron would extrapolate to this vertex so far that errors of its nodes grow threefold.
     #[error(
         "vertex {vertex} of the surface is {distance:.3} mm outside of a tetrahedron that is about as thin: mesh the volume \
          coarser there, or let it hold the vertex"
@@ -116,8 +116,8 @@ pub enum VolumeError {
 }
 
 impl Volume {
-    /// A volume of these nodes, in millimetres and the coordinates of the surface's file, and tetrahedra of them. Seen from
-    /// the fourth node of each, the first three run counterclockwise backwards: as VTK and Gmsh number them.
+    /// A volume of these nodes, in millimetres and the coordinates of the surface's file, and tetrahedra of them. Seen
+    /// from the fourth node of each, the first three run counterclockwise: as VTK and Gmsh number them.
     ///
     /// # Errors
     /// [`VolumeError`] names the first defect.
@@ -126,7 +126,7 @@ impl Volume {
         volume.check().map(|()| volume)
     }
 
-    /// A lattice of cells around a mesh, cut in six tetrahedra each, with a margin of a thousandth of its size.
+    /// A lattice of cells around a mesh, each cut into six tetrahedra, with a margin of a thousandth of its size.
     ///
     /// # Errors
     /// [`VolumeError::Cells`] for no cells, or too many; [`VolumeError::Shape`] for cells too small.
@@ -158,7 +158,7 @@ impl Volume {
         };
         let nodes = grid(points).map(at).collect();
         let number = |p: UVec3| p.x + points.x * (p.y + points.y * p.z);
-        // Each cell's diagonal is in all six, so that faces of neighbours meet.
+        // All six tetrahedra of a cell contain its diagonal, so that the faces of neighbouring cells match.
         let tetrahedra = grid(cells).flat_map(|cell| {
             ORDERS.map(|order| {
                 let mut corner = cell;
@@ -175,12 +175,12 @@ impl Volume {
         volume.check().map(|()| volume)
     }
 
-    /// Binds vertices of a surface that are outside, within this distance (mm), to the nearest tetrahedron: they move as if
-    /// it went on. Others are refused still.
+    /// Binds vertices of a surface that are outside, within this distance (mm), to the nearest tetrahedron, whose
+    /// deformation is extrapolated to them. Vertices farther outside are still refused.
     ///
-    /// Such a vertex moves farther than the nodes, and their errors grow with it:
-    /// [`amplification`](dibs_nostd::nodes::Nodes::amplification) says how much. A vertex at a lever of three is refused, which
-    /// is about as far outside as the tetrahedron is high. If any vertex is outside, weights have 14 bits instead of 16.
+    /// Such a vertex moves farther than the nodes, and so do their errors, by the factor
+    /// [`amplification`](dibs_nostd::nodes::Nodes::amplification). A vertex with a factor of three is refused; it is
+    /// about as far outside as the tetrahedron is high. If any vertex is outside, weights have 14 bits instead of 16.
     #[must_use]
     pub fn bind_within(mut self, distance: f64) -> Self {
         self.within = distance;
@@ -199,7 +199,7 @@ impl Volume {
         &self.tetrahedra
     }
 
-    /// The nodes in f32, from an origin, and the faces of the tetrahedra: what a motion of them is compared with.
+    /// Nodes in f32, relative to an origin, and faces of the tetrahedra: motions of the nodes are checked against it.
     pub(crate) fn skeleton(&self, origin: DVec3) -> Mesh {
         let positions = self.nodes.iter().map(|&node| (node - origin).as_vec3()).collect();
         let faces = self.tetrahedra.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [b, c, d]]);
@@ -257,7 +257,7 @@ impl Volume {
     }
 }
 
-/// The axes in the six orders in which a path from a cell's first corner to its last can go.
+/// The axes in the six orders in which a path along a cell's edges can go from its first corner to its last.
 const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
 /// The points of a grid, x first.
@@ -267,19 +267,19 @@ fn grid(size: UVec3) -> impl Iterator<Item = UVec3> {
     (0..size.z).flat_map(layer)
 }
 
-/// The largest singular value of the gradient from edges at rest to edges now.
+/// The largest singular value of the deformation gradient that maps the edges at rest to the edges now.
 pub(crate) fn largest_stretch(rest: DMat3, now: DMat3) -> f64 {
     let gradient = now * rest.inverse();
     let [a, b, c] = [gradient.x_axis, gradient.y_axis, gradient.z_axis];
     let (aa, bb, cc) = (a.length_squared(), b.length_squared(), c.length_squared());
     let (ab, ac, bc) = (a.dot(b), a.dot(c), b.dot(c));
-    // The largest root of the characteristic polynomial of the products, which is all real.
+    // The largest root of the characteristic polynomial of `F^T F`, whose roots are all real.
     let mean = (aa + bb + cc) / 3.0;
     let (x, y, z) = (aa - mean, bb - mean, cc - mean);
     let size = ((x * x + y * y + z * z) / 6.0 + (ab * ab + ac * ac + bc * bc) / 3.0).sqrt();
     let determinant = x * (y * z - bc * bc) - ab * (ab * z - bc * ac) + ac * (ab * bc - y * ac);
     let cosine = (determinant / (2.0 * size.powi(3))).clamp(-1.0, 1.0);
-    // NaN of a gradient that is a rotation.
+    // For a gradient that is a rotation, the cosine is NaN.
     let spread = if size > 0.0 { 2.0 * size * (cosine.acos() / 3.0).cos() } else { 0.0 };
     (mean + spread).sqrt()
 }

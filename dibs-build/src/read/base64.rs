@@ -1,10 +1,10 @@
-//! Base64, in which text formats hold binary data.
+//! Base64, the encoding of binary data in text formats.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 
-/// Decodes up to the first character that is none. Padding may occur inside: VTK's arrays are several runs in
-/// a row, each padded. `None` where a run is cut off.
+/// Decodes up to the first character that is not Base64. Padding may occur inside: VTK's arrays are several runs in a
+/// row, each padded. `None` where a run is cut off.
 pub(super) fn decode(text: &[u8]) -> Option<Vec<u8>> {
     let is_digit = |byte: &u8| byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'/' | b'=');
     let digits = text.iter().copied().filter(|byte| !byte.is_ascii_whitespace());

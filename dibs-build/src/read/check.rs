@@ -1,6 +1,4 @@
-//! Makes a checked mesh of a file's elements: every check, in order.
-//!
-//! One file, because the order of the checks is their meaning.
+//! Turns a file's elements into a checked mesh. One file, because the checks depend on their order.
 
 // Requirement: M-03
 
@@ -15,8 +13,8 @@ use dibs_nostd::format::MAX_ROOTS;
 use glam::{DVec3, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// The exact tests multiply two squared lengths. Across a mesh of this size, with edges down to a
-/// thousandth of it, the product of two squared edges is still a normal f32.
+/// The exact tests multiply two squared lengths. For edges down to a thousandth of a mesh of this size, the product of
+/// two squared edges is still a normal f32.
 const LEAST_EXTENT: f64 = 1e-6;
 
 /// Above this, fourth powers of distances overflow f32.
@@ -25,13 +23,14 @@ const MOST_COORDINATE: f64 = dibs_nostd::MAX_COORDINATE as f64;
 /// Ear clipping takes quadratic time at worst: up to a second for a face below this size.
 const MOST_CORNERS: usize = 10_000;
 
-/// So faces of more corners than this may only be few: their squares sum up to at most three of the largest.
+/// Faces of more corners than this must be few: the squares of all corner counts sum up to at most three times the
+/// largest.
 const FEW_CORNERS: usize = 100;
 const MOST_WORK: usize = 3 * MOST_CORNERS * MOST_CORNERS;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// Checks a mesh whose positions are in their `place` already.
+/// Checks a mesh whose positions are already converted by their `place`.
 pub(crate) fn import(
     raw: &Raw,
     format: Format,
@@ -95,7 +94,7 @@ pub(crate) fn import(
     })
 }
 
-/// A vertex's name in an error.
+/// The name of a vertex in an error.
 fn vertex_name(vertex: usize, format: Format) -> String {
     match format {
         Format::Obj => format!("vertex {}", vertex + 1),
@@ -137,14 +136,14 @@ fn check_scale(raw: &Raw, format: Format) -> Result<()> {
         }
     }
     let extent = low.iter().zip(&high).map(|(l, h)| (h - l) * (h - l)).sum::<f64>().sqrt();
-    // If all vertices coincide, the error for degenerate triangles says more.
+    // If all vertices coincide, the error for degenerate triangles is clearer.
     if extent > 0.0 && extent < LEAST_EXTENT {
         return Err(ReadErrorKind::TooSmall { extent, least: LEAST_EXTENT });
     }
     Ok(())
 }
 
-/// Largest distance of a corner from where the file has it.
+/// Largest distance of a corner from its position in the file.
 fn position_error(raw: &Raw, origin: DVec3) -> f64 {
     let corners = raw.corner_positions().map(DVec3::from);
     let rounded = corners.map(rounding).fold(0.0, f64::max);
@@ -158,7 +157,7 @@ struct Triangle {
     face: usize,
 }
 
-/// Cuts faces into triangles, and lists those of fewer than three corners.
+/// Cuts faces into triangles, and lists the faces of fewer than three corners.
 fn triangles(raw: &Raw, report: &mut Report) -> Result<(Vec<Triangle>, Vec<usize>)> {
     let mut triangulator = Triangulator::new();
     let mut cut = Vec::new();
@@ -209,8 +208,8 @@ impl Surface {
         let first = first_coincident(&self.positions, tolerance.unwrap_or(0.0));
         let mut referenced = self.referenced();
         if is_stl {
-            // Every record repeats its corners, and the file has no vertex numbers, so the distinct positions get new
-            // ones.
+            // Every record repeats its corners, and the file has no vertex numbers, so the distinct positions are
+            // numbered anew.
             referenced.fill(true);
         }
         let coincident = (0..)
@@ -301,7 +300,7 @@ impl Surface {
         Ok(())
     }
 
-    /// Keeps the largest component, or all if a tree can; triangles that share a vertex are connected.
+    /// Keeps the largest component, or all if `largest` is false; triangles that share a vertex are connected.
     fn keep_components(&mut self, largest: bool, report: &mut Report) -> Result<()> {
         let corners: Vec<[u32; 3]> = self.faces.iter().map(|face| face.corners).collect();
         let components = connected_by_vertices(&corners);
@@ -354,8 +353,8 @@ impl Surface {
     }
 }
 
-/// The farthest that a point of dropped triangles may be from those that are kept. A point of a triangle is no farther from
-/// its longest edge than the triangle is high, nor from the two others together.
+/// Largest possible distance of a point of dropped triangles from the kept triangles. The distance of a triangle's
+/// points from its longest edge is at most its height, and so is their distance from the union of the other two edges.
 fn lost(dropped: &[[u32; 3]], kept: impl Iterator<Item = [u32; 3]>, positions: &[Vec3]) -> f64 {
     let edge = |a: u32, b: u32| (a.min(b), a.max(b));
     let edges = |[a, b, c]: [u32; 3]| [edge(a, b), edge(b, c), edge(c, a)];
@@ -364,14 +363,14 @@ fn lost(dropped: &[[u32; 3]], kept: impl Iterator<Item = [u32; 3]>, positions: &
         a.distance(b)
     };
     let mut thin = Vec::with_capacity(dropped.len());
-    // The distance of each edge of a dropped triangle from those that are kept.
+    // The distance of each edge of a dropped triangle from the kept triangles.
     let mut from_kept = HashMap::new();
     for &corners in dropped {
         let [a, b, c] = corners.map(|corner| positions[corner as usize].as_dvec3());
         let mut edges = edges(corners);
         edges.sort_by(|&a, &b| length(b).total_cmp(&length(a)).then(a.cmp(&b)));
         let doubled_area = (b - a).cross(c - a).length();
-        // One without area is no surface.
+        // A triangle without area is no surface.
         if doubled_area > 0.0 {
             from_kept.extend(edges.map(|edge| (edge, f64::INFINITY)));
             thin.push((edges, doubled_area / length(edges[0]), f64::INFINITY));
@@ -400,7 +399,7 @@ fn lost(dropped: &[[u32; 3]], kept: impl Iterator<Item = [u32; 3]>, positions: &
             break;
         }
     }
-    // A triangle that no kept one is near was a line by itself.
+    // A triangle that is connected to no kept one was an isolated sliver.
     let of = |&(_, height, distance): &(_, f64, f64)| {
         if distance.is_finite() { distance } else { height }
     };
@@ -410,8 +409,8 @@ fn lost(dropped: &[[u32; 3]], kept: impl Iterator<Item = [u32; 3]>, positions: &
 /// Most dropped triangles in a row whose heights are added up.
 const MOST_ROUNDS: usize = 64;
 
-/// Whether a triangle repeats a vertex, or could be a line segment rounded to f32: its height over its longest side is
-/// less than the distance between neighbouring f32 numbers of its coordinates' size.
+/// Whether a triangle repeats a vertex, or could be a line segment rounded to f32: its height is less than the distance
+/// between neighbouring f32 numbers of its coordinates' size.
 fn is_degenerate([a, b, c]: [u32; 3], positions: &[Vec3]) -> bool {
     if a == b || b == c || c == a {
         return true;

@@ -1,4 +1,4 @@
-//! A place in a file that is text, or text with binary numbers between its words.
+//! A position in a file that is text, or text with binary numbers between its words.
 
 use super::raw::{coordinate, excerpt};
 use super::scalar::{Endian, Scalar, index};
@@ -11,7 +11,7 @@ pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
     format: Format,
-    /// The order of binary numbers; `None` where numbers are text.
+    /// The byte order of binary numbers; `None` where numbers are text.
     pub binary: Option<Endian>,
 }
 
@@ -46,11 +46,11 @@ impl<'a> Cursor<'a> {
         let length = self.rest().iter().take_while(|byte| !byte.is_ascii_whitespace()).count();
         let word = &self.rest()[..length];
         self.at += length;
-        // Names in another encoding than UTF-8 are no keyword: what is read of them does not matter.
+        // A name in another encoding than UTF-8 is no keyword, so its text is not needed.
         (length > 0).then(|| std::str::from_utf8(word).unwrap_or("?"))
     }
 
-    /// The next word, which must be there.
+    /// The next word; its absence is an error.
     pub fn needed(&mut self, what: &str) -> Result<&'a str> {
         self.word().ok_or_else(|| self.truncated(format!("no {what}")))
     }
@@ -60,14 +60,14 @@ impl<'a> Cursor<'a> {
         self.word().map(str::to_ascii_uppercase)
     }
 
-    /// Passes so many bytes.
+    /// Skips so many bytes.
     pub fn skip(&mut self, bytes: usize) -> Result<&'a [u8]> {
         let skipped = self.rest().get(..bytes);
         self.at = (self.at + bytes).min(self.bytes.len());
         skipped.ok_or_else(|| self.truncated("bytes are missing".to_owned()))
     }
 
-    /// Leaves the line, and returns the rest of it.
+    /// Moves to the next line, and returns the rest of this one.
     pub fn line(&mut self) -> String {
         let length = self.rest().iter().take_while(|&&byte| byte != b'\n').count();
         let line = String::from_utf8_lossy(&self.rest()[..length]).trim().to_owned();
@@ -75,7 +75,7 @@ impl<'a> Cursor<'a> {
         line
     }
 
-    /// Leaves a section that nothing is needed of, with the word that ends it.
+    /// Skips a section that is not needed, including the word that ends it.
     pub fn skip_to(&mut self, end: &str) -> Result<()> {
         let found = self.rest().windows(end.len()).position(|window| window == end.as_bytes());
         let found = found.ok_or_else(|| self.truncated(format!("no '{end}'")))?;
@@ -93,14 +93,14 @@ impl<'a> Cursor<'a> {
         Ok(scalar.read(bytes, order))
     }
 
-    /// The next number, which is text whatever the others are.
+    /// The next number, which is text even in a binary file.
     pub fn text_number(&mut self) -> Result<f64> {
-        let word = self.needed("number where one must be")?;
+        let word = self.needed("number where one is expected")?;
         coordinate(word)
             .ok_or_else(|| self.malformed(format!("'{}' is not a number", excerpt(word))))
     }
 
-    /// A number that counts or numbers something.
+    /// The next number, which must be a whole number: a count or an index.
     pub fn index(&mut self, scalar: Scalar) -> Result<u64> {
         let number = self.number(scalar)?;
         self.whole(number)
@@ -112,10 +112,11 @@ impl<'a> Cursor<'a> {
     }
 
     pub fn whole(&self, number: f64) -> Result<u64> {
-        index(number).ok_or_else(|| self.malformed(format!("{number} is no number of a thing")))
+        index(number).ok_or_else(|| self.malformed(format!("{number} is not a count or an index")))
     }
 
-    /// Fails where so many elements, of at least so many bytes each, cannot follow: before memory is taken for them.
+    /// An error unless so many elements, of at least so many bytes each, can follow; called before memory is allocated
+    /// for them.
     pub fn check_room(&self, count: u64, bytes: usize, element: &str) -> Result<usize> {
         let most = self.rest().len() as u64 / bytes as u64 + 1;
         if count > most {
@@ -131,13 +132,13 @@ impl<'a> Cursor<'a> {
 
     /// The next numbers.
     pub fn numbers(&mut self, count: u64, scalar: Scalar, element: &str) -> Result<Vec<f64>> {
-        // In a text a digit and a space each.
+        // In text a number takes at least a digit and a space.
         let bytes = if self.binary.is_some() { scalar.bytes() } else { 2 };
         let count = self.check_room(count, bytes, element)?;
         (0..count).map(|_| self.number(scalar)).collect()
     }
 
-    /// The next numbers if they are wanted; otherwise they are passed, whatever a text has in their places.
+    /// The next numbers if they are wanted; otherwise they are skipped, whatever the text holds in their places.
     pub fn numbers_or_words(
         &mut self,
         count: u64,
@@ -152,7 +153,7 @@ impl<'a> Cursor<'a> {
             self.skip(count * scalar.bytes())?;
         } else {
             for _ in 0..self.check_room(count, 2, "values")? {
-                self.needed("value where one must be")?;
+                self.needed("value where one is expected")?;
             }
         }
         Ok(None)

@@ -6,7 +6,7 @@ use dibs_nostd::format::MAX_ROOTS;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// A file without a valid mesh or motion, and its defect.
+/// A file that is not a valid mesh or motion, and its defect.
 #[derive(Debug, Error)]
 #[error("{}: {kind}", path.display())]
 pub struct ReadError {
@@ -21,7 +21,7 @@ pub struct ReadError {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReadErrorKind {
-    /// The file is no frame of the tree.
+    /// The file is not a frame of the tree.
     #[error(transparent)]
     Frame(#[from] crate::FrameError),
     /// The operating system could not read it.
@@ -30,17 +30,17 @@ pub enum ReadErrorKind {
     /// It is empty.
     #[error("the file is empty; export the mesh again")]
     Empty,
-    /// Its content is none of the formats.
+    /// Its content is of no known format.
     #[error(
         "neither content nor extension is that of a format that is read (OBJ, STL, PLY, OFF, VTK, glTF, Gmsh, 3MF); convert it to one of them"
     )]
     UnknownFormat,
-    /// A known kind of file that is not read.
+    /// A known kind of file that cannot be read.
     #[error("this is {what}; {remedy}")]
     Foreign {
         /// The kind of file.
         what: String,
-        /// How it becomes one that is read.
+        /// How to convert it to one that can be read.
         remedy: String,
     },
     /// A format whose reader was left out of this program.
@@ -64,13 +64,13 @@ pub enum ReadErrorKind {
         "an archive (.npz) and not one array; save the frames alone by `numpy.save(name, frames)`"
     )]
     NumPyArchive,
-    /// A NumPy array that is no motion.
+    /// A NumPy array that is not a motion.
     #[error("no motion: {what}; save it by `numpy.save(name, frames)`, of frames x vertices x 3")]
     NumPy {
         /// What is wrong with it.
         what: String,
     },
-    /// A NumPy array of other things than real numbers.
+    /// A NumPy array of something other than real numbers.
     #[error(
         "no motion: numbers of the type '{descr}'; save it by `numpy.save(name, frames.astype('float32'))`"
     )]
@@ -93,7 +93,7 @@ pub enum ReadErrorKind {
         "missing in its series, which goes on with number {next}; add it, or number the files anew"
     )]
     Gap {
-        /// The next number that is there.
+        /// The next number that exists.
         next: u64,
     },
     /// A frame of a series is STL.
@@ -106,10 +106,10 @@ pub enum ReadErrorKind {
         "its triangles are not those of the series' first file; export every frame of one mesh, with vertices in the same order"
     )]
     OtherTriangles,
-    /// It does not follow its format.
+    /// It violates its format.
     #[error("not valid {format}{}: {what}; repair it or export the mesh again", at(*.line))]
     Malformed {
-        /// The format as which it was read.
+        /// The format that it was read as.
         format: Format,
         /// The line, counted from 1, where the format has lines.
         line: Option<usize>,
@@ -121,7 +121,7 @@ pub enum ReadErrorKind {
         "the {format} data ends early: {missing}; the file was cut off, copy or export it again"
     )]
     Truncated {
-        /// The format as which it was read.
+        /// The format that it was read as.
         format: Format,
         /// The missing part.
         missing: String,
@@ -146,7 +146,7 @@ pub enum ReadErrorKind {
     NoTriangles {
         /// Degenerate triangles in it.
         degenerate: usize,
-        /// What is in it and was left out.
+        /// Elements of the file that were left out.
         remarks: Vec<String>,
     },
     /// A face refers to a vertex that does not exist.
@@ -215,19 +215,19 @@ pub enum ReadErrorKind {
         /// The largest magnitude that is accepted.
         most: f64,
     },
-    /// The surface lies so far from the file's origin that the file's numbers do not hold its shape.
+    /// The surface lies so far from the file's origin that the file's numbers cannot represent its shape.
     #[error(
         "the surface is {extent:e} across and has coordinates up to {largest:e}, where the file's numbers are {resolution:e} apart, so that its shape is lost; export it in double precision, or nearer to the origin"
     )]
     TooFar {
         /// The largest magnitude of a coordinate (mm).
         largest: f64,
-        /// Distance between the file's numbers of that size.
+        /// Distance between neighbouring numbers of the file of that size.
         resolution: f64,
         /// The surface's largest extent along an axis.
         extent: f64,
     },
-    /// The surface lies so far from the origin that was given that f32 coordinates do not hold its shape.
+    /// The surface lies so far from the given origin that f32 coordinates cannot represent its shape.
     #[error(
         "{what} is {extent:e} across and up to {largest:e} from the origin of the mesh, where f32 numbers are {resolution:e} apart; give a file of the same mesh, or an origin near it"
     )]
@@ -236,12 +236,12 @@ pub enum ReadErrorKind {
         what: String,
         /// The largest magnitude of a coordinate (mm), from the origin.
         largest: f64,
-        /// Distance between f32 numbers of that size.
+        /// Distance between neighbouring f32 numbers of that size.
         resolution: f64,
         /// The surface's largest extent along an axis.
         extent: f64,
     },
-    /// The given unit is not the one that the file states.
+    /// The given unit differs from the one that the file states.
     #[error(
         "its lengths are in {}, as {format} files say, and not in {}: leave the unit out (--unit), or export the mesh as PLY, which states none",
         name(*.stated), name(*.given)
@@ -254,7 +254,7 @@ pub enum ReadErrorKind {
         /// The given one.
         given: Unit,
     },
-    /// The origin that was given is not a point.
+    /// The given origin is not a point.
     #[error("the origin is {origin}; give three finite numbers")]
     Origin {
         /// The origin given.
@@ -291,18 +291,18 @@ pub enum ReadErrorKind {
         /// Vertices that coincide with another one and were not welded.
         coincident: usize,
     },
-    /// Labels were to be made of the groups of a file that has none.
+    /// The file has no groups to make labels of.
     #[error("no groups of triangles: {}; give labels in a file of their own", super::groups::expected(*.format))]
     NoGroups {
         /// The format.
         format: Format,
     },
-    /// A face's group is not a label.
+    /// A face's group is not a number from 0 to 255.
     #[error("face {face} has {}, and labels are whole numbers from 0 to 255; number the groups so", group(*.value))]
     Label {
         /// The face, counted from 1.
         face: usize,
-        /// Its group's number; NaN where it has none.
+        /// Its group's number; NaN if it has no group.
         value: f64,
     },
     /// More groups than labels.
@@ -312,10 +312,10 @@ pub enum ReadErrorKind {
     ManyGroups {
         /// Groups in the file.
         groups: usize,
-        /// Labels that there are.
+        /// The number of possible labels.
         most: usize,
     },
-    /// A file that should hold a volume holds no tetrahedra, or other cells too.
+    /// A file that should hold a volume of tetrahedra holds none, or other cells as well.
     #[error(
         "{format} with {tetrahedra} tetrahedra and {others} other volume cells, where a volume of tetrahedra is needed: \
          give a Gmsh (.msh) or VTK (.vtk, .vtu) file of straight tetrahedra alone, or --nodes lattice:NX,NY,NZ"
@@ -328,7 +328,7 @@ pub enum ReadErrorKind {
         /// Its other volume cells.
         others: usize,
     },
-    /// A volume that cannot carry a surface.
+    /// A volume that cannot move a surface.
     #[error(transparent)]
     Volume(#[from] crate::nodes::VolumeError),
     /// The weld tolerance is not a length.

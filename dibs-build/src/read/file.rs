@@ -1,4 +1,4 @@
-//! Files read whole, and no further than they are long.
+//! Reads whole files, and bounds memory by their length.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -7,8 +7,8 @@ use std::path::Path;
 /// The bytes of a regular file.
 ///
 /// # Errors
-/// Those of the operating system; also for a folder, a pipe and a device, which have no length: reading one may wait, or
-/// fill the memory.
+/// Those of the operating system. Also for a folder, and for a pipe or a device, which have no length: reading them may
+/// block, or fill the memory.
 pub(crate) fn whole(path: &Path) -> io::Result<Vec<u8>> {
     first(path, u64::MAX)
 }
@@ -18,7 +18,7 @@ pub(crate) fn whole(path: &Path) -> io::Result<Vec<u8>> {
 /// # Errors
 /// As [`whole`].
 pub(crate) fn first(path: &Path, most: u64) -> io::Result<Vec<u8>> {
-    // Asked before the file is opened too, since opening a pipe waits for its other end.
+    // Checked before the file is opened as well, since opening a pipe blocks until its other end is open.
     check(&std::fs::metadata(path)?)?;
     let file = File::open(path)?;
     let metadata = file.metadata()?;
@@ -45,10 +45,10 @@ fn check(metadata: &std::fs::Metadata) -> io::Result<()> {
 /// The text of a regular file.
 ///
 /// # Errors
-/// As [`whole`]; also where it is no UTF-8.
+/// As [`whole`]. Also where it is not UTF-8.
 pub(crate) fn text(path: &Path) -> io::Result<String> {
     String::from_utf8(whole(path)?)
-        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is no text in UTF-8"))
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not text in UTF-8"))
 }
 
 #[cfg(test)]
@@ -66,7 +66,7 @@ mod tests {
         assert_eq!(whole(folder.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
     }
 
-    /// A device gives bytes without end, and a pipe without a writer keeps its reader waiting.
+    /// A device returns bytes without end, and a pipe without a writer blocks its reader.
     #[cfg(unix)]
     #[test]
     fn devices_and_pipes_are_refused_at_once() {

@@ -1,9 +1,9 @@
-//! Files that are something else than a mesh that is read: each by its name, with the command that converts it.
+//! Files of kinds that are not read: each with its name, and the command that converts it.
 
 use super::ReadErrorKind;
 use std::path::Path;
 
-/// How a file becomes a mesh that is read.
+/// How to convert a file to a mesh that can be read.
 enum Remedy {
     Meshio,
     Assimp,
@@ -16,7 +16,7 @@ enum Remedy {
     Fetch,
 }
 
-/// Where in a file its mark stands, the mark, the file's kind, and the remedy.
+/// Position of a kind's mark in the file, the mark, the kind, and the remedy.
 const MARKS: &[(usize, &[u8], &str, Remedy)] = &[
     (0, b"ISO-10303-21", "a STEP file", Remedy::Gmsh),
     (72, b"S      1", "an IGES file", Remedy::Gmsh),
@@ -52,7 +52,7 @@ const MARKS: &[(usize, &[u8], &str, Remedy)] = &[
     (0, b"PK\x03\x04", "a compressed file (ZIP)", Remedy::Unpack),
 ];
 
-/// Elements of XML, and the same.
+/// The same for XML: the root element, the kind, and the remedy.
 const ELEMENTS: &[(&[u8], &str, Remedy)] = &[
     (b"<COLLADA", "a COLLADA scene", Remedy::Assimp),
     (b"<X3D", "an X3D scene", Remedy::Assimp),
@@ -61,10 +61,10 @@ const ELEMENTS: &[(&[u8], &str, Remedy)] = &[
     (b"<amf", "an AMF file", Remedy::Assimp),
 ];
 
-/// Bytes in which the first element of an XML file stands.
+/// The first element of an XML file is expected within this many bytes.
 const BEGINNING: usize = 1024;
 
-/// What a file is, if it is known and not read.
+/// The error for a file of a kind that is known but not read.
 pub(super) fn named(bytes: &[u8], path: &Path) -> Option<ReadErrorKind> {
     let starts = |at: usize, mark: &[u8]| {
         let found = bytes.get(at..).and_then(|bytes| bytes.get(..mark.len()));

@@ -1,6 +1,6 @@
-//! Gmsh's meshes, versions 1, 2 and 4.1, text or binary: their triangles and quads, or the skin of their volumes.
+//! Gmsh's meshes, versions 1, 2 and 4.1, text or binary: their triangles and quads, or the boundary of their volumes.
 //!
-//! Our own reader, although `mshio` exists: that is of 2020, knows version 4.1 alone, and panics on numbers of other
+//! Our own reader, although `mshio` exists: it is from 2020, reads only version 4.1, and panics on numbers of other
 //! widths than it expects.
 
 use super::cursor::Cursor;
@@ -13,7 +13,7 @@ use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// How a file of a version writes its sections.
+/// How a version of the format writes its sections.
 #[derive(Clone, Copy, PartialEq)]
 enum Version {
     /// `$NOD` and `$ELM`, without a header.
@@ -69,7 +69,7 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     Ok(raw)
 }
 
-/// Reads the header, and leaves the file behind it: numbers may be binary from there on.
+/// Reads the header; numbers may be binary from there on.
 fn header(file: &mut Cursor<'_>) -> Result<Version> {
     let start = file.clone();
     match file.word() {
@@ -94,7 +94,7 @@ fn header(file: &mut Cursor<'_>) -> Result<Version> {
     }
     if is_binary {
         file.line();
-        // The number 1, in the order of the bytes.
+        // The number 1, in the byte order of the file.
         file.binary = Some(Endian::Little);
         if file.number(Scalar::I32)? != 1.0 {
             file.binary = Some(Endian::Big);
@@ -109,7 +109,7 @@ const FLATTEN: &str = "mesh it again with flat elements: `gmsh MODEL.geo -2 -ord
 #[derive(Default)]
 struct Mesh {
     raw: Raw,
-    /// The row of each node's number.
+    /// The row of each node by its number.
     row: HashMap<u64, u32>,
     /// The physical group of each surface and volume that has one, by its dimension and number.
     physical: HashMap<(u64, i64), f64>,
@@ -141,7 +141,7 @@ impl Mesh {
         for (dimension, &count) in (0..).zip(&counts) {
             for _ in 0..file.whole(count)? {
                 let entity = file.number(Scalar::I32)?;
-                // A point's place, or the corners of a box.
+                // A point's position, or the corners of a box.
                 file.numbers(if dimension == 0 { 3 } else { 6 }, Scalar::F64, "coordinates")?;
                 let physical = file.index(Scalar::U64)?;
                 let physical = file.numbers(physical, Scalar::I32, "physical groups")?;
@@ -160,7 +160,7 @@ impl Mesh {
                         "{entity} is in several physical groups, and a triangle has one label"
                     )));
                 }
-                // Its sign turns the surface, which the elements show.
+                // The sign reverses the surface, which the elements' winding already shows.
                 self.physical.insert((dimension, entity as i64), number.abs());
             }
         }
@@ -170,7 +170,7 @@ impl Mesh {
     fn nodes(&mut self, file: &mut Cursor<'_>) -> Result<()> {
         skip_line(file);
         let blocks = file.index(Scalar::U64)?;
-        // Nodes in all, their smallest and largest number.
+        // Number of nodes, their smallest and largest number.
         file.numbers(3, Scalar::U64, "numbers")?;
         for _ in 0..blocks {
             let dimension = file.index(Scalar::I32)?;
@@ -178,7 +178,7 @@ impl Mesh {
             let is_parametric = file.index(Scalar::I32)? == 1;
             let count = file.index(Scalar::U64)?;
             let tags = file.numbers(count, Scalar::U64, "nodes")?;
-            // A place on its curve or surface stands beside a node's coordinates.
+            // A node's coordinates may be followed by its parameters on its curve or surface.
             let more = if is_parametric { dimension.min(3) } else { 0 };
             for tag in tags {
                 let tag = file.whole(tag)?;
@@ -196,7 +196,7 @@ impl Mesh {
             let tag = file.index(Scalar::I32)?;
             self.node(file, tag)?;
             if file.binary.is_none() {
-                // Its place on a curve or surface may follow.
+                // Parameters on a curve or surface may follow.
                 file.line();
             } else if is_parametric {
                 let (dimension, _) = (file.index(Scalar::I32)?, file.number(Scalar::I32)?);
@@ -213,7 +213,7 @@ impl Mesh {
             *value = file.number(Scalar::F64)?;
         }
         if self.row.insert(tag, self.raw.positions.len() as u32).is_some() {
-            return Err(file.malformed(format!("node {tag} stands there twice")));
+            return Err(file.malformed(format!("node {tag} is defined twice")));
         }
         self.raw.positions.push(position);
         Ok(())
@@ -243,7 +243,7 @@ impl Mesh {
         skip_line(file);
         let mut done = 0;
         while done < count {
-            // Binary elements of one type stand together, below one header.
+            // Binary elements of one type are grouped, below one header.
             let (tag, kind, block, tags);
             if file.binary.is_some() {
                 kind = file.index(Scalar::I32)?;
@@ -256,7 +256,7 @@ impl Mesh {
             let nodes = nodes_of(kind)?;
             for _ in 0..block {
                 let tag = tag.map_or_else(|| file.index(Scalar::I32), Ok)?;
-                // The first is the physical group, 0 for none.
+                // The first tag is the physical group, 0 for none.
                 let tags = file.numbers(tags, Scalar::I32, "tags")?;
                 let group = tags.first().copied().unwrap_or(0.0);
                 let nodes = file.numbers(nodes, Scalar::I32, "nodes")?;
@@ -283,7 +283,7 @@ impl Mesh {
         Ok(())
     }
 
-    /// Triangles and quads are kept, and volumes for their skin; points and curves are passed over.
+    /// Keeps triangles and quads, and volumes for their boundary; skips points and curves.
     fn element(
         &mut self,
         file: &Cursor<'_>,
@@ -331,7 +331,7 @@ fn skip_line(file: &mut Cursor<'_>) {
     }
 }
 
-/// The nodes of an element of this type.
+/// The number of nodes of an element of this type.
 fn nodes_of(kind: u64) -> Result<u64> {
     let curved = match kind {
         15 => return Ok(1),

@@ -1,4 +1,4 @@
-//! A file's groups of faces, as labels of triangles.
+//! Converts a file's groups of faces to labels of triangles.
 
 use super::{Format, ReadErrorKind};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Groups {
     /// A label for each triangle of the mesh.
     pub labels: Vec<u8>,
-    /// The labels that occur, in their order.
+    /// The labels that occur, in ascending order.
     pub groups: Vec<Group>,
 }
 
@@ -23,17 +23,17 @@ pub struct Group {
     pub triangles: usize,
 }
 
-/// The groups of a file's faces, as written.
+/// The groups of a file's faces, as the file has them.
 #[derive(Default)]
 pub(crate) struct FaceGroups {
-    /// The number of each face's group. Which numbers are labels is checked last, since faces may be dropped.
+    /// The group number of each face. Whether a number is a valid label is checked last, since faces may be dropped.
     pub of_face: Vec<f64>,
-    /// Names of numbers.
+    /// Names of group numbers.
     pub names: Vec<(f64, String)>,
 }
 
 impl FaceGroups {
-    /// The number of a name. Names are numbered in their order.
+    /// The number of a name. Names are numbered in the order of their first use.
     pub fn number(&mut self, name: &str) -> f64 {
         if let Some(&(number, _)) = self.names.iter().find(|(_, other)| other == name) {
             return number;
@@ -43,11 +43,11 @@ impl FaceGroups {
         number
     }
 
-    /// The labels of triangles that come from these faces, counted from 1.
+    /// The labels of triangles that come from these faces, which are counted from 1.
     ///
     /// # Errors
-    /// [`ReadErrorKind::Label`] where a group's number is no label, [`ReadErrorKind::ManyGroups`] where there are more
-    /// names than labels.
+    /// [`ReadErrorKind::Label`] where a group's number is not a label, [`ReadErrorKind::ManyGroups`] where there are
+    /// more names than labels.
     pub fn labels(
         &self,
         faces: impl Iterator<Item = usize>,
@@ -74,10 +74,10 @@ impl FaceGroups {
     }
 }
 
-/// Labels that there are.
+/// Number of possible labels.
 const MOST: usize = 256;
 
-/// What a format's groups are, for a file that has none.
+/// For a file that has no groups: how its format would state them.
 pub(super) fn expected(format: Format) -> &'static str {
     match format {
         Format::Obj => "an OBJ file has them as statements `g` or `usemtl`",
@@ -89,7 +89,7 @@ pub(super) fn expected(format: Format) -> &'static str {
     }
 }
 
-/// Whether an array of a value for each cell has labels.
+/// Whether cell data of this name are labels.
 pub(super) fn is_name(name: &str) -> bool {
     ["label", "labels", "regionid"].iter().any(|known| name.eq_ignore_ascii_case(known))
 }

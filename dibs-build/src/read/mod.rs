@@ -50,14 +50,14 @@ pub(crate) use raw::excerpt;
 pub(crate) use scalar::{Endian, Scalar};
 use std::path::Path;
 
-/// A mesh that passed every check, and the report of findings and repairs.
+/// A mesh that passed every check, and the report on findings and repairs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Import {
     /// The surface: at most 64 connected components without degenerate or duplicate triangles.
     pub mesh: Mesh,
     /// Counts of the elements read, welded, dropped and found.
     pub report: Report,
-    /// The labels that the file's groups give its triangles, where [`ReadOptions::groups`] asks for them.
+    /// The labels that the file's groups give its triangles, if [`ReadOptions::groups`] is set.
     pub groups: Option<Groups>,
     /// The face of the file, counted from 0, that each triangle of the mesh comes from.
     pub faces: Vec<u32>,
@@ -70,21 +70,22 @@ pub struct ReadOptions {
     /// exactly equal f32 coordinates (`-0.0` equals `0.0`).
     ///
     /// `None` decides by the file: triangle soup (STL, and an indexed file in which no two faces share a vertex) is
-    /// welded exactly; other indexed files are not welded, because two sheets of tissue that touch in the rest shape
-    /// may part later. The [`Report`] counts the coincident vertices that were left apart.
+    /// welded exactly. Other indexed files are not welded, because two sheets of tissue that touch in the rest shape
+    /// may separate later. The [`Report`] counts coincident vertices that were not welded.
     pub weld_tolerance: Option<f32>,
     /// Make degenerate and duplicate triangles an error, instead of dropping and counting them.
     pub strict: bool,
     /// Keep only the connected component with the most triangles.
     pub largest_component: bool,
-    /// The unit of the file's lengths, which become millimetres. `None` takes the unit that the file states, as glTF
-    /// (always metres) and 3MF do, and millimetres of a file that states none. A unit other than the stated one is refused.
+    /// The unit of the file's lengths, which are converted to millimetres. `None` takes the unit that the file states,
+    /// as glTF (always metres) and 3MF do, or millimetres if it states none. A unit other than the stated one is an
+    /// error.
     pub unit: Option<Unit>,
-    /// The point of the file, in millimetres, that the mesh's positions count from: [`Mesh::origin`].
+    /// The point of the file, in millimetres, that the mesh's positions are relative to: [`Mesh::origin`].
     ///
-    /// `None` decides by the file: zero, or where f32 would round the mesh by more than 2^-20 of its extent the centre
-    /// of its bounding box, rounded to a number of few bits. A mesh of 100 mm in double precision is recentred from a
-    /// coordinate of about 2 m on.
+    /// `None` decides by the file. The origin is zero, unless f32 would round the mesh by more than 2^-20 of its
+    /// extent: then it is the centre of its bounding box, rounded to a number of few bits. A mesh of 100 mm in double
+    /// precision is recentred from a coordinate of about 2 m on.
     pub origin: Option<DVec3>,
     /// Make labels of the file's groups ([`Import::groups`]), or fail where it has none: the names of OBJ's `g` and
     /// `usemtl`, numbered from 0 in the order of their first face; the numbers of Gmsh's physical groups, 0 for none;
@@ -143,7 +144,7 @@ impl ReadOptions {
         Ok(import)
     }
 
-    /// Checks a mesh in memory as [`read`](Self::read) checks that of a file: with the same repairs, and the same report.
+    /// Checks a mesh in memory as [`read`](Self::read) checks a file's: with the same repairs, and the same report.
     ///
     /// # Errors
     /// As [`read`](Self::read).
@@ -201,7 +202,7 @@ impl ReadOptions {
 /// The unit of a file's lengths: the one that it states, or else the given one, or millimetres.
 ///
 /// # Errors
-/// [`ReadErrorKind::OtherUnit`] where both are there and differ: lengths are converted once.
+/// [`ReadErrorKind::OtherUnit`] if both are given and differ: lengths are converted only once.
 pub(crate) fn unit_of(
     format: Format,
     stated: Option<Unit>,
@@ -215,10 +216,10 @@ pub(crate) fn unit_of(
     }
 }
 
-/// The positions of a mesh file that is a frame (mm, from `origin`), and its faces.
+/// The positions of a mesh file that is a frame (mm, relative to `origin`), and its faces.
 ///
 /// # Errors
-/// [`ReadErrorKind::UnnumberedFrame`] for STL, whose vertices may be others than the tree's.
+/// [`ReadErrorKind::UnnumberedFrame`] for STL, whose vertices may be numbered otherwise than the tree's.
 pub(crate) fn frame(
     path: &Path,
     number: usize,
@@ -249,7 +250,7 @@ pub(crate) fn volume(
     Ok((nodes, raw.tetrahedra))
 }
 
-/// The format of a file, and its vertices and polygons, with their groups if asked for.
+/// The format of a file, and its vertices and polygons, with their groups if requested.
 pub(crate) fn elements(
     bytes: Vec<u8>,
     path: &Path,
@@ -266,7 +267,7 @@ pub(crate) fn elements(
         Format::Off => off::read(&bytes),
         Format::Vtk => vtk::read(&bytes, groups),
         Format::Gmsh => gmsh::read(&bytes, groups),
-        // No content is taken for it.
+        // No file is recognised as this format.
         Format::Memory => Err(ReadErrorKind::UnknownFormat),
         #[cfg(feature = "formats")]
         Format::Vtp => vtp::read(&bytes, groups),
@@ -280,17 +281,17 @@ pub(crate) fn elements(
     Ok((format, raw))
 }
 
-/// Reads and checks a mesh file in OBJ, STL (ASCII or binary), PLY (ASCII, little- or big-endian),
-/// OFF, legacy VTK or Gmsh's format, with the feature `formats` also in VTK's XML, glTF or 3MF, told apart by content.
-/// Polygons are triangulated, soup is welded, degenerate and
-/// duplicate triangles are dropped and counted.
+/// Reads and checks a mesh file in OBJ, STL (ASCII or binary), PLY (ASCII, little- or big-endian), OFF, legacy VTK or
+/// Gmsh's format; with the feature `formats` also in VTK's XML, glTF or 3MF. Formats are recognised by content.
+/// Polygons are triangulated, soup is welded, degenerate and duplicate triangles are dropped and counted.
 ///
 /// Vertex numbers are those of the file, even after welding and dropping: an unused vertex keeps its row in
 /// [`Mesh::positions`], so a recorded [`Motion`](crate::Motion) still fits. STL has no vertex numbers: distinct
 /// positions are numbered in order of first appearance.
 ///
-/// The whole file is held in memory. Memory is bounded by the size of the file, and of regular files that it names, not by a
-/// count that they claim. Pipes and devices are refused. Elements that are left out are [`Report::remarks`].
+/// The whole file is held in memory. Memory is bounded by the size of the file and of regular files that it refers to,
+/// not by a count that they claim. Pipes and devices are refused. Elements that are left out are listed in
+/// [`Report::remarks`].
 ///
 /// # Errors
 /// [`ReadError`], one sentence that names the file, the offending element and the remedy.

@@ -15,7 +15,7 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw, ReadErrorKind> {
     let mut continued = String::new();
     for (number, line) in lines(bytes) {
         let line = line.trim();
-        // A comment is not continued, since it may end in a path's backslash.
+        // A comment has no continuation line, since it may end with the backslash of a path.
         if continued.is_empty() && line.starts_with('#') {
             continue;
         }
@@ -56,12 +56,12 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw, ReadErrorKind> {
     Ok(raw)
 }
 
-/// The groups of faces: each pair of a group's and a material's name that occurs is one.
+/// The groups of faces: one for each combination of a group's and a material's name that occurs.
 #[derive(Default)]
 struct Names {
     group: String,
     material: String,
-    /// The number of that pair, once a face has it.
+    /// The number of the present combination, once a face has it.
     number: Option<f64>,
     were_given: bool,
     groups: FaceGroups,
@@ -88,7 +88,7 @@ impl Names {
     }
 }
 
-/// Statements that are left out.
+/// Counts of statements that are left out.
 #[derive(Default)]
 struct Others {
     lines: usize,
@@ -110,7 +110,7 @@ fn statement(
     match words.next() {
         Some("v") => {
             raw.positions.push(position(&mut words, Format::Obj, number)?);
-            // One more value is a weight, three or four are a colour.
+            // One more value is a weight; three or four more are a colour.
             if let (Some(weight), None) = (words.next(), words.next())
                 && weight.parse() != Ok(1.0)
             {
@@ -129,7 +129,7 @@ fn statement(
                 let Ok(index) = vertex.parse::<i64>() else {
                     return Err(malformed(format!("'{}' is not a vertex number", excerpt(word))));
                 };
-                // Negative numbers count back from the vertices so far.
+                // Negative numbers count back from the latest vertex.
                 let row = if index < 0 { index + raw.positions.len() as i64 } else { index - 1 };
                 raw.corners.push(u32::try_from(row).map_err(|_| raw.bad_index(index))?);
             }

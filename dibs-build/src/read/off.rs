@@ -1,7 +1,7 @@
 //! OFF: a stream of numbers after the word OFF.
 //!
-//! Our own reader, because `off-rs` accepts one spelling of the header and one colour format announced in advance, and
-//! real files mix them.
+//! Our own reader, because `off-rs` accepts one spelling of the header and one colour format that is declared in
+//! advance, and real files mix them.
 
 use super::raw::{Raw, excerpt, lines, position};
 use super::{Format, ReadErrorKind};
@@ -28,8 +28,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
         let what = format!("'{}' is no header of an OFF in three dimensions", excerpt(keyword));
         return Err(malformed(number, what));
     }
-    // The counts may be on the header's line. Normals, colours and texture, which prefixes of OFF announce, follow the
-    // position on a vertex's line.
+    // The counts may be on the header's line. Normals, colours and texture coordinates, which prefixes of OFF declare,
+    // follow the position on a vertex's line.
     let (number, counts) = match rest.trim() {
         "" => lines.next().ok_or_else(|| truncated("counts"))?,
         rest => (number, rest.to_owned()),
@@ -70,8 +70,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     Ok(raw)
 }
 
-/// Whether a word begins a file of points in three dimensions: OFF after letters for texture, colours and normals. A small n
-/// or a 4 before OFF announce other dimensions.
+/// Whether a word begins a file of points in three dimensions: OFF after prefixes for texture, colours and normals. The
+/// prefixes `n` and `4` declare other dimensions.
 pub(super) fn is_header(word: &str) -> bool {
     let letters = word.strip_suffix("OFF").map_or("STCNstcn", |_| "STCN");
     let prefix = word.len().checked_sub(3).and_then(|end| word.split_at_checked(end));

@@ -1,4 +1,4 @@
-//! From a file's coordinates to a mesh's: in millimetres, and from an origin near the mesh, where f32 holds them.
+//! Converts a file's coordinates to a mesh's: millimetres, relative to an origin near the mesh where f32 requires it.
 
 // Requirement: M-05
 
@@ -7,47 +7,46 @@ use super::raw::Raw;
 use crate::Unit;
 use glam::{DVec3, Vec3};
 
-/// Rounding by this part of a mesh's extent is about the accuracy of a query there; a mesh is recentred where f32 would
-/// round it more.
+/// A mesh is recentred if f32 would round it by more than this fraction of its extent: about the accuracy of a query.
 const MOST_ROUNDING: f64 = 1.0 / 1_048_576.0;
 
-/// Distance between neighbouring numbers, as a part of the mesh's extent, above which its shape is lost.
+/// Distance between neighbouring numbers, as a fraction of the mesh's extent, above which the shape is lost.
 const MOST_RESOLUTION: f64 = 1e-4;
 
-/// Lengths beyond this are none of an organ in any unit, and their sums might overflow.
+/// Lengths beyond this are implausible for an organ in any unit, and their sums might overflow.
 const MOST_DISTANCE: f64 = 1e18;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// The place of a file's coordinates among a mesh's.
+/// The conversion of a file's coordinates to a mesh's.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     /// The unit of the file's lengths.
     pub unit: Unit,
-    /// The mesh's origin, in millimetres from the file's.
+    /// The mesh's origin, in millimetres in the file's coordinates.
     pub origin: DVec3,
 }
 
 impl Place {
-    /// A position of the file, not yet rounded.
+    /// Converts a position of the file, without rounding it.
     pub fn of(&self, position: [f64; 3]) -> DVec3 {
         DVec3::from(position) * self.unit.millimetres() - self.origin
     }
 
-    /// The place of a mesh. Its origin is the given one; otherwise the file's own, or where f32 would spoil the mesh the
-    /// centre of its bounding box.
+    /// The conversion for a mesh. Its origin is the given one; otherwise zero, or where f32 would round the mesh too
+    /// much the centre of its bounding box.
     ///
     /// The centre is rounded to a power of two of about an eighth of the extent, so that few bits hold it and f64
     /// subtracts it exactly.
     ///
     /// # Errors
-    /// [`ReadErrorKind::TooFar`] where the file's numbers do not hold the shape.
+    /// [`ReadErrorKind::TooFar`] where the file's numbers cannot represent the shape.
     pub fn of_mesh(raw: &Raw, unit: Unit, origin: Option<DVec3>) -> Result<Self> {
         let unmoved = Self { unit, origin: DVec3::ZERO };
         let positions = || raw.corner_positions();
         let bounds = Bounds::of(positions().map(|position| unmoved.of(position)));
         let extent = bounds.extent();
-        // Later checks say more of positions that coincide, or are too large or not finite.
+        // Later checks have clearer errors for positions that coincide, or are too large or not finite.
         let is_surface = extent > f32::MIN_POSITIVE.into() && bounds.largest() <= MOST_DISTANCE;
         let is_coarse = bounds.resolution(f32::EPSILON.into()) > MOST_RESOLUTION * extent;
         if is_surface && is_coarse {
@@ -68,11 +67,11 @@ impl Place {
         Ok(Self { origin: (bounds.centre() / step).round() * step, ..unmoved })
     }
 
-    /// The positions of a frame, rounded to f32. `name` is the frame's in an error.
+    /// The positions of a frame, rounded to f32. Errors name the frame by `name`.
     ///
     /// # Errors
-    /// [`ReadErrorKind::TooFar`] where the file's numbers do not hold the shape, [`ReadErrorKind::Elsewhere`] where f32
-    /// does not hold it so far from the origin.
+    /// [`ReadErrorKind::TooFar`] where the file's numbers cannot represent the shape, [`ReadErrorKind::Elsewhere`]
+    /// where f32 numbers so far from the origin cannot.
     pub fn frame(&self, positions: &[[f64; 3]], name: impl Fn() -> String) -> Result<Vec<Vec3>> {
         let in_file = Self { origin: DVec3::ZERO, ..*self };
         let bounds = Bounds::of(positions.iter().map(|&position| in_file.of(position)));
@@ -83,7 +82,7 @@ impl Place {
         Ok(positions.iter().map(|&position| self.of(position).as_vec3()).collect())
     }
 
-    /// The positions of frame `number` of a motion in their place.
+    /// The converted positions of frame `number` of a motion.
     ///
     /// # Errors
     /// [`ReadErrorKind::NonFinite`], and those of [`frame`](Self::frame).
@@ -101,20 +100,20 @@ impl Place {
     }
 }
 
-/// The distance of a position from the nearest f32 numbers.
+/// The distance of a position from its rounding to f32.
 pub(super) fn rounding(position: DVec3) -> f64 {
     position.distance(position.as_vec3().as_dvec3())
 }
 
-/// Neighbouring f32 numbers must be much closer than the surface is large, or its shape is lost. Returns the largest
-/// extent along an axis.
+/// Checks that neighbouring f32 numbers are much closer than the surface is large: otherwise its shape is lost. Returns
+/// the largest extent along an axis.
 pub(super) fn check_nearness(
     positions: impl Iterator<Item = DVec3>,
     name: impl Fn() -> String,
 ) -> Result<f64> {
     let bounds = Bounds::of(positions);
     let (extent, resolution) = (bounds.extent(), bounds.resolution(f32::EPSILON.into()));
-    // If all vertices coincide, the error for degenerate triangles says more.
+    // If all vertices coincide, the error for degenerate triangles is clearer.
     if extent > 0.0 && resolution > MOST_RESOLUTION * extent {
         let (what, largest) = (name(), bounds.largest());
         return Err(ReadErrorKind::Elsewhere { what, largest, resolution, extent });
@@ -122,8 +121,8 @@ pub(super) fn check_nearness(
     Ok(extent)
 }
 
-/// Far from the origin the file's numbers must have more digits than f32. If each of them is an f32, and some has its
-/// last bit, then they were rounded to f32 when they were written.
+/// Checks that far from the origin the file's numbers have more digits than f32. If each number is an f32, and some use
+/// its last bit, they were rounded to f32 when they were written.
 fn check_digits<P: Iterator<Item = [f64; 3]>>(
     bounds: &Bounds,
     positions: impl Fn() -> P,
@@ -140,7 +139,7 @@ fn check_digits<P: Iterator<Item = [f64; 3]>>(
     Ok(())
 }
 
-/// A box around positions.
+/// The bounding box of positions.
 struct Bounds {
     low: DVec3,
     high: DVec3,
@@ -155,7 +154,7 @@ impl Bounds {
         })
     }
 
-    /// The longest side; not above 0 where there are no two positions.
+    /// The longest side; 0 or less for fewer than two positions.
     fn extent(&self) -> f64 {
         (self.high - self.low).max_element()
     }
@@ -168,7 +167,7 @@ impl Bounds {
         (self.low + self.high) / 2.0
     }
 
-    /// Distance between neighbouring numbers of the largest coordinate's size.
+    /// Distance between neighbouring numbers of the size of the largest coordinate.
     fn resolution(&self, epsilon: f64) -> f64 {
         self.largest() * epsilon
     }

@@ -37,7 +37,7 @@ pub(super) fn read(mut bytes: Vec<u8>) -> Result<Raw, ReadErrorKind> {
                     face.add_to(&mut raw)?;
                 }
             }
-            // Several strips stand in one list, each ended by -1.
+            // A list holds several strips, each ended by -1.
             name if name.contains("strip") => {
                 for strips in corners(&mut reader, element, &header, &mut raw)? {
                     strips.add_strips_to(&mut raw)?;
@@ -120,7 +120,7 @@ fn corners<T: BufRead>(
     let mut renamed = ElementDef { properties: Default::default(), ..element.clone() };
     for property in element.properties.values() {
         let mut property = property.clone();
-        // Another list may have that name, and be of other numbers.
+        // Another list may already have the usual name, and hold other numbers.
         if property.name == list {
             NAMES[0].clone_into(&mut property.name);
         } else if property.name == NAMES[0] {
@@ -148,15 +148,15 @@ fn make_header_ascii(bytes: &mut [u8]) {
     }
 }
 
-/// Refuses an element count that the rest of the file cannot hold, before anything is allocated
-/// for it. Elements without properties take no bytes in binary, so their count would be unbounded.
+/// Refuses an element count that does not fit in the rest of the file, before anything is allocated for it. Elements
+/// without properties take no bytes in binary, so their count would be unbounded.
 fn check_count(
     element: &ElementDef,
     encoding: Encoding,
     remaining: usize,
 ) -> Result<(), ReadErrorKind> {
     let least_bytes: usize = match encoding {
-        // A digit and a separator each; the last line may lack its end.
+        // A number takes at least a digit and a separator; the last line may lack its end.
         Encoding::Ascii => 2 * element.properties.len(),
         _ => element
             .properties
@@ -194,7 +194,7 @@ fn malformed(error: &ParseError) -> ReadErrorKind {
             missing: "there are fewer elements than its header says".to_owned(),
         };
     }
-    // The first line has the message, the others repeat the input.
+    // The first line is the message, the others repeat the input.
     let text = error.to_string();
     let first = text.lines().next().unwrap_or_default();
     let what = first.split_once(": ").map_or(first, |(_, what)| what).trim_end_matches('.');
@@ -252,7 +252,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-/// A face fills one of the two lists, by the file's type of vertex numbers.
+/// Vertex numbers of a face: in one of two lists, depending on their type in the file.
 #[derive(Default)]
 struct Face {
     signed: Vec<i32>,
@@ -278,7 +278,7 @@ impl Face {
         for strip in numbers.split(|&number| number == -1 || number == i64::from(u32::MAX)) {
             for (number, triangle) in strip.windows(3).enumerate() {
                 let [a, b, c] = [triangle[0], triangle[1], triangle[2]];
-                // Every second one is wound the other way.
+                // Every second triangle is wound the other way.
                 for corner in if number % 2 == 0 { [a, b, c] } else { [b, a, c] } {
                     raw.corners.push(u32::try_from(corner).map_err(|_| raw.bad_index(corner))?);
                 }

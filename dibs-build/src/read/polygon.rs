@@ -96,9 +96,8 @@ impl Triangulator {
     }
 }
 
-/// Ear clipping may leave out corners on a straight stretch. A neighbouring face uses them, and a deformed surface
-/// bends there. So each is restored in the one triangle that has the stretch as an edge. False if there is no such
-/// triangle.
+/// Ear clipping may leave out corners between collinear edges. A neighbouring face uses them, and a deformed surface
+/// bends there. So each is restored in the triangle whose edge it lies on. False if there is no such triangle.
 fn restore_straight_corners(count: u32, ears: &mut Vec<u32>) -> bool {
     let mut used = vec![false; count as usize];
     for &ear in &*ears {
@@ -187,7 +186,7 @@ mod tests {
 
     #[test]
     fn corners_that_ear_clipping_left_out_are_restored() {
-        // A square that lacks the three corners on its first side.
+        // A square without the three corners on its first side.
         let mut ears = vec![0, 4, 5, 0, 5, 6];
         assert!(restore_straight_corners(7, &mut ears));
         let (ears, _) = ears.as_chunks::<3>();
@@ -204,8 +203,8 @@ mod tests {
         assert_eq!(triangles.len(), 2);
     }
 
-    /// The triangles of any polygon have its area and orientation; those of a simple one do not overlap and use every
-    /// corner.
+    /// The triangles of any polygon have its area and orientation. Those of a simple polygon do not overlap and use
+    /// every corner.
     #[test]
     fn random_polygons_keep_their_area() {
         let mut state = 1_u32;

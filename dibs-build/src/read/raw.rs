@@ -1,4 +1,4 @@
-//! A file's vertices and polygons, as written; and the lines and numbers of the text formats.
+//! A file's vertices and polygons as written; and parsing of lines and numbers in the text formats.
 
 use super::groups::FaceGroups;
 use super::{Format, ReadErrorKind};
@@ -8,7 +8,7 @@ use std::borrow::Cow;
 /// The contents of a file, before the checks that need all of it.
 #[derive(Default)]
 pub(crate) struct Raw {
-    /// f64, so that the rounding to f32 is known, and a coordinate too large for f32 differs from an infinite one.
+    /// In f64: so the rounding to f32 can be measured, and a coordinate too large for f32 differs from an infinite one.
     pub positions: Vec<[f64; 3]>,
     /// The corners of all polygons, one after the other.
     pub corners: Vec<u32>,
@@ -16,14 +16,14 @@ pub(crate) struct Raw {
     pub ends: Vec<usize>,
     /// The number that the file gives to its first vertex.
     pub first_vertex: u32,
-    /// The group of each polygon, where groups are asked for and the file has them.
+    /// The group of each polygon, if groups are requested and the file has them.
     pub groups: Option<FaceGroups>,
     /// The unit of its lengths, where the file states it.
     pub unit: Option<Unit>,
-    /// Volume cells: the corners of tetrahedra, and the number of others.
+    /// Corners of the tetrahedra among the volume cells, and the number of other cells.
     pub tetrahedra: Vec<[u32; 4]>,
     pub other_cells: usize,
-    /// What was left out or interpreted: warnings.
+    /// Warnings: elements that were left out or interpreted.
     pub remarks: Vec<String>,
 }
 
@@ -32,7 +32,7 @@ impl Raw {
         Self { first_vertex, ..Self::default() }
     }
 
-    /// A warning where there are such things in the file.
+    /// Adds a warning if `count` is not 0.
     pub fn remark(&mut self, count: usize, one: &str, several: &str) {
         match count {
             0 => (),
@@ -56,7 +56,8 @@ impl Raw {
         }
     }
 
-    /// The position of each corner of each polygon. Corners without a vertex are left to another check.
+    /// The position of each corner of each polygon. Corners that refer to no vertex are skipped; another check reports
+    /// them.
     pub fn corner_positions(&self) -> impl Iterator<Item = [f64; 3]> {
         self.corners.iter().filter_map(|&corner| self.positions.get(corner as usize).copied())
     }
@@ -82,11 +83,11 @@ pub(crate) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, str>)>
         .map(|(i, line)| (i + 1, line))
 }
 
-/// A coordinate in a text. It rounds to the f32 nearest to the text's number.
+/// Parses a coordinate. Its rounding to f32 is the f32 nearest to the text's number.
 pub(crate) fn coordinate(token: &str) -> Option<f64> {
     let (narrow, wide) = (token.parse::<f32>().ok()?, token.parse::<f64>().ok()?);
     if narrow.is_finite() {
-        // Rounding twice could give another f32, if the f64 lies midway between two.
+        // Rounding to f64 and then to f32 could give another f32 if the f64 lies midway between two f32.
         return Some(match f64::from(narrow) {
             _ if wide as f32 == narrow => wide,
             nearest if nearest > wide => wide.next_up(),
@@ -121,7 +122,7 @@ pub(crate) fn position<'a>(
     Ok(position)
 }
 
-/// The start of a text, short enough for a message.
+/// The beginning of a text, short enough for a message.
 pub(crate) fn excerpt(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).take(40).collect()
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::path::Path;
 
-/// The format of a mesh: of a file, or none.
+/// The format of a mesh file; or none, for a mesh in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -40,7 +40,8 @@ impl Format {
     /// The format of a mesh file: by its content, or where that does not decide by its extension.
     ///
     /// # Errors
-    /// [`ReadErrorKind::Foreign`] names a file that is something else, [`ReadErrorKind::UnknownFormat`] is any other.
+    /// [`ReadErrorKind::Foreign`] for a known kind of file that is not read, otherwise
+    /// [`ReadErrorKind::UnknownFormat`].
     pub fn of(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, ReadErrorKind> {
         super::sniff::format(bytes, path.as_ref())
     }
@@ -94,12 +95,12 @@ impl fmt::Display for Format {
 /// Counts of the elements read, welded, dropped and found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// The content's format.
+    /// The format of the content.
     pub format: Format,
-    /// The unit of the file's lengths, which became millimetres.
+    /// The unit of the file's lengths, which were converted to millimetres.
     #[serde(serialize_with = "symbol", deserialize_with = "unit")]
     pub unit: Unit,
-    /// Whether the file name's extension disagrees.
+    /// Whether the file name's extension names another format.
     pub extension_disagrees: bool,
     /// Rows of the mesh's vertex table.
     pub vertices: usize,
@@ -109,15 +110,16 @@ pub struct Report {
     pub faces: usize,
     /// Triangles of the mesh.
     pub triangles: usize,
-    /// Triangles of the file, those too that were dropped; polygons count as the triangles that they were cut into.
+    /// Triangles of the file, including those that were dropped; a polygon counts as the triangles that it was cut
+    /// into.
     pub file_triangles: usize,
     /// Faces with more than three corners, cut into triangles.
     pub polygons_triangulated: usize,
-    /// Of these, faces that touch or cross themselves in their plane, or have no area: cut into a fan.
+    /// Faces among these that touch or cross themselves in their plane, or have no area: cut into a fan.
     pub polygons_not_simple: usize,
     /// Vertices merged into another one.
     pub welded: usize,
-    /// Vertices that coincide with another one but were left apart, because the file is indexed.
+    /// Vertices that coincide with another one but were not welded, because the file is indexed.
     pub coincident: usize,
     /// Degenerate triangles (and faces of fewer than three corners) that were dropped.
     pub dropped_degenerate: usize,
@@ -129,18 +131,19 @@ pub struct Report {
     pub border_edges: usize,
     /// Edges of three or more triangles.
     pub non_manifold_edges: usize,
-    /// Edges whose two triangles run the same way along them, so that their normals disagree.
+    /// Edges whose two triangles run along them in the same direction, so that their normals disagree.
     pub inconsistent_edges: usize,
     /// The surface's largest extent along an axis, in the mesh's unit.
     pub extent: f64,
-    /// The point of the file (mm) that the mesh's positions count from.
+    /// The point of the file (mm) that the mesh's positions are relative to.
     pub origin: [f64; 3],
-    /// Whether the reader chose that point, because f32 would lose the shape so far from the file's own origin.
+    /// Whether the reader chose that point, because f32 cannot represent the shape so far from the file's origin.
     pub recentred: bool,
-    /// Largest distance of the file's surface from the mesh (mm): by rounding vertices to f32 (0 for files that hold f32),
-    /// by welding, and by dropping triangles too low for f32. The tree adds it to the accuracy of every answer.
+    /// Largest distance of the file's surface from the mesh (mm): caused by rounding vertices to f32 (0 for files that
+    /// hold f32), by welding, and by dropping triangles too thin for f32. The tree adds it to the error of every
+    /// answer.
     pub position_error: f64,
-    /// Elements of the file that were left out or interpreted, a sentence each; they are warnings, too.
+    /// Elements of the file that were left out or interpreted, one sentence each; they are warnings as well.
     pub remarks: Vec<String>,
 }
 
@@ -155,7 +158,7 @@ fn unit<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Unit, D::Error> {
 }
 
 impl Report {
-    /// Warnings for a user, one sentence for each change and each oddity.
+    /// Warnings for a user: one sentence for each repair and each oddity.
     pub fn warnings(&self) -> impl Iterator<Item = String> + use<> {
         let mut warnings = self.remarks.clone();
         let mut warn = |count: usize, one: &str, several: &str| match count {
@@ -214,17 +217,17 @@ impl Report {
         warnings.into_iter()
     }
 
-    /// Rows of the vertex table that belong to no triangle because their vertex was welded to another.
+    /// Rows of the vertex table that no triangle uses because their vertex was welded to another.
     fn welded_rows(&self) -> usize {
         match self.format {
-            // Their rows were removed.
+            // Welded rows of these formats were removed.
             Format::StlAscii | Format::StlBinary => 0,
             _ => self.welded.min(self.unreferenced_vertices),
         }
     }
 }
 
-/// A number of things whose plural ends in "s".
+/// A count and a noun whose plural ends in "s".
 fn counted(count: usize, thing: &str) -> String {
     format!("{count} {thing}{}", if count == 1 { "" } else { "s" })
 }

@@ -1,4 +1,4 @@
-//! Numbers as files hold them: text, or bytes of a type and an order.
+//! Numbers as files hold them: as text, or as bytes of a type and a byte order.
 
 /// The type of an array's numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +16,7 @@ pub(crate) enum Scalar {
     F64,
 }
 
-/// The order of a number's bytes.
+/// Byte order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Endian {
     Little,
@@ -33,7 +33,7 @@ impl Scalar {
         }
     }
 
-    /// The number in these bytes, 8 at most. An integer beyond 2^53, of which no file has so many things, is rounded.
+    /// The number in these bytes, at most 8. Integers beyond 2^53 are rounded; no count or index in a file is so large.
     pub fn read(self, bytes: &[u8], order: Endian) -> f64 {
         let mut little = [0; 8];
         for (place, byte) in little.iter_mut().zip(bytes) {
@@ -64,7 +64,7 @@ impl Scalar {
     }
 }
 
-/// A number of 16 bits: sign, five bits of exponent, ten of fraction.
+/// The value of a 16-bit float: sign, five bits of exponent, ten of fraction.
 fn half(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
     let size = match exponent {
@@ -76,7 +76,7 @@ fn half(bits: u16) -> f64 {
     if bits >> 15 == 1 { -size } else { size }
 }
 
-/// A number that counts or numbers something.
+/// The number as a count or an index; `None` if it is not a whole number.
 pub(crate) fn index(number: f64) -> Option<u64> {
     (number >= 0.0 && number < 2_f64.powi(53) && number.trunc() == number).then_some(number as u64)
 }

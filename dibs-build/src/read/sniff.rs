@@ -35,7 +35,7 @@ pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind>
         return Ok(Format::Obj);
     }
     let named = path.extension().and_then(|extension| extension.to_str()).and_then(named);
-    // A damaged package is no other archive.
+    // A damaged package is not reported as another archive.
     if named == Some(Format::ThreeMf) {
         return Ok(Format::ThreeMf);
     }
@@ -43,22 +43,22 @@ pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind>
         return Err(foreign);
     }
     match named {
-        // Text begins with "solid", even if a zero ends it: this is a binary file that was cut in its header.
+        // Text STL begins with "solid" as well; a zero means that this is a binary file, cut off in its header.
         Some(Format::StlAscii) if bytes.contains(&0) => Ok(Format::StlBinary),
-        // So that the error is that of its reader.
+        // The error is then that of this format's reader.
         Some(format) => Ok(format),
         None => Err(ReadErrorKind::UnknownFormat),
     }
 }
 
-/// The format of an extension.
+/// The format of a file name extension.
 fn named(extension: &str) -> Option<Format> {
     use Format::{Gltf, Gmsh, Obj, Off, Ply, StlAscii, ThreeMf, Vtk, Vtp};
     let all = [Obj, StlAscii, Ply, Off, Vtk, Vtp, Gltf, Gmsh, ThreeMf];
     all.into_iter().find(|format| format.has_extension(extension))
 }
 
-/// A format that begins with a mark of its own.
+/// The format of a file that begins with a format's own mark.
 fn marked(bytes: &[u8]) -> Option<Format> {
     let beginning = &bytes[..bytes.len().min(1024)];
     let has = |bytes: &[u8], mark: &[u8]| {
@@ -74,7 +74,7 @@ fn marked(bytes: &[u8]) -> Option<Format> {
         [b'$', ..] if has(beginning, b"$MeshFormat") || has(beginning, b"$NOD") => {
             Some(Format::Gmsh)
         }
-        // Names of files stand in a package as they are.
+        // A package contains the names of its files uncompressed.
         [b'P', b'K', 3, 4, ..] if has(bytes, b"3D/") && has(bytes, b".model") => {
             Some(Format::ThreeMf)
         }
@@ -82,7 +82,7 @@ fn marked(bytes: &[u8]) -> Option<Format> {
     }
 }
 
-/// Whether a line is an OBJ vertex or face: prose may begin with "v" or "f", but not so.
+/// Whether a line is an OBJ vertex or face: prose may begin with "v" or "f", but is not followed by numbers.
 fn is_obj_line(line: &str) -> bool {
     let mut words = line.split_whitespace();
     match words.next() {

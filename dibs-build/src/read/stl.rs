@@ -53,7 +53,7 @@ pub(super) fn read_binary(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     Ok(raw)
 }
 
-/// Reads any number of solids, in upper or lower case; without the end of one, the file was cut off.
+/// Reads any number of solids, in upper or lower case. A missing end of a solid means that the file was cut off.
 pub(super) fn read_ascii(bytes: &[u8]) -> Result<Raw, ReadErrorKind> {
     let format = Format::StlAscii;
     let mut raw = Raw::new(0);

@@ -1,12 +1,12 @@
-//! The text of a file, however its program wrote it.
+//! Normalises the text of a file.
 
-/// A file's bytes as the readers expect them: UTF-16 becomes UTF-8, and a byte order mark goes.
+/// A file's bytes as the readers expect them: UTF-16 becomes UTF-8, without a byte order mark.
 pub(super) fn normal(bytes: Vec<u8>) -> Vec<u8> {
     match bytes.as_slice() {
         [0xff, 0xfe, rest @ ..] => from_utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, rest @ ..] => from_utf16(rest, u16::from_be_bytes),
         [0xef, 0xbb, 0xbf, rest @ ..] => rest.to_vec(),
-        // Without a mark: every second byte of its first words is zero.
+        // UTF-16 without a mark: every second byte of its first words is zero.
         [a, 0, b, 0, c, 0, ..] if [a, b, c].into_iter().all(is_plain) => {
             from_utf16(&bytes, u16::from_le_bytes)
         }
@@ -27,7 +27,7 @@ fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Vec<u8> {
     letters.collect::<String>().into_bytes()
 }
 
-/// A text without the zeros or the end-of-file mark (Control-Z) that some programs write after it.
+/// A text without the zeros or the end-of-file mark (Control-Z) that some programs append.
 pub(super) fn trimmed(bytes: &[u8]) -> &[u8] {
     let is_end = |byte: &u8| matches!(byte, 0 | 0x1a) || byte.is_ascii_whitespace();
     let length = bytes.iter().rposition(|byte| !is_end(byte)).map_or(0, |last| last + 1);

@@ -1,4 +1,4 @@
-//! The skin of volume cells: the surface of a simulation mesh that has no triangles of its own.
+//! The boundary of volume cells: the surface of a simulation mesh that has no triangles of its own.
 
 use super::ReadErrorKind;
 use super::groups::FaceGroups;
@@ -28,7 +28,7 @@ impl Shape {
         }
     }
 
-    /// Faces, all wound the same way as seen from inside.
+    /// Faces, all counterclockwise as seen from inside, or all clockwise.
     fn faces(self) -> &'static [&'static [usize]] {
         match self {
             Self::Tetrahedron => &[&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[2, 0, 3]],
@@ -73,7 +73,7 @@ const MOST: usize = 6;
 pub(super) struct Volumes {
     cells: Vec<(Shape, f64)>,
     corners: Vec<u32>,
-    /// Cells with curved faces, whose skin is not taken.
+    /// Cells with curved faces, whose boundary is not extracted.
     pub curved: usize,
 }
 
@@ -83,14 +83,14 @@ impl Volumes {
         self.cells.is_empty() && self.curved == 0
     }
 
-    /// Adds a cell, with its group. False where it has another number of corners.
+    /// Adds a cell and its group. False if the number of corners does not match the shape.
     pub fn push(&mut self, shape: Shape, corners: &[u32], group: f64) -> bool {
         self.cells.push((shape, group));
         self.corners.extend(corners);
         corners.len() == shape.corners()
     }
 
-    /// Adds the skin where the file has no faces, and says so; `remedy` is for cells with curved faces alone.
+    /// Adds the boundary as faces if the file has no faces, with a remark; `remedy` is for files of curved cells alone.
     pub fn finish(
         self,
         raw: &mut Raw,
@@ -133,7 +133,7 @@ impl Volumes {
         self.cells.iter().filter_map(of).collect()
     }
 
-    /// Adds the faces of one cell alone: each turned outwards, in the order of the cells.
+    /// Adds the faces that belong to one cell only: each turned outwards, in the order of the cells.
     fn add_skin(&self, raw: &mut Raw, has_groups: bool) {
         let mut faces = Vec::new();
         let mut rest = &self.corners[..];
@@ -143,7 +143,7 @@ impl Volumes {
             let is_inside_out = volume(*shape, corners, &raw.positions) < 0.0;
             for face in shape.faces() {
                 let mut face: Vec<u32> = face.iter().map(|&at| corners[at]).collect();
-                // Cells are made of larger ones by repeating a corner.
+                // Cells are degenerated to simpler shapes by repeating a corner.
                 face.dedup();
                 if face.len() > 1 && face.first() == face.last() {
                     face.pop();
@@ -174,7 +174,7 @@ impl Volumes {
     }
 }
 
-/// The same for faces of the same corners.
+/// Equal for faces with the same corners.
 fn key(face: &[u32]) -> [u32; MOST] {
     let mut key = [u32::MAX; MOST];
     for (to, &from) in key.iter_mut().zip(face) {
@@ -186,7 +186,7 @@ fn key(face: &[u32]) -> [u32; MOST] {
 
 /// Six times the volume: negative where the corners are numbered inside out.
 fn volume(shape: Shape, corners: &[u32], positions: &[[f64; 3]]) -> f64 {
-    // A corner without a vertex is an error of another check.
+    // A corner that refers to no vertex is left to another check.
     let at = |corner: usize| {
         let position = positions.get(corners[corner] as usize).copied().unwrap_or_default();
         DVec3::from(position)
@@ -205,7 +205,7 @@ fn volume(shape: Shape, corners: &[u32], positions: &[[f64; 3]]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A cell of each shape: on the unit circle, or above it.
+    /// One cell of each shape: on the unit circle, or above it.
     fn cell(shape: Shape) -> Vec<[f64; 3]> {
         let ring = |count: usize, z: f64| {
             (0..count).map(move |i| {
@@ -262,7 +262,7 @@ mod tests {
         }
     }
 
-    /// A cube of five tetrahedra, any of which are numbered inside out.
+    /// A cube of five tetrahedra, some of which are numbered inside out.
     #[test]
     fn each_cell_has_a_sign_of_its_own() {
         let corner = |at: usize| [1, 2, 4].map(|bit| if at & bit == 0 { 0.0 } else { 1.0 });

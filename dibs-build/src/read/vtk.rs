@@ -1,8 +1,8 @@
 //! VTK's legacy format, text or binary: polygons and strips of PolyData, and the cells of an unstructured grid.
 //!
-//! Our own reader, although `vtkio` exists: that is a release candidate that panics on files which VTK's own writers
-//! make (compressed XML), knows no raw appended data, and reports no line; with one of the two formats our own, the
-//! other shares most of it.
+//! Our own reader, although `vtkio` exists: it is a release candidate that panics on files of VTK's own writers
+//! (compressed XML), does not read raw appended data, and reports no line. With our own reader for one of the two
+//! formats, the other shares most of it.
 
 use super::cursor::Cursor;
 use super::raw::{Raw, excerpt};
@@ -34,7 +34,7 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     }
     let mut raw = Raw::new(0);
     let (mut cells, mut types) = (Vec::new(), Vec::new());
-    // A file may have these in any order; its cells' values count lines, polygons and bands in this one.
+    // A file may have these in any order, but its cell data are in the order lines, polygons, strips.
     let (mut lines, mut polygons, mut bands) = (0, Vec::new(), Vec::new());
     let mut labels = None;
     while let Some(keyword) = file.keyword() {
@@ -60,10 +60,10 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
                 file.line();
                 types = file.numbers(count, Scalar::I32, "cell types")?;
             }
-            // Ends with an empty line.
+            // Metadata end with an empty line.
             "METADATA" => skip_metadata(&mut file),
             "FIELD" => drop(field(&mut file, |_| false)?),
-            // Values at points and cells, after the surface.
+            // Data at points and cells follow the surface.
             "POINT_DATA" | "CELL_DATA" if groups => {
                 labels = vtk_data::labels(&mut file, &keyword)?;
                 break;
@@ -116,7 +116,7 @@ fn read_cells(file: &mut Cursor<'_>, has_offsets: bool) -> Result<Vec<Vec<u32>>>
         let points = array("CONNECTIVITY", second)?;
         return split(&offsets, &points).map_err(|what| file.malformed(what));
     }
-    // A count and as many points, for each cell.
+    // For each cell its number of points, and the points.
     let numbers = file.numbers(second, Scalar::I32, "numbers of points")?;
     let numbers = numbers.into_iter().map(|number| file.whole(number));
     let numbers = numbers.collect::<Result<Vec<u64>>>()?;

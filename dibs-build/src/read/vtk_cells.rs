@@ -1,4 +1,4 @@
-//! Cells of VTK's formats: faces, strips, and volumes of which the skin is taken.
+//! Cells of VTK's formats: faces, strips, and volumes, whose boundary is extracted.
 
 use super::ReadErrorKind;
 use super::raw::{Raw, excerpt};
@@ -6,7 +6,7 @@ use super::volume::{Shape, Volumes};
 
 const FLATTEN: &str = "save it with flat cells: in ParaView, the filter Extract Surface, then Triangulate and Save Data";
 
-/// Cuts a list of points where each cell ends. The first offset may be the start of the first cell.
+/// Cuts a list of points at each cell's end. The first offset may be the start of the first cell.
 pub(super) fn split(offsets: &[u64], points: &[u64]) -> Result<Vec<Vec<u32>>, String> {
     let ends = match offsets {
         [0, ends @ ..] => ends,
@@ -24,20 +24,20 @@ pub(super) fn split(offsets: &[u64], points: &[u64]) -> Result<Vec<Vec<u32>>, St
     ends.iter().map(&mut cell).collect()
 }
 
-/// A point's number; one that no u32 holds is as wrong as the largest that it does.
+/// A point's number as u32; a number too large for u32 becomes the largest one, which is out of range as well.
 pub(super) fn clamped(point: u64) -> u32 {
     u32::try_from(point).unwrap_or(u32::MAX)
 }
 
-/// Faces, with a label for each cell where there are labels.
+/// Faces, with a label for each cell if there are labels.
 #[derive(Default)]
 pub(super) struct Labelled {
     pub raw: Raw,
-    /// One for each cell of the piece.
+    /// A label for each cell of the piece.
     labels: Option<Vec<f64>>,
     /// Cells of the piece so far.
     cell: usize,
-    /// Points and lines among them.
+    /// Points and lines, which are left out.
     others: usize,
     volumes: Volumes,
 }
@@ -48,7 +48,7 @@ impl Labelled {
         (self.labels, self.cell) = (labels, 0);
     }
 
-    /// Ends a piece: there must be a label for each cell.
+    /// Ends a piece: the number of labels must be that of the cells.
     pub fn end_piece(&self) -> Result<(), String> {
         match &self.labels {
             Some(labels) if labels.len() != self.cell => {
@@ -63,7 +63,7 @@ impl Labelled {
         !self.volumes.is_empty()
     }
 
-    /// Passes cells that are points and lines.
+    /// Skips cells that are points and lines.
     pub fn skip(&mut self, cells: usize) {
         self.cell = self.cell.saturating_add(cells);
         self.others = self.others.saturating_add(cells);
@@ -77,7 +77,7 @@ impl Labelled {
         }
     }
 
-    /// Strips of triangles: every second one is wound the other way.
+    /// Adds strips of triangles: every second triangle is wound the other way.
     pub fn strips(&mut self, cells: &[Vec<u32>]) {
         for cell in cells {
             for (number, corners) in cell.windows(3).enumerate() {
@@ -92,8 +92,8 @@ impl Labelled {
     /// A cell of an unstructured grid, whose type is VTK's number.
     ///
     /// # Errors
-    /// A sentence for a cell that has not its type's points; [`ReadErrorKind::Foreign`] for curved faces and types that
-    /// are not read.
+    /// A sentence for a cell with another number of points than its type has; [`ReadErrorKind::Foreign`] for curved
+    /// faces and types that are not read.
     pub fn grid_cell(
         &mut self,
         kind: u64,
@@ -111,7 +111,7 @@ impl Labelled {
             5 if points != 3 => return Err(wrong()),
             8 | 9 if points != 4 => return Err(wrong()),
             5 | 7..=9 => {
-                // A pixel's third point is opposite its second.
+                // In a pixel the third point is not next to the second, but opposite to it.
                 if kind == 8 {
                     cell.swap(2, 3);
                 }
@@ -165,13 +165,13 @@ impl Labelled {
         if self.labels.is_some() {
             let label = self.label();
             let groups = self.raw.groups.get_or_insert_default();
-            // Faces of an earlier piece may have none.
+            // Faces of an earlier piece may have no labels.
             groups.of_face.resize(self.raw.ends.len() - 1, f64::NAN);
             groups.of_face.push(label);
         }
     }
 
-    /// The faces; without any the skin of the volumes.
+    /// The faces; if there are none, the boundary of the volumes.
     pub fn end(mut self) -> Result<Raw, ReadErrorKind> {
         let has_labels = self.labels.is_some();
         self.volumes.finish(&mut self.raw, has_labels, FLATTEN)?;

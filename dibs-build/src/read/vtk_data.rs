@@ -1,4 +1,4 @@
-//! Values at the points and cells of VTK's legacy format, of which the labels of cells are kept.
+//! Data at points and cells in VTK's legacy format, of which cell labels are kept.
 
 use super::ReadErrorKind;
 use super::cursor::Cursor;
@@ -8,7 +8,7 @@ use super::scalar::Scalar;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// The array of labels of cells, from the keyword `POINT_DATA` or `CELL_DATA` on.
+/// The array of cell labels, from the keyword `POINT_DATA` or `CELL_DATA` on.
 pub(super) fn labels(file: &mut Cursor<'_>, keyword: &str) -> Result<Option<Vec<f64>>> {
     let mut is_cells = keyword == "CELL_DATA";
     let mut count = file.text_index()?;
@@ -34,7 +34,7 @@ pub(super) fn labels(file: &mut Cursor<'_>, keyword: &str) -> Result<Option<Vec<
                 let kind = file.line();
                 values(file, count, components, &kind, false)?;
             }
-            // Colours are bytes in a binary file, and numbers up to 1 in a text.
+            // Colours are bytes in a binary file, and numbers from 0 to 1 in text.
             "COLOR_SCALARS" => {
                 let _name = file.needed("name of an array")?;
                 let components = file.text_index()?;
@@ -53,7 +53,7 @@ pub(super) fn labels(file: &mut Cursor<'_>, keyword: &str) -> Result<Option<Vec<
     Ok(labels)
 }
 
-/// The values of `SCALARS`, after their name, if they are wanted and one each.
+/// The values of `SCALARS` after its name, if they are wanted and there is one for each cell.
 fn scalars(file: &mut Cursor<'_>, count: u64, is_wanted: bool) -> Result<Option<Vec<f64>>> {
     let line = file.line();
     let mut words = line.split_whitespace();
@@ -61,7 +61,7 @@ fn scalars(file: &mut Cursor<'_>, count: u64, is_wanted: bool) -> Result<Option<
     let components = words.next().map_or(Ok(1), str::parse);
     let components: u64 = components
         .map_err(|_| file.malformed(format!("'{}' ends in no number", excerpt(&line))))?;
-    // This line may be missing.
+    // The line LOOKUP_TABLE may be missing.
     let before = file.clone();
     if file.keyword().as_deref() == Some("LOOKUP_TABLE") {
         file.line();
@@ -77,8 +77,8 @@ fn skip(file: &mut Cursor<'_>, count: u64, components: u64) -> Result<()> {
     values(file, count, components, &kind, false).map(drop)
 }
 
-/// Passes values of a kind, from the start of their line on. Returns them if they are wanted and numbers: VTK also has
-/// arrays of bits and of texts.
+/// Skips values of a type, from the start of their line on. Returns them if they are wanted and are numbers: VTK also
+/// has arrays of bits and strings.
 fn values(
     file: &mut Cursor<'_>,
     count: u64,
@@ -111,7 +111,7 @@ fn values(
     }
 }
 
-/// Passes a text in a binary file: the top bits of its first byte say how many bytes its length takes.
+/// Skips a string in a binary file: the top bits of its first byte state how many bytes its length takes.
 fn skip_text(file: &mut Cursor<'_>) -> Result<()> {
     let &[first] = file.skip(1)? else { return Ok(()) };
     let more = match first >> 6 {
@@ -125,7 +125,7 @@ fn skip_text(file: &mut Cursor<'_>) -> Result<()> {
     file.skip(length).map(drop)
 }
 
-/// A type of numbers. In a binary file `vtkIdType` has 32 bits, whatever it has in memory.
+/// The type of this name. In a binary file `vtkIdType` has 32 bits, whatever its size in memory.
 pub(super) fn scalar_named(name: &str) -> Option<Scalar> {
     Some(match name.to_ascii_lowercase().as_str() {
         "char" | "signed_char" | "vtktypeint8" => Scalar::I8,
@@ -142,13 +142,13 @@ pub(super) fn scalar_named(name: &str) -> Option<Scalar> {
     })
 }
 
-/// Ends with an empty line.
+/// Metadata end with an empty line.
 pub(super) fn skip_metadata(file: &mut Cursor<'_>) {
     file.line();
     while !file.line().is_empty() {}
 }
 
-/// A field's arrays: returns the last whose name is wanted.
+/// Reads a field's arrays; returns the last one whose name is wanted.
 pub(super) fn field(
     file: &mut Cursor<'_>,
     is_wanted: impl Fn(&str) -> bool,
@@ -157,12 +157,12 @@ pub(super) fn field(
     let mut found = None;
     for _ in 0..file.text_index()? {
         let mut name = file.needed("name of an array")?;
-        // Information about the array before.
+        // Metadata of the previous array.
         if name.eq_ignore_ascii_case("METADATA") {
             skip_metadata(file);
             name = file.needed("name of an array")?;
         }
-        // A place without an array.
+        // A placeholder for no array.
         if name == "NULL_ARRAY" {
             continue;
         }

@@ -1,6 +1,6 @@
 //! VTK's XML, PolyData and unstructured grids: text, inline binary and appended data, compressed by zlib or not.
 //!
-//! Our own reader of what `quick-xml` finds; `vtk.rs` says why not `vtkio`.
+//! Our own reader on top of `quick-xml`; `vtk.rs` says why not `vtkio`.
 
 use super::groups::is_name;
 use super::raw::{Raw, coordinate, excerpt};
@@ -14,7 +14,7 @@ use std::mem::take;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// The element whose content may be no XML.
+/// The element whose content may not be XML.
 const APPENDED: &[u8] = b"<AppendedData";
 
 pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
@@ -23,7 +23,7 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     let head = String::from_utf8_lossy(head);
     let mut file = File { appended, has_groups: groups, ..File::default() };
     let mut xml = Reader::from_str(&head);
-    // Only the end of the whole is cut off.
+    // Only the end of the document is cut off.
     xml.config_mut().check_end_names = false;
     loop {
         match xml.read_event().map_err(|error| malformed(error.to_string()))? {
@@ -66,7 +66,7 @@ struct Array {
     format: String,
     offset: usize,
     text: String,
-    /// Elements inside, whose text is not the array's.
+    /// Depth of elements inside, whose text does not belong to the array.
     depth: usize,
 }
 
@@ -77,7 +77,7 @@ struct File<'a> {
     is_compressed: bool,
     /// From the element `AppendedData` on.
     appended: &'a [u8],
-    /// Whether labels of cells are wanted.
+    /// Whether cell labels are requested.
     has_groups: bool,
     /// `PolyData` or `UnstructuredGrid`.
     kind: String,
@@ -87,14 +87,14 @@ struct File<'a> {
     connectivity: Vec<u64>,
     offsets: Vec<u64>,
     types: Vec<u64>,
-    /// Vertices of the pieces before.
+    /// Number of vertices in the previous pieces.
     first: u32,
-    /// The cells of a piece, the number of those that are no surface, and their labels.
+    /// The cells of a piece, the number of cells that are not polygons, and their labels.
     polygons: Vec<Vec<u32>>,
     strips: Vec<Vec<u32>>,
     grid: Vec<(u64, Vec<u32>)>,
     others: usize,
-    /// The number of its points, as stated.
+    /// The piece's number of points, as stated.
     points: Option<usize>,
     labels: Option<Vec<f64>>,
     surface: Labelled,
@@ -143,7 +143,7 @@ impl File<'_> {
             }
             "DataArray" if self.is_read(&attribute("Name")?.unwrap_or_default()) => {
                 let kind = attribute("type")?.unwrap_or_default();
-                // Labels that are no numbers are none.
+                // Labels that are not numbers are ignored.
                 if self.section == "CellData" && scalar(&kind).is_err() {
                     return Ok(());
                 }
@@ -164,7 +164,7 @@ impl File<'_> {
             }
             "Points" | "Verts" | "Lines" | "Polys" | "Strips" | "Cells" | "PointData"
             | "CellData" | "FieldData" => tag.name().0.clone_into(&mut self.section),
-            // Arrays of texts, and what is known about an array.
+            // Arrays of strings, and information about an array.
             _ => {}
         }
         Ok(())
@@ -198,7 +198,7 @@ impl File<'_> {
                 remedy: "save it as triangles: in ParaView, the filter Triangulate".to_owned(),
             });
         }
-        // Pieces repeat the points between them, so the cells there would seem to lie outside.
+        // Pieces repeat the points at their common border, so the cells' faces there would seem to be on the boundary.
         if self.surface.has_volumes() {
             return Err(ReadErrorKind::Foreign {
                 what: "a VTK grid of volume cells in several pieces".to_owned(),
@@ -231,7 +231,7 @@ impl File<'_> {
             }
             let numbers = self.numbers(&array)?;
             let indices = || {
-                let not_one = |number: &f64| malformed(format!("{number} is no number of a point"));
+                let not_one = |number: &f64| malformed(format!("{number} is not a point number"));
                 numbers.iter().map(|n| index(*n).ok_or_else(|| not_one(n))).collect::<Result<_>>()
             };
             match array.name.as_str() {
@@ -299,7 +299,7 @@ impl File<'_> {
         Ok(array.scalar.read_all(&bytes, order))
     }
 
-    /// Whether appended data is raw bytes, and the data, after an underscore.
+    /// Whether appended data are raw bytes, and the data, which start after an underscore.
     fn appended(&self) -> Result<(bool, &[u8])> {
         let end = self.appended.iter().position(|&byte| byte == b'>');
         let (tag, content) = self.appended.split_at(end.ok_or_else(|| truncated("appended data"))?);
@@ -308,7 +308,7 @@ impl File<'_> {
         Ok((tag.windows(5).any(|window| window == b"\"raw\""), &content[start + 1..]))
     }
 
-    /// What a header announces: one run of bytes, or compressed blocks.
+    /// The data that a header announces: one run of bytes, or compressed blocks.
     fn payload(&self, data: &[u8], order: Endian) -> Result<Vec<u8>> {
         let scalar = if self.has_long_headers { Scalar::U64 } else { Scalar::U32 };
         let cut_off = || truncated("an array of numbers is shorter than its header says");
@@ -325,7 +325,7 @@ impl File<'_> {
         if !self.is_compressed {
             return Ok(take(first)?.to_vec());
         }
-        // The number of blocks, their size, that of the last one, and then the compressed size of each.
+        // The number of blocks, their size, the size of the last one, and then the compressed size of each.
         let _sizes = take(2 * size)?;
         let sizes = take(first.saturating_mul(size))?;
         let mut bytes = Vec::new();
@@ -358,7 +358,7 @@ fn scalar(name: &str) -> Result<Scalar> {
     })
 }
 
-/// All numbers of a text, or the first word that is none.
+/// All numbers of a text, or the first word that is not a number.
 fn words(text: &str) -> std::result::Result<Vec<f64>, &str> {
     text.split_ascii_whitespace().map(|word| coordinate(word).ok_or(word)).collect()
 }

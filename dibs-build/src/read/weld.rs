@@ -4,8 +4,8 @@ use glam::Vec3;
 use std::collections::HashMap;
 
 /// For every vertex the first one that it coincides with: itself, or an earlier kept vertex at most `tolerance` away.
-/// So no chain of near vertices collapses into one, and the result depends only on the order of the vertices. O(n) for
-/// tolerances below the typical distance of vertices.
+/// So no chain of close vertices collapses into one, and the result depends only on the order of the vertices. Cost:
+/// linear, for tolerances below the typical distance of vertices.
 pub(crate) fn first_coincident(positions: &[Vec3], tolerance: f32) -> Vec<u32> {
     if tolerance > 0.0 { within(positions, tolerance) } else { equal(positions) }
 }
@@ -15,7 +15,7 @@ fn equal(positions: &[Vec3]) -> Vec<u32> {
     (0..)
         .zip(positions)
         .map(|(vertex, position)| {
-            // Adding 0 turns -0.0 into 0.0, and changes nothing else.
+            // Adding 0 turns -0.0 into 0.0, and changes no other number.
             let key = position.to_array().map(|c| (c + 0.0).to_bits());
             *first.entry(key).or_insert(vertex)
         })
@@ -71,7 +71,7 @@ mod tests {
     fn tolerance_reaches_across_cells_and_does_not_chain() {
         let at = |x| Vec3::new(x, -5.0, 0.0);
         let positions = [at(0.99), at(1.01), at(1.08), at(1.17), at(-3.0)];
-        // The third is near the second, which was merged, and within 0.1 of the first.
+        // The third vertex is near the second, which was merged, and within 0.1 of the first.
         assert_eq!(first_coincident(&positions, 0.1), [0, 0, 0, 3, 4]);
     }
 

@@ -1,7 +1,7 @@
-//! The least stretch limits that the controller's check can hold a surface to.
+//! The least stretch limits that the controller's check can enforce.
 //!
-//! The check is in f32 and rounds against the surface: it takes a triangle for stretched by a little more than it is. So a
-//! limit of exactly 1 would refuse the rest shape itself, and limits learned from a motion would refuse its frames.
+//! The check is in f32 and rounds upwards: it overestimates a triangle's stretch a little. So a limit of exactly 1
+//! would refuse the rest shape itself, and limits learned from a motion would refuse its frames.
 
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
@@ -9,22 +9,22 @@ use glam::{DVec3, Vec3};
 use super::RestShape;
 use crate::Mesh;
 
-/// Rounding of the check, at most: 21 units when the metric is stored, 21 when it is compared (`dibs_nostd`'s
-/// `stretch/kernel.rs`), 2 for its marks, less a half for the root, and those of the limit's own rounding.
+/// Upper bound on the check's rounding: 21 units when the metric is stored, 21 when it is compared (`dibs_nostd`'s
+/// `stretch/kernel.rs`), 2 for the marks in its bits, less a half for the root, and that of the limit itself.
 const ROUNDING: f64 = 32.0 / 16_777_216.0;
 
-/// The same where all triangles have one limit: neighbours share the lower of their roundings then.
+/// The same factor where all triangles have one limit: neighbours then share the smaller of their rounded edges.
 pub(crate) const SHARED: f64 = 1.0006;
 
-/// The factor by which the check may take the stretch of a triangle with these corners at rest for more than it is,
-/// whichever corner the check measures it from.
+/// The factor by which the check may overestimate the stretch of a triangle with these corners at rest, from whichever
+/// corner it measures.
 fn rounding(corners: [Vec3; 3], paths: PathKind) -> f64 {
     if paths == PathKind::EdgePath {
         return 1.0 + ROUNDING;
     }
     let [a, b, c] = RestShape::new(corners, paths).corners;
     let open = [openness(b - a, c - a), openness(c - b, a - b), openness(a - c, b - c)];
-    // A rest shape is at least 1/64 high: no corner of one is less open.
+    // The height of a rest shape is at least 1/64 of its longest edge, which bounds the openness of its corners.
     1.0 + ROUNDING / open.into_iter().fold(1.0, f64::min).max(1e-4)
 }
 

@@ -16,7 +16,7 @@ pub enum Paths {
 }
 
 impl Paths {
-    /// The kind that the tree records.
+    /// The kind that the tree stores.
     pub(crate) const fn kind(self) -> PathKind {
         match self {
             Self::Edges => PathKind::EdgePath,

@@ -1,21 +1,21 @@
 //! The rest shape of one triangle.
 //!
-//! Consider a triangle a thousand times longer than high. A vertex that moves by a thousandth of that length, or that a
-//! bus quantises, doubles the height and so the stretch: one such triangle among a million would make every sphere
-//! grow, or every frame be refused. So where paths cross triangles, a triangle lower than 1/64 of its longest edge, a
-//! *flat* one, has a rest shape of that height.
+//! Consider a triangle a thousand times longer than high. A vertex that moves by a thousandth of that length, or that
+//! is quantised on the bus, doubles the height and so the stretch: one such triangle among a million would make every
+//! sphere grow, or every frame be refused. So where paths cross triangles, a *flat* triangle, whose height is less than
+//! 1/64 of its longest edge, has a rest shape of that height.
 //!
-//! Coverage only requires that builder, tree and stretch check use the same shape: an arc along an edge is as long as
-//! the edge in the rest shape of one of its triangles, and the stretch check bounds how much longer that edge is now.
-//! The rest shapes of neighbours need not fit together; a flat one does not fit, so no chord crosses it. The fattened
-//! shape is nowhere shorter than the true one, so the true rest shape stays within its spheres.
+//! Coverage only requires that builder, tree and stretch check use the same shape: an arc along an edge has the length
+//! of that edge in the rest shape of one of its triangles, and the stretch check bounds how much longer the edge is
+//! now. The rest shapes of neighbours need not match at their common edge; that of a flat triangle does not, so no
+//! chord crosses it. The fattened shape is nowhere shorter than the true one, so the true one stays within its spheres.
 
 // Requirement: A-02
 
 use dibs_nostd::format::PathKind;
 use glam::{DVec3, Vec3};
 
-/// Height of a triangle over its longest edge below which it is flat.
+/// Height of a triangle over its longest edge below which it counts as flat.
 const FLAT: f64 = 1.0 / 64.0;
 
 /// The shape that a triangle's stretch is measured against.
@@ -23,19 +23,19 @@ const FLAT: f64 = 1.0 / 64.0;
 pub(crate) struct RestShape {
     /// Its corners, in the given order.
     pub corners: [DVec3; 3],
-    /// Whether it is higher than the true triangle, and so does not fit its neighbours.
+    /// Whether it is higher than the true triangle, and so does not match its neighbours.
     pub is_flat: bool,
 }
 
 impl RestShape {
-    /// The rest shape of a triangle with these corners, for paths of this kind. The same corners in another order have
-    /// the same shape, bit for bit, because the tree stores them in another order than the mesh.
+    /// The rest shape of a triangle with these corners, for paths of this kind. The same corners in another order give
+    /// the same shape, bit for bit, because the tree's order differs from the mesh's.
     pub fn new(corners: [Vec3; 3], kind: PathKind) -> Self {
         let mut shape = Self { corners: corners.map(Vec3::as_dvec3), is_flat: false };
         if kind == PathKind::EdgePath {
             return shape;
         }
-        // The order of the positions decides between equal edges, and the rounding.
+        // The order of the positions determines the choice between equal edges, and the rounding.
         let mut order = [0, 1, 2];
         order.sort_unstable_by(|&i, &j| by_position(corners[i], corners[j]));
         if let Some(fattened) = fattened(order.map(|i| shape.corners[i])) {
@@ -50,7 +50,7 @@ fn by_position(a: Vec3, b: Vec3) -> std::cmp::Ordering {
     a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z))
 }
 
-/// Whether a triangle has an area: its height is more than the f64 rounding of a part in 10^12 of its longest edge.
+/// Whether a triangle has an area: its height is more than 10^-12 of its longest edge, the allowance for f64 rounding.
 pub(crate) fn has_area(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(Vec3::as_dvec3);
     let longest = [b - a, c - b, a - c].map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
@@ -58,7 +58,7 @@ pub(crate) fn has_area(corners: [Vec3; 3]) -> bool {
 }
 
 /// The corners of a flat triangle, with the apex moved away from the longest edge until it is not flat; `None` for
-/// others.
+/// other triangles.
 fn fattened(mut corners: [DVec3; 3]) -> Option<[DVec3; 3]> {
     let Apex { corner, edge, height } = apex(corners);
     if height >= FLAT * edge {
@@ -67,14 +67,15 @@ fn fattened(mut corners: [DVec3; 3]) -> Option<[DVec3; 3]> {
     let [start, end] = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
     let along = (end - start) / edge;
     let across = (corners[corner] - start).reject_from_normalized(along);
-    // Twice, since rounding leaves a very short vector a part along the edge, which would shorten another edge.
+    // Rejected twice, since rounding leaves a very short vector a component along the edge, which would shorten another
+    // edge.
     let up = across.try_normalize().map(|up| up.reject_from_normalized(along));
     let up = up.and_then(DVec3::try_normalize).unwrap_or_else(|| along.any_orthonormal_vector());
     corners[corner] += up * (FLAT * edge - height);
     Some(corners)
 }
 
-/// The corner across from the longest edge (of equal ones, from the first).
+/// The corner opposite to the longest edge; of equal edges, to the first.
 struct Apex {
     corner: usize,
     /// Length of the longest edge.
@@ -114,7 +115,7 @@ mod tests {
         [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
     proptest! {
-        /// A flat triangle grows until it is not flat, no direction in it becomes shorter, and other triangles stay.
+        /// A flat triangle grows until it is not flat, and shrinks in no direction; other triangles do not change.
         #[test]
         fn only_flat_triangles_grow(a in point(), b in point(), at in -0.2_f32..1.2, off in point(),
                                     power in -6.0_f32..0.0, turn in 0..3_usize) {
@@ -126,7 +127,7 @@ mod tests {
             let shape = RestShape::new(given, PathKind::Surface);
             prop_assert_eq!(shape.is_flat, shape.corners != corners);
             let Apex { edge, height, .. } = apex(shape.corners);
-            // An edge to the corner that moved may be the longest now.
+            // An edge to the moved corner may be the longest now.
             let least = FLAT * edge / (1.0 + FLAT * FLAT);
             prop_assert!(height >= least * (1.0 - 1e-9), "{} of {}", height, edge);
             // The Gram matrix has grown: no path across the triangle is shorter.

@@ -1,8 +1,8 @@
 //! The file that `dibs stretch` writes and `dibs build` reads: a limit for each triangle, or tetrahedron of a volume.
 //!
-//! Text: lines that start with `#` are comments; then `dibs-limits 1`, `mesh` with the mesh's checksum
-//! in hexadecimal digits, `triangles` with their number, and one number a line, in the mesh's order. Of a volume it is
-//! `tetrahedra` and the volume's order.
+//! Text: lines that start with `#` are comments; then `dibs-limits 1`, `mesh` with the mesh's checksum in hexadecimal
+//! digits, `triangles` with their number, and one limit a line, in the mesh's order. For a volume the keyword is
+//! `tetrahedra`, and the order is the volume's.
 
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ pub enum LimitsErrorKind {
         /// Checksum in the file.
         found: u32,
     },
-    /// The number of limits is another one.
+    /// The number of limits differs from the number of triangles or tetrahedra.
     #[error("has {found} limits, {expected} are needed: it is cut off or was edited")]
     Count {
         /// Triangles of the mesh, or tetrahedra of the volume.
@@ -68,7 +68,7 @@ pub enum LimitsErrorKind {
 /// [`WriteError`]; the file is complete or untouched.
 ///
 /// # Panics
-/// If the number of limits differs from that of triangles.
+/// If the number of limits differs from the number of triangles.
 pub fn write_limits(
     path: impl AsRef<Path>,
     mesh: &Mesh,
@@ -87,13 +87,13 @@ pub fn read_limits(path: impl AsRef<Path>, mesh: &Mesh) -> Result<Vec<f32>, Limi
 }
 
 impl Volume {
-    /// Writes limits for its tetrahedra, after a comment.
+    /// Writes limits for the volume's tetrahedra, after a comment.
     ///
     /// # Errors
     /// [`WriteError`]; the file is complete or untouched.
     ///
     /// # Panics
-    /// If the number of limits differs from that of tetrahedra.
+    /// If the number of limits differs from the number of tetrahedra.
     pub fn write_limits(
         &self,
         path: impl AsRef<Path>,
@@ -103,7 +103,7 @@ impl Volume {
         Limited::tetrahedra(self).write(path.as_ref(), limits, comment)
     }
 
-    /// Reads the limits of its tetrahedra.
+    /// Reads the limits of the volume's tetrahedra.
     ///
     /// # Errors
     /// [`LimitsError`] names the file and its defect, such as limits of another volume.
@@ -112,7 +112,7 @@ impl Volume {
     }
 }
 
-/// What a file's limits are of.
+/// The mesh or volume whose limits a file holds.
 struct Limited {
     elements: &'static str,
     count: usize,

@@ -17,9 +17,10 @@ use crate::{Mesh, Motion, Paths};
 
 /// The stretch of each triangle of a mesh in a recorded motion.
 ///
-/// The tree's paths decide the measure: a triangle's largest singular value (a triangle lower than 1/64 of its longest
-/// edge counts as that high), or for [`Paths::Edges`] the largest ratio of an edge to its rest length. Both are convex,
-/// so on straight lines between two frames neither exceeds the larger of its values there.
+/// The tree's paths decide the measure: a triangle's largest singular value (a triangle whose height is less than 1/64
+/// of its longest edge counts as that high), or for [`Paths::Edges`] the largest ratio of an edge to its rest length.
+/// Both are convex, so for positions interpolated linearly between two frames neither exceeds the larger of its values
+/// at these frames.
 ///
 /// ```
 /// use dibs_build::{Builder, MotionStretch, Paths, generate};
@@ -32,7 +33,7 @@ use crate::{Mesh, Motion, Paths};
 #[derive(Clone, Debug)]
 pub struct MotionStretch {
     triangles: Vec<Needed>,
-    /// The factor by which the controller may take each triangle's stretch for more than it is.
+    /// The factor by which the controller may overestimate each triangle's stretch.
     rounding: Vec<f64>,
 }
 
@@ -58,7 +59,7 @@ pub struct Beyond {
 }
 
 impl Beyond {
-    /// The stretch as a part of the limit.
+    /// The stretch over the limit.
     fn share(&self) -> f64 {
         self.needed.stretch / f64::from(self.limit)
     }
@@ -88,7 +89,7 @@ impl MotionStretch {
         Ok(Self::of_elements(mesh.triangles.len(), rounding, motion, progress, stretch))
     }
 
-    /// The same of the tetrahedra of a volume, whose nodes the motion moves: [`Needed::triangle`] is a tetrahedron then.
+    /// The same for the tetrahedra of a volume whose nodes move: [`Needed::triangle`] is then a tetrahedron.
     ///
     /// # Errors
     /// [`MotionMismatchError`] where a frame does not fit the nodes.
@@ -108,7 +109,7 @@ impl MotionStretch {
         };
         let count = volume.tetrahedra().len();
         let least = |tetrahedron| least_limit(shape(tetrahedron, &rest.positions));
-        // A flat one is refused by the builder.
+        // The builder refuses a flat tetrahedron, so its factor does not matter.
         let rounding = (0..count).map(|at| least(at).unwrap_or(1.0)).collect();
         Ok(Self::of_elements(count, rounding, motion, progress, stretch))
     }
@@ -162,27 +163,28 @@ impl MotionStretch {
         self.ranked()[0]
     }
 
-    /// Limits for the builder: each triangle's largest stretch, at least 1, plus `margin` (0.1: a tenth), plus the rounding
-    /// of the controller's measurement: 0.0006, and up to 0.016 for a triangle with a sharp corner or a flat tetrahedron. A tree with them
-    /// admits every frame of the motion that does not turn a closed surface inside out, even with a margin of 0.
+    /// Limits for the builder: each triangle's largest stretch, at least 1, plus `margin` (0.1: a tenth), plus the
+    /// rounding of the controller's measurement: 0.0006, and up to 0.016 for a triangle with a sharp corner or a flat
+    /// tetrahedron. A tree with these limits admits every frame of the motion that does not turn a closed surface
+    /// inside out, even with a margin of 0.
     #[must_use]
     pub fn limits(&self, margin: f32) -> Vec<f32> {
-        // No frame is known that `SHARED` alone refuses: 400,000 pairs of flat triangles reached 0.00056. The proven bound
-        // on such a pair's two roundings is 0.00085, so both factors stay.
+        // No frame is known that `SHARED` alone refuses: 400,000 pairs of flat triangles reached 0.00056. The proven
+        // bound on the two roundings of such a pair is 0.00085, so both factors are applied.
         let limit = |(needed, rounding): (&Needed, &f64)| {
             round_up(needed.stretch.max(1.0) * (1.0 + f64::from(margin)) * SHARED * rounding)
         };
         self.triangles.iter().zip(&self.rounding).map(limit).collect()
     }
 
-    /// The triangle that is stretched farthest beyond its limit; `None` if none is.
+    /// The triangle that exceeds its limit by the largest factor; `None` if none does.
     ///
     /// # Panics
-    /// If there is not a limit for each triangle.
+    /// If the number of limits differs from the number of triangles.
     #[must_use]
     pub fn beyond(&self, limits: &[f32]) -> Option<Beyond> {
         assert_eq!(limits.len(), self.triangles.len(), "a limit for each triangle");
-        // The builder raises limits to what the controller can tell from the rest shape.
+        // The builder raises limits to the least that the controller can tell from the rest shape.
         let limits =
             limits.iter().zip(&self.rounding).map(|(&limit, &least)| limit.max(round_up(least)));
         let all = self.triangles.iter().zip(limits);
@@ -193,10 +195,10 @@ impl MotionStretch {
     }
 }
 
-/// The largest stretch of any triangle of a surface whose vertices stand in the order of the tree's rows, in f64; `None`
-/// where the tree has no rest shape, a position is missing, or elements are stretched instead. [`MeasuredStretch`](dibs_nostd::MeasuredStretch) is a factor
-/// for the tree's radii instead: where triangles have their own limits, a triangle's stretch is divided by its limit there,
-/// and multiplied by the tree's.
+/// The largest stretch of any triangle of a surface whose vertices are in the order of the tree's rows, in f64; `None`
+/// if the tree has no rest shape, a position is missing, or the limits are those of tetrahedra.
+/// [`MeasuredStretch`](dibs_nostd::MeasuredStretch) is the factor for the tree's radii instead: if triangles have their
+/// own limits, it multiplies a triangle's stretch by the tree's limit over the triangle's.
 #[must_use]
 pub fn largest_stretch<I: Index>(tree: &Tree<'_, I>, rows: &[Vec3]) -> Option<f64> {
     let kind = tree.paths();
@@ -226,7 +228,7 @@ fn stretch(rest: [DVec3; 3], now: [DVec3; 3], paths: Paths) -> f64 {
             (0..3).map(ratio).fold(0.0, f64::max)
         }
         Paths::Surface { .. } => {
-            // The deformation gradient in the plane, and the root of its metric's larger eigenvalue.
+            // The deformation gradient in the plane, and the root of the larger eigenvalue of `F^T F`.
             let gradient = in_plane(now) * in_plane(rest).inverse();
             let metric = gradient.transpose() * gradient;
             let (pp, pq, qq) = (metric.x_axis.x, metric.x_axis.y, metric.y_axis.y);
@@ -235,7 +237,7 @@ fn stretch(rest: [DVec3; 3], now: [DVec3; 3], paths: Paths) -> f64 {
     }
 }
 
-/// Two edges of a triangle in a frame of its plane.
+/// Two edges of a triangle, in an orthonormal basis of its plane.
 fn in_plane([a, b, c]: [DVec3; 3]) -> DMat2 {
     let (along, other) = (b - a, c - a);
     let x = along.normalize_or(DVec3::X);

@@ -1,4 +1,4 @@
-//! An answer, as JSON or for a reader.
+//! An answer, as JSON or as text.
 
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::{Contact, Coverage, NoSide, Proximity, QueryError, Side};
@@ -9,18 +9,18 @@ pub struct Answer<'a> {
     pub proximity: Proximity,
     /// Corners of the triangle, numbered as in the mesh file.
     pub triangle: [u32; 3],
-    /// The triangle's label, where the tree has labels.
+    /// The triangle's label, if the tree has labels.
     pub label: Option<u8>,
-    /// The point that the pair's coordinates count from.
+    /// The point that the pair's coordinates are relative to.
     pub origin: DVec3,
     pub tree: &'a str,
-    /// The tool's number in its chain, from 0.
+    /// Index of the tool in its chain, from 0.
     pub tool: usize,
-    /// `None` where the tree has no rest metric to measure with.
+    /// `None` if the tree has no rest metric to measure it with.
     pub stretch: Option<f64>,
-    /// All contacts, nearest first, where they were asked for.
+    /// All contacts, nearest first, if they were requested.
     pub contacts: Option<Vec<Touch<'a>>>,
-    /// Every contact whose separation is below is listed.
+    /// Every contact with a separation below this is listed.
     pub bound: f32,
 }
 
@@ -40,7 +40,7 @@ pub fn side_name(side: Side) -> (&'static str, Option<String>) {
         Side::Outside => ("outside", None),
         Side::Inside => ("inside", None),
         Side::Crossing => ("crossing", None),
-        // With the remedy.
+        // The text includes the remedy.
         Side::Undefined(NoSide::NoAdjacency) => {
             ("undefined", Some(QueryError::NoAdjacency.to_string()))
         }
@@ -49,7 +49,7 @@ pub fn side_name(side: Side) -> (&'static str, Option<String>) {
     }
 }
 
-/// How it is known that no part of the surface is nearer.
+/// Whether the coverage was measured or assumed.
 fn coverage_name(coverage: Coverage) -> &'static str {
     match coverage {
         Coverage::Measured => "measured",
@@ -58,18 +58,18 @@ fn coverage_name(coverage: Coverage) -> &'static str {
     }
 }
 
-/// An answer in JSON. Numbers are f64, which holds every f32: a reader that computes in f64 gets the same bits.
+/// An answer in JSON. Numbers are f64, which represents every f32: a reader that computes in f64 gets the same bits.
 #[derive(Serialize)]
 pub struct Record<'a> {
-    /// Of a file of poses.
+    /// Line number in a file of poses.
     #[serde(skip_serializing_if = "Option::is_none")]
     line: Option<usize>,
     separation: f64,
     lower: f64,
     accuracy: f64,
-    /// Certified: the ends include the accuracy. The first is null where the tool may be inside at any depth.
+    /// Certified: the bounds include the accuracy. The first is null if the tool may be inside to any depth.
     interval: [f64; 2],
-    /// Whether the stretch that the answer rests on was checked.
+    /// Whether the stretch that the answer depends on was checked.
     coverage: &'static str,
     side: &'static str,
     side_reason: Option<String>,
@@ -89,7 +89,7 @@ pub struct Record<'a> {
     triangle_tests: u32,
     #[serde(skip_serializing_if = "Option::is_none")]
     contacts: Option<Vec<ContactRecord<'a>>>,
-    /// Every contact whose separation is below is listed: the margin, unless there were too many.
+    /// Every contact with a separation below this is listed: the margin, unless there were too many contacts.
     #[serde(skip_serializing_if = "Option::is_none")]
     contacts_bound: Option<f64>,
 }
@@ -115,11 +115,11 @@ pub fn vector(vector: Vec3) -> [f64; 3] {
 
 /// A point in the coordinates of the mesh's file.
 fn point(point: Vec3, origin: DVec3) -> [f64; 3] {
-    // A sum with zero would lose the sign of -0.
+    // Adding zero would lose the sign of -0.
     if origin == DVec3::ZERO { vector(point) } else { (origin + point.as_dvec3()).to_array() }
 }
 
-/// The same for a reader.
+/// The same as text.
 fn point_text(point: Vec3, origin: DVec3) -> String {
     if origin == DVec3::ZERO {
         return point.to_string();

@@ -1,4 +1,4 @@
-//! Many poses, answered as fast as they come.
+//! Answers many poses, as they are read.
 
 use super::scene::{self, Room, Surface};
 use crate::mesh_file::spinner;
@@ -28,14 +28,14 @@ pub fn run(
             file.write_all(bytes)?;
             Ok(true)
         });
-        // Whatever ends here, the file keeps its old content.
+        // On any failure the output file keeps its old content.
         if failure.is_err() { Err(io::Error::other("incomplete")) } else { Ok(()) }
     });
     spinner.finish_and_clear();
     failure.and(written.map_err(Into::into))
 }
 
-/// Answers the lines in their order, up to the first wrong one, as long as `write` wants more.
+/// Answers the lines in their order, up to the first wrong line, as long as `write` returns true.
 fn answer_all(
     lines: &mut Lines,
     surfaces: &[Surface<'_>],
@@ -71,8 +71,8 @@ fn answer_all(
     }
 }
 
-/// The lines that are there, at least one unless the input has ended, and whether more may come: whoever waits for an
-/// answer before the next line gets it.
+/// The lines that are available, at least one unless the input has ended, and whether more may come. So a writer that
+/// waits for an answer before its next line gets it.
 fn batch(lines: &mut Lines) -> (Vec<(usize, String)>, Result<bool>) {
     let mut batch = Vec::new();
     loop {

@@ -1,4 +1,4 @@
-//! `dibs query`: the closest pair between an instrument and one surface or several, and all contacts.
+//! `dibs query`: the closest pair between an instrument and one or several surfaces, and all contacts.
 
 mod answer;
 mod bulk;
@@ -38,13 +38,13 @@ pub struct Args {
     /// A tool: X,Y,Z,R, a sphere, or X1,Y1,Z1,X2,Y2,Z2,R, a capsule; up to eight of them are a chain
     #[arg(long, value_parser = tool::one, allow_hyphen_values = true, required_unless_present = "poses")]
     tool: Vec<ToolSpec>,
-    /// Answer every line of this file, CSV or JSON lines, by a JSON line; `-` is standard input
+    /// Answer every line of this file (CSV or JSON lines) with a JSON line; `-` is standard input
     #[arg(long, value_name = "POSES", conflicts_with = "tool")]
     poses: Option<PathBuf>,
-    /// The file of the answers to --poses, written as a whole or not at all; `-` is standard output
+    /// The file for the answers to --poses, written completely or not at all; `-` is standard output
     #[arg(short, long, default_value = "-", requires = "poses")]
     output: PathBuf,
-    /// List all locally closest pairs whose separation is at most this, too: at most 64 of each tool and surface
+    /// Also list all locally closest pairs with a separation of at most this: up to 64 of each tool and surface
     #[arg(long, value_name = "MM")]
     contacts: Option<f32>,
     /// Current positions, one for each vertex of the built mesh: a mesh file, or a motion with
@@ -54,8 +54,8 @@ pub struct Args {
     /// Frame of a motion, counted from 0
     #[arg(long, requires = "vertices")]
     frame: Option<usize>,
-    /// Fail if the surface is stretched by more than this, and search with the stretch that it has
-    /// instead of the tree's limit
+    /// Fail if the surface is stretched by more than this, and search with its measured stretch instead of the tree's
+    /// limit
     #[arg(long)]
     stretch: Option<f32>,
     #[command(flatten)]

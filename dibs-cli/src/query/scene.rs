@@ -1,4 +1,4 @@
-//! The surfaces of a query, each with its positions, and the closest pair between them and a chain of tools.
+//! The surfaces of a query with their positions, and the closest pair between them and a chain of tools.
 
 use super::answer::{Answer, Touch};
 use crate::mesh_file::Lengths;
@@ -13,22 +13,22 @@ use dibs_nostd::{
 };
 use std::path::{Path, PathBuf};
 
-/// As much as any tree needs.
+/// Enough for any tree.
 pub const STACK: usize = dibs_nostd::format::MAX_STACK;
 
-/// A tree, and where its vertices are.
+/// A tree, and the positions of its vertices.
 pub struct Surface<'a> {
     pub name: String,
     tree: AnyTree<'a>,
-    /// In the order of the tree's rows.
+    /// Rows in the tree's order.
     rows: SurfaceRows,
-    /// `None` where the tree has no rest metric to measure with.
+    /// `None` if the tree has no rest metric to measure it with.
     stretch: Option<f64>,
     options: Options,
 }
 
 impl<'a> Surface<'a> {
-    /// A tree file's surface, at rest where no `vertices` are given, stretched by at most `limit`.
+    /// The surface of a tree file, at rest if no `vertices` are given, stretched by at most `limit`.
     pub fn new(
         bytes: &'a [u8],
         path: &'a Path,
@@ -46,7 +46,7 @@ impl<'a> Surface<'a> {
             AnyTree::Narrow(tree) => largest_stretch(tree, rows.positions()),
             AnyTree::Wide(tree) => largest_stretch(tree, rows.positions()),
         };
-        // Without a rest shape only the factor for radii is known, which is no smaller.
+        // Without a rest shape only the factor for radii is known, which is at least as large.
         let stretch = measured.map(|measured| largest.unwrap_or(measured.sigma().into()));
         let name = path.display();
         let mut options = Options::cold();
@@ -54,7 +54,7 @@ impl<'a> Surface<'a> {
             let (Some(measured), Some(sigma)) = (measured, stretch) else {
                 bail!("{name}: no rest metric to measure a stretch with");
             };
-            // Up to the measure's own rounding.
+            // The measurement's own rounding is allowed.
             if sigma > f64::from(limit) * (1.0 + 1e-5) || limit.is_nan() {
                 bail!(
                     "{name}: the surface is stretched by {sigma}, more than the {limit} of --stretch"
@@ -85,7 +85,7 @@ impl<'a> Surface<'a> {
             LocalTool::Sphere(sphere) => self.closest(tree, &sphere, margin, room)?,
             LocalTool::Capsule(capsule) => self.closest(tree, &capsule, margin, room)?,
         };
-        // It is within the limit, or the surface would have been refused.
+        // The stretch is within the limit: otherwise the surface was refused before.
         if self.stretch.is_some() {
             found.proximity.coverage = Coverage::Measured;
         }
@@ -117,13 +117,14 @@ impl<'a> Surface<'a> {
 
 type List = Contacts<64, 16_384>;
 
-/// Room for the contacts of a pair, once it is needed: half a megabyte, for any number of poses.
+/// Memory for the contacts of a pair, allocated when first needed: half a megabyte, for any number of poses.
 #[derive(Default)]
 pub struct Room(Option<Box<List>>);
 
 impl Room {
     fn list(&mut self) -> &mut List {
-        /// A separate function, since the list passes over the stack: nothing of it is left there when work is split.
+        /// A separate function, since the list is built on the stack: the caller's frame must not keep room for it when
+        /// work is split.
         #[inline(never)]
         fn empty() -> Box<List> {
             Box::new(List::new())
@@ -132,7 +133,7 @@ impl Room {
     }
 }
 
-/// What one tool finds on one surface.
+/// The result for one tool and one surface.
 struct Found {
     proximity: Proximity,
     /// Corners of its triangle, numbered as in the mesh file.
@@ -140,7 +141,7 @@ struct Found {
     contacts: Vec<Contact>,
     /// The triangle of each contact.
     triangles: Vec<[u32; 3]>,
-    /// All contacts below are listed.
+    /// Every contact with a separation below this is listed.
     bound: f32,
 }
 
@@ -151,10 +152,10 @@ impl Found {
     }
 }
 
-/// The closest of all pairs of a tool and a surface, and with a margin all contacts, nearest first.
+/// The closest of all pairs of a tool and a surface; with a margin also all contacts, nearest first.
 ///
-/// The pairs are searched one by one: `Query::closest_in_scene` would pass over a far tool, which it may only if the tools
-/// of a chain touch each other, and takes surfaces of one index width and one origin.
+/// The pairs are searched one by one: `Query::closest_in_scene` may skip a far tool only if the tools of a chain touch
+/// each other, and requires that all surfaces have one index width and one origin.
 pub fn ask<'a>(
     surfaces: &'a [Surface<'a>],
     tools: &[ToolSpec],
@@ -163,7 +164,7 @@ pub fn ask<'a>(
 ) -> Result<Answer<'a>> {
     let mut best: Option<Answer<'a>> = None;
     let (mut touches, mut bound) = (Vec::new(), f32::INFINITY);
-    // Interval, accuracy, coverage and tests are those of all pairs.
+    // Interval, accuracy, coverage and tests cover all pairs.
     let mut coverage = Coverage::Measured;
     let (mut lower, mut accuracy, mut node_tests, mut triangle_tests) =
         (f32::INFINITY, 0_f32, 0, 0);
@@ -213,7 +214,7 @@ pub fn ask<'a>(
     Ok(answer)
 }
 
-/// The positions of a tree's rows, and how far they stretch it.
+/// The positions of a tree's rows, and the measured stretch.
 fn measured<I: Index>(
     tree: &Tree<'_, I>,
     path: &Path,
@@ -227,7 +228,7 @@ fn measured<I: Index>(
             .ok_or_else(|| anyhow!("{name}: the tree has no rest shape, give --vertices"))?,
         Some(path) => current(tree, path, frame, lengths)?,
     };
-    // A distance on a surface that is stretched beyond the limit could be wrong: none is given.
+    // Beyond the stretch limit a distance could be wrong, so the surface is refused.
     let rows = SurfaceRows::of(tree, frame).map_err(|error| anyhow!("{name}: {error}"))?;
     match rows.stretch {
         Ok(measured) => Ok((rows, Some(measured))),
@@ -238,7 +239,7 @@ fn measured<I: Index>(
     }
 }
 
-/// Positions in the order of the tree's rows, from its origin.
+/// Positions in the order of the tree's rows, relative to its origin.
 fn current<I: Index>(
     tree: &Tree<'_, I>,
     path: &Path,
@@ -267,7 +268,7 @@ fn current<I: Index>(
     }
 }
 
-/// Puts the positions of a motion's frame into the order of the tree's rows.
+/// Reorders the positions of a motion's frame into the tree's rows.
 pub fn rows<I: Index>(
     tree: &Tree<'_, I>,
     path: &Path,

@@ -1,4 +1,4 @@
-//! Ctrl-C ends a stream without losing its totals.
+//! Ends a stream on Ctrl-C without losing its totals.
 
 use anyhow::{Context, Result};
 use std::sync::Arc;
@@ -7,12 +7,12 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-/// Whether the user or the system has asked the program to end.
+/// Whether the user or the system has requested the end of the program.
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Takes over SIGINT, SIGTERM and SIGHUP; on Windows, Ctrl-C and the closing of the console. A second
-    /// signal ends the program at once.
+    /// Handles SIGINT, SIGTERM and SIGHUP; on Windows, Ctrl-C and the closing of the console. A second signal ends the
+    /// program at once.
     pub fn new() -> Result<Self> {
         let flag = Arc::new(AtomicBool::new(false));
         let raised = Arc::clone(&flag);
@@ -29,18 +29,18 @@ impl Interrupt {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// The flag, for a line that must not block afterwards.
+    /// The flag, for a line that must not block once it is set.
     pub fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.0)
     }
 
-    /// The result of work that may block; `None` if it was not there before the interrupt.
+    /// The result of work that may block; `None` if an interrupt came first.
     pub fn unless_raised<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Option<T> {
         let (done, result) = channel();
-        // Without an owner the result is dropped.
+        // After an interrupt the result is dropped.
         thread::spawn(move || drop(done.send(work())));
         loop {
             match result.recv_timeout(Duration::from_millis(20)) {

@@ -6,8 +6,8 @@ use std::path::Path;
 /// Digits of a key of 128 bits.
 const DIGITS: usize = 32;
 
-/// Reads a key: 32 hexadecimal digits, with any white space around them. No error repeats the file's content: it may be
-/// a key.
+/// Reads a key: 32 hexadecimal digits, with any white space around them. No error quotes the file's content, which may
+/// be a key.
 pub fn read(path: &Path) -> Result<[u8; 16]> {
     let name = path.display();
     let what = format!(

@@ -1,4 +1,4 @@
-//! Frames as they come: a thread reads them, and the newest waits to be sent.
+//! Live frames: a thread reads them, and the newest waits to be sent.
 
 // Requirement: B-10
 
@@ -9,29 +9,29 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// The time to the next frame that is assumed at the first one: of 30 frames a second.
+/// The assumed time from the first frame to the second: that of 30 frames a second.
 const FIRST_GAP: Duration = Duration::from_millis(33);
 
-/// Positions, and the pose at which they are as a whole.
+/// Positions, and the rigid pose of the whole surface.
 type Rows = (Vec<Vec3>, Option<RigidPose>);
 
-/// A frame that fits the tree, as a source has it.
+/// A frame of a source that fits the tree.
 pub struct Parsed {
     /// In the mesh's order.
     pub positions: Vec<Vec3>,
-    /// At which they are as a whole, where the source has one.
+    /// The rigid pose of the whole surface, if the source has one.
     pub pose: Option<RigidPose>,
     /// When its last byte came.
     pub came: Instant,
     pub age: Age,
 }
 
-/// What a source knows of a frame's age.
+/// What a source states about a frame's age.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Age {
-    /// It states the time since the capture, also of frames that are equal.
+    /// The time since the capture, even for repeated frames.
     Stated(Duration),
-    /// At least so long on the way. A frame that equals the one before it is as old as that one.
+    /// A lower bound on the delay. A frame that equals the previous one is as old as that one.
     Delay(Duration),
 }
 
@@ -40,22 +40,22 @@ pub struct Frame {
     /// In the mesh's order.
     pub positions: Vec<Vec3>,
     pub pose: Option<RigidPose>,
-    /// When it came.
+    /// Its arrival time.
     pub came: Instant,
-    /// When the one that it repeats came, or it did: a source that states no age and stands still grows old.
+    /// The arrival time of the first of equal frames: a source that states no age and stops moving ages.
     pub first: Instant,
-    /// The age at that time.
+    /// The age at time `first`.
     pub age: Duration,
-    /// Time from the frame before it.
+    /// Time since the previous frame.
     pub gap: Duration,
 }
 
-/// What a source has.
+/// The state of a source.
 pub enum Next {
     Frame(Frame),
-    /// Nothing yet.
+    /// No frame yet.
     Later,
-    /// No more.
+    /// No more frames.
     End,
 }
 
@@ -68,7 +68,7 @@ struct Shared {
     changed: Condvar,
 }
 
-/// Room for one frame. Not a channel: a frame that waits behind others only grows old.
+/// Room for one frame. A queue would be wrong: frames that wait behind others only age.
 #[derive(Default)]
 struct Place {
     frame: Option<Frame>,
@@ -78,23 +78,23 @@ struct Place {
 }
 
 impl Live {
-    /// Starts to read what `next` gives, `None` at the end. With `keeps_all` a frame waits until the one before it is
-    /// taken; otherwise it replaces that one.
+    /// Starts to read frames from `next`, which returns `None` at the end. With `keeps_all` a frame waits until the
+    /// previous one is taken; otherwise it replaces it.
     pub fn start(
         next: impl FnMut() -> Result<Option<Parsed>> + Send + 'static,
         keeps_all: bool,
     ) -> Self {
         let shared = Arc::new(Shared::default());
         let filled = Arc::clone(&shared);
-        // It may wait for input for ever: the program ends without it.
+        // This thread may wait for input for ever, so the program does not wait for it.
         thread::spawn(move || filled.fill(next, keeps_all));
         Self(shared)
     }
 
-    /// The frame that waits, or the first that comes within `patience`.
+    /// The waiting frame, or the first that arrives within `patience`.
     ///
     /// # Errors
-    /// The source's, once every frame before it is taken.
+    /// The source's error, once every earlier frame is taken.
     pub fn next(&self, patience: Duration) -> Result<Next> {
         let place = self.0.place();
         let is_idle = |place: &mut Place| place.frame.is_none() && place.end.is_none();
@@ -110,7 +110,7 @@ impl Live {
         }
     }
 
-    /// Frames that newer ones replaced.
+    /// Number of frames that newer ones replaced.
     pub fn passed_over(&self) -> u64 {
         self.0.place().passed_over
     }
@@ -122,7 +122,7 @@ impl Shared {
     }
 
     fn fill(&self, mut next: impl FnMut() -> Result<Option<Parsed>>, keeps_all: bool) {
-        // The last positions and their pose, when they came, when their like first did, and its age then.
+        // The last positions and pose, their arrival time, the arrival time of the first equal frame, and its age then.
         let mut last: Option<(Rows, Instant, Instant, Duration)> = None;
         let end = loop {
             let Parsed { positions, pose, came, age } = match next() {

@@ -1,7 +1,8 @@
-//! Frames in memory that another program shares.
+//! Frames in memory shared with another program.
 //!
 //! The memory is little-endian: a sequence number (u64), the number of positions (u32), 0 (u32), and x, y and z of each
-//! position (f32). The number is 0 while there is no frame, odd while one is written, and even once it is whole.
+//! position (f32). The sequence number is 0 as long as there is no frame, odd while a frame is written, and even once
+//! it is complete.
 
 use super::parse::RAW;
 use anyhow::{Context, Result, bail};
@@ -14,16 +15,16 @@ use std::time::Duration;
 /// Bytes before the positions.
 const HEADER: usize = 16;
 
-/// Time between two looks at the sequence number.
+/// Interval at which the sequence number is polled.
 const GLANCE: Duration = Duration::from_micros(200);
 
-/// Gives the bytes of each whole frame once, until the memory is removed.
+/// Returns the bytes of each complete frame once, until the memory is removed.
 pub struct Memory {
     file: File,
     /// The sequence number of the frame in `bytes`.
     sequence: u64,
     bytes: Vec<u8>,
-    /// Bytes of it that were given.
+    /// Number of its bytes that were returned.
     given: usize,
 }
 
@@ -85,12 +86,12 @@ impl Memory {
         Ok(u64::from_le_bytes(number))
     }
 
-    /// Waits for a frame that is whole. Returns whether there is one.
+    /// Waits for a complete frame. Returns whether there is one.
     fn wait(&mut self) -> io::Result<bool> {
         loop {
             let before = self.now()?;
             if before == 0 {
-                // A writer that starts over in the same memory counts from here.
+                // A restarted writer counts from zero.
                 self.sequence = 0;
             }
             if before != self.sequence && before.is_multiple_of(2) {

@@ -1,4 +1,4 @@
-//! `dibs stream`: a motion, recorded or as it comes, sent to a controller.
+//! `dibs stream`: sends a recorded or live motion to a controller.
 
 mod igtl;
 mod interrupt;
@@ -63,36 +63,37 @@ wrong frame ends the stream.
 
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
 pub struct Args {
-    /// The tree that the receiver has (NAME.dibs), or its mesh, of which `dibs build` with default
-    /// options makes the same tree
+    /// The tree that the receiver has (NAME.dibs), or the mesh from which `dibs build` makes the same tree with default
+    /// options
     tree: PathBuf,
     #[command(flatten)]
     motion: MotionFile,
-    /// Frames as they come, instead of a recorded motion: from standard input (-), from shared memory (shm:NAME), or from
+    /// Live frames, instead of a recorded motion: from standard input (-), from shared memory (shm:NAME), or from
     /// OpenIGTLink (igtl:HOST:PORT, igtl-listen:PORT)
     #[arg(long, value_name = "SOURCE", conflicts_with_all = ["weights", "repeat"])]
     from: Option<LiveSource>,
-    /// What the frames of --from are
+    /// The format of the frames of --from
     #[arg(long, value_enum, default_value_t = Format::Raw, conflicts_with_all = ["motion", "unnamed_motion"])]
     format: Format,
-    /// The axes of the frames and of the tree, FROM:TO: RAS:LPS turns frames of 3D Slicer for a mesh that it saved
+    /// The axes of the frames and of the tree, FROM:TO: RAS:LPS converts frames of 3D Slicer for a mesh that it saved
     #[arg(long, conflicts_with_all = ["motion", "unnamed_motion"])]
     axes: Option<Axes>,
-    /// Take the messages of this OpenIGTLink device alone
+    /// Accept only messages of this OpenIGTLink device
     #[arg(long, conflicts_with_all = ["motion", "unnamed_motion"])]
     device: Option<String>,
-    /// Send every frame with the rigid pose that this OpenIGTLink device had last, in TRANSFORM, TDATA or QTDATA: the frame's
-    /// positions are those before it. For controllers that take posed frames. The age is that of the older of both, and a frame
-    /// counts as new where positions or pose have changed
+    /// Send every frame with the latest rigid pose of this OpenIGTLink device, from TRANSFORM, TDATA or QTDATA: the
+    /// frame's positions are those before the pose is applied. For controllers that accept posed frames. The age is
+    /// that of the older of the two, and a frame counts as new if positions or pose have changed
     #[arg(long, value_name = "TRACKED", conflicts_with_all = ["motion", "unnamed_motion"])]
     pose_device: Option<String>,
-    /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
-    /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next one
+    /// The receiver's address: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
+    /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next
+    /// frame
     #[arg(long)]
     to: Target,
     #[command(flatten)]
     motion_rate: MotionRate,
-    /// 6 bytes a vertex instead of 12, in a box around each frame
+    /// Send 6 bytes a vertex instead of 12, quantised in a box around each frame
     #[arg(long)]
     quantise: bool,
     /// Send only the vertices that moved by more than this (in the mesh's unit)
@@ -101,14 +102,14 @@ pub struct Args {
     /// Send the weights of the displacement modes that the tree was built with, instead of positions
     #[arg(long, alias = "modes", conflicts_with_all = ["quantise", "partial"])]
     weights: bool,
-    /// Put a tag on every packet, by the 128-bit key in this file: 32 hexadecimal digits. Waits for the
-    /// receiver's challenge
+    /// Add a tag to every packet, with the 128-bit key in this file: 32 hexadecimal digits. Waits for the receiver's
+    /// challenge
     #[arg(long, value_name = "KEY")]
     key: Option<PathBuf>,
-    /// The receiver's challenge, where it has no way to report one: 0, if it was made with none
+    /// The receiver's challenge, if it has no return channel to report one: 0 unless it was created with another
     #[arg(long, value_name = "NUMBER", requires = "key")]
     challenge: Option<u64>,
-    /// The receiver's id under the tags: a key may be shared by several receivers, each with its own
+    /// The receiver's id for the tags: several receivers may share a key, each with its own id
     #[arg(long, value_name = "NUMBER", default_value_t = 0, requires = "key")]
     receiver: u32,
     /// Largest packet, in bytes: no more than the receiver takes. 64 is a CAN-FD message
@@ -120,11 +121,11 @@ pub struct Args {
     /// Stop after this many frames. Ctrl-C stops too, and prints the totals
     #[arg(long)]
     frames: Option<u64>,
-    /// Frames that may be on their way before the next one waits, where the receiver reports
+    /// Most frames in flight before the next one waits, if the receiver reports
     #[arg(long, default_value_t = 2)]
     window: u32,
-    /// How long to try to connect again after the connection broke, and to an OpenIGTLink server also at the start; 0 gives
-    /// up at once
+    /// How long to try to reconnect after the connection broke, and to connect to an OpenIGTLink server at the start; 0
+    /// gives up at once
     #[arg(long, value_name = "SECONDS", default_value_t = 10)]
     retry: u64,
     #[command(flatten)]
@@ -152,7 +153,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
 }
 
-/// Where frames come from as they are made.
+/// The source of live frames.
 #[derive(Clone)]
 enum LiveSource {
     Input,
@@ -182,7 +183,7 @@ impl FromStr for LiveSource {
 struct Source {
     name: String,
     frames: Frames,
-    /// Frames a second; `None` as they come.
+    /// Frames a second; `None` to send frames as they arrive.
     rate: Option<f64>,
 }
 
@@ -195,12 +196,12 @@ enum Frames {
     },
     Live {
         live: Live,
-        /// With a source that counts what it refuses, and is told what the receiver reports.
+        /// For a source that counts refused messages, and reports the receiver's status to its peer.
         exchange: Option<Arc<Exchange>>,
     },
 }
 
-/// Starts to read frames as they come.
+/// Starts to read live frames.
 fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> Result<Source> {
     let (unit, axes, keeps_all) = (args.lengths.unit(), args.axes, rate.is_some());
     let place = Place { unit, axes, origin, order: order.clone() };
@@ -235,7 +236,7 @@ fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> 
     Ok(Source { name, frames: Frames::Live { live, exchange }, rate })
 }
 
-/// Reads a recorded motion, all of whose frames can be sent.
+/// Reads a recorded motion, and checks that all of its frames can be sent.
 fn recorded(args: &Args, path: &Path, order: &SurfaceOrder, origin: DVec3) -> Result<Source> {
     let motion = args.lengths.motion(path, origin)?;
     let rate = args.motion_rate.of(&motion, path)?;
@@ -250,7 +251,7 @@ fn recorded(args: &Args, path: &Path, order: &SurfaceOrder, origin: DVec3) -> Re
     Ok(Source { name: name.to_string(), frames, rate: Some(rate) })
 }
 
-/// Makes the sender: without tags, or with them once the receiver's challenge is known.
+/// Creates the sender: without tags, or with tags once the receiver's challenge is known.
 fn connect<const MTU: usize>(
     args: &Args,
     key: Option<[u8; 16]>,
@@ -278,7 +279,7 @@ fn connect<const MTU: usize>(
     Player::new(args, source, sender, interrupt).run()
 }
 
-/// The order and origin of a tree's vertices: of the tree file given, or of the tree built from the mesh file given.
+/// The order and origin of a tree's vertices: from the given tree file, or from the tree built of the given mesh file.
 fn order(path: &Path, lengths: &Lengths) -> Result<(SurfaceOrder, DVec3)> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dibs")) {
         let bytes = tree_file::load(path)?;

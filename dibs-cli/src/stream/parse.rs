@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 /// Bytes of a raw position.
 pub const RAW: usize = 12;
 
-/// Most bytes of a position in JSON: three numbers of all their digits, and white space.
+/// Largest size of a position in JSON: three numbers with all their digits, and white space.
 const MOST_JSON: usize = 256;
 
-/// What frames are made of.
+/// The format of frames.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
     /// Little-endian f32 numbers: x, y and z of each position
@@ -22,21 +22,21 @@ pub enum Format {
     Json,
 }
 
-/// Reads one frame after the other.
+/// Reads one frame after another.
 pub struct Parser<R> {
     /// The stream's name in errors.
     name: String,
     input: BufReader<R>,
     format: Format,
     place: Place,
-    /// Of the next frame, from 0.
+    /// Number of the next frame, from 0.
     number: usize,
 }
 
-/// Positions in the source's unit, and the age that they state.
+/// Positions in the source's unit, and their stated age.
 type Unplaced = (Vec<[f64; 3]>, Option<Duration>);
 
-/// A coordinate that is not finite is `null` in JavaScript's JSON.
+/// JavaScript writes a coordinate that is not finite as `null`.
 type Point = [Option<f64>; 3];
 
 #[derive(Deserialize)]
@@ -79,7 +79,7 @@ impl<R: Read> Parser<R> {
         let size = RAW * count;
         let mut bytes = Vec::with_capacity(size);
         (&mut self.input).take(size as u64).read_to_end(&mut bytes)?;
-        // So long a run of letters and digits is no run of coordinates.
+        // Coordinates do not contain so long a run of letters and digits.
         if self.number == 0 && !bytes.is_empty() && bytes.iter().all(is_text) {
             bail!("begins with text: give --format json for JSON lines");
         }
@@ -131,9 +131,9 @@ impl<R: Read> Parser<R> {
 fn json<'a, T: Deserialize<'a>>(line: &'a [u8]) -> Result<T> {
     serde_json::from_slice(line).map_err(|error| {
         let what = error.to_string();
-        // Its line is always the first.
+        // The error's line is always the first.
         let what = what.rsplit_once(" at line ").map_or(&*what, |(what, _)| what);
-        // The list opens one bracket, and each position one.
+        // The list opens with one bracket, and so does each position.
         let before = line.get(..error.column()).unwrap_or(line);
         let opened = before.iter().filter(|&&byte| byte == b'[').count();
         let at = match opened.checked_sub(2) {

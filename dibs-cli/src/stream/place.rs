@@ -1,4 +1,4 @@
-//! Positions of a live source, in the tree's unit, axes and origin.
+//! Converts positions of a live source to the tree's unit, axes and origin.
 
 use anyhow::{Result, anyhow};
 use dibs_build::glam::{DMat3, DQuat, DVec3, Vec3};
@@ -7,10 +7,10 @@ use dibs_nostd::RigidPose;
 use dibs_stream::SurfaceOrder;
 use std::str::FromStr;
 
-/// The patient's axes, each by the letters of its two directions.
+/// The patient's axes, each with the letters of its two directions.
 const AXES: [[char; 2]; 3] = [['R', 'L'], ['A', 'P'], ['S', 'I']];
 
-/// Where a source's positions are in the tree.
+/// The conversion of a source's positions to the tree's.
 #[derive(Clone)]
 pub struct Place {
     pub unit: Option<Unit>,
@@ -24,11 +24,11 @@ pub struct Place {
 pub struct Axes([(usize, f64); 3]);
 
 impl Place {
-    /// A frame in the mesh's order and the source's unit and axes, as the tree has it.
+    /// Converts a frame in the mesh's order, and in the source's unit and axes, to the tree's.
     ///
     /// # Errors
-    /// What no frame of the tree's surface has: a coordinate that is not finite, another number of vertices, another size,
-    /// inside out.
+    /// If the positions are not a frame of the tree's surface: a coordinate is not finite, the number of vertices or
+    /// the size differs, or the surface is inside out.
     pub fn frame(&self, mut positions: Vec<[f64; 3]>, number: usize) -> Result<Vec<Vec3>> {
         if let Some(axes) = self.axes {
             positions.iter_mut().for_each(|position| *position = axes.turn(*position));
@@ -45,15 +45,15 @@ impl Place {
         Ok(positions)
     }
 
-    /// A pose in the source's unit and axes, as the tree has it. Where the tree counts from a point of its own, so does the
-    /// world.
+    /// Converts a pose in the source's unit and axes to the tree's. If the tree has an origin, the world frame has the
+    /// same.
     ///
     /// # Errors
-    /// If its shift is too large.
+    /// If its translation is too large.
     pub fn pose(&self, rotation: &DQuat, shift: DVec3) -> Result<RigidPose> {
         let (mut rotation, mut shift) = (*rotation, shift);
         if let Some(axes) = self.axes {
-            // By columns: each axis of the tree, as the source's has it.
+            // By columns: each axis of the tree in the source's axes.
             let from = DMat3::from_cols_array_2d(
                 &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| axes.turn(axis)),
             );
@@ -113,8 +113,8 @@ mod tests {
     use dibs_build::{Builder, Unit};
     use dibs_stream::SurfaceOrder;
 
-    /// A point that a source moves by its pose is where the tree's point is moved by the tree's: in other axes, metres, and from
-    /// another origin.
+    /// Converting a point and then applying the converted pose equals applying the pose and then converting the point:
+    /// with other axes, metres, and another origin.
     #[test]
     fn a_pose_is_placed_as_its_points_are() {
         let built = Builder::new().build(&heart(320).expect("a size").mesh).expect("a tree");

@@ -1,4 +1,4 @@
-//! Plays a motion to a receiver: a recording at its speed, live frames as they come.
+//! Sends a motion to a receiver: a recording at its rate, live frames as they arrive.
 
 use super::igtl::Exchange;
 use super::interrupt::Interrupt;
@@ -15,22 +15,23 @@ use dibs_stream::{Pace, SendError, Sender};
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
-/// A receiver without a status for this long does not report.
+/// A receiver that sends no status for this long counts as silent.
 const SILENT: Duration = Duration::from_secs(2);
 
-/// A datagram that nobody takes comes back within this time.
+/// A datagram that nobody receives is rejected within this time.
 const REFUSAL: Duration = Duration::from_millis(100);
 
-/// Datagrams that came back so long before the end were sent before the receiver started: not every one comes back.
+/// Rejections this long before the end concern datagrams sent before the receiver started; not every datagram is
+/// rejected.
 const RECENT: Duration = Duration::from_millis(1500);
 
-/// Between two attempts to connect.
+/// Interval of attempts to connect.
 const ATTEMPT: Duration = Duration::from_millis(200);
 
-/// Longest time over which a frame's packets are spread: a slow recording's frames need not arrive later than that.
+/// Longest time over which a frame's packets are spread: frames of a slow recording need not arrive any later.
 const SPREAD: Duration = Duration::from_millis(50);
 
-/// Time between two polls.
+/// Interval of polling.
 const GLANCE: Duration = Duration::from_millis(2);
 
 pub struct Player<'a, const MTU: usize, M> {
@@ -38,15 +39,15 @@ pub struct Player<'a, const MTU: usize, M> {
     source: &'a Source,
     sender: Sender<Line, MTU, M>,
     interrupt: Interrupt,
-    /// From one frame to the next; zero where they are sent as they come.
+    /// Time between two frames; zero to send them as they arrive.
     interval: Duration,
     display: Display,
     outcome: Outcome,
-    /// The receiver's statuses so far, and when the last one came.
+    /// Number of the receiver's statuses, and the time of the last one.
     heard: (u64, Instant),
 }
 
-/// What is sent of a frame.
+/// The content of a frame that is sent.
 enum Rows<'a> {
     Positions(Cow<'a, [Vec3]>, Option<RigidPose>),
     Weights(&'a [f32]),
@@ -57,9 +58,9 @@ struct Due<'a> {
     rows: Rows<'a>,
     /// Time since its capture.
     ago: Duration,
-    /// Time to the next one, as far as it is known.
+    /// Time until the next frame, as far as known.
     period: Duration,
-    /// When its last byte came, of a live source.
+    /// Arrival time of its last byte, for a live source.
     came: Option<Instant>,
 }
 
@@ -77,7 +78,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         Self { args, source, sender, interrupt, interval, display, outcome, heard }
     }
 
-    /// Sends the frames, and prints the totals, after an interrupt too.
+    /// Sends the frames, and prints the totals, even after an interrupt.
     pub fn run(mut self) -> Result<()> {
         self.await_challenge()?;
         let played = self.play();
@@ -94,7 +95,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         played.and(refused)
     }
 
-    /// An error if nothing listens at the end.
+    /// Fails if nothing listens at the end.
     fn refused(&mut self) -> Result<()> {
         let is_heard = self.sender.totals().statuses > 0 && self.sender.in_flight() == 0;
         if !matches!(self.args.to, Target::Udp { .. }) || is_heard {
@@ -116,7 +117,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         Ok(())
     }
 
-    /// Waits for the receiver's challenge, if tags need it.
+    /// Waits for the receiver's challenge if tags are used.
     fn await_challenge(&mut self) -> Result<()> {
         let (start, to) = (Instant::now(), &self.args.to);
         while !self.sender.is_ready() && !self.interrupt.is_raised() {
@@ -164,7 +165,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         if let Some(timing) = &mut self.outcome.timing {
             timing.end();
         }
-        // Wait for the acknowledgement of frames on their way, if the receiver acknowledges any.
+        // Wait for the acknowledgement of frames in flight, if the receiver acknowledges any.
         let end = Instant::now();
         while self.sender.in_flight() > 0
             && self.sender.status().is_some()
@@ -177,8 +178,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         Ok(())
     }
 
-    /// The frame that is due; of a live source once it is there, and then it is due. `None` after the last one and after an
-    /// interrupt.
+    /// The next frame to send; a live frame is due when it arrives. `None` after the last frame and after an interrupt.
     fn next(&mut self, number: u64, due: &mut Instant) -> Result<Option<Due<'a>>> {
         let period = self.interval;
         let is_due_when_it_came;
@@ -189,7 +189,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                     Some(weights) => Rows::Weights(&weights[at]),
                     None => Rows::Positions(Cow::Borrowed(&positions[at]), None),
                 };
-                // A recorded frame counts as captured when it is due, even if the surface stands still.
+                // A recorded frame counts as captured when it is due, even if the surface does not move.
                 return Ok(Some(Due { rows, ago: Duration::ZERO, period, came: None }));
             }
             Frames::Live { live, exchange } => {
@@ -203,7 +203,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
                     *due = frame.came.max(*due);
                     self.outcome.passed_over = live.passed_over();
                     let rows = Rows::Positions(Cow::Owned(frame.positions), frame.pose);
-                    // A program that prints faster than the rate has frames that are due later.
+                    // Frames of a program that prints faster than the rate are due later, so their waiting is no age.
                     let is_waiting = period.is_zero() || is_due_when_it_came;
                     let waited = if is_waiting { frame.first.elapsed() } else { Duration::ZERO };
                     let period = if period.is_zero() { frame.gap } else { period };
@@ -218,7 +218,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     }
 
     fn send(&mut self, frame: &Due<'_>) -> Result<()> {
-        // Any other line holds the sender up by itself; a datagram that does not fit the receiver's buffer is lost.
+        // Any other line blocks until it has room; a datagram that does not fit in the receiver's buffer is lost.
         let spread = match self.args.to {
             Target::Udp { .. } => SPREAD.min(frame.period / 2),
             _ => Duration::ZERO,
@@ -281,9 +281,9 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         }
     }
 
-    /// Connects again, within the time that the user allows.
+    /// Reconnects, within the time that the user allows.
     fn reconnect(&mut self, error: &std::io::Error) -> Result<()> {
-        // An interrupt prints the totals and is no error.
+        // An interrupt prints the totals and is not an error.
         if self.interrupt.is_raised() {
             return Ok(());
         }
@@ -309,7 +309,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         )
     }
 
-    /// Sends heartbeats and takes statuses until the next frame is due and fits the window.
+    /// Sends heartbeats and receives statuses until the next frame is due and fits in the window.
     fn wait(&mut self, due: Instant) -> Result<()> {
         let mut heard = (self.sender.totals().statuses, Instant::now());
         loop {

@@ -10,26 +10,26 @@ use std::fmt::Write;
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Progress: one line on a terminal, one line each second elsewhere.
+/// Progress: one line that is updated on a terminal, elsewhere one line each second.
 pub struct Display {
     bar: ProgressBar,
     last: Instant,
 }
 
-/// Totals of a stream besides the sender's.
+/// Totals of a stream in addition to the sender's.
 #[derive(Default)]
 pub struct Outcome {
-    /// Frames that were sent later than they were due.
+    /// Number of frames that were sent later than they were due.
     pub late: u64,
-    /// Live frames that newer ones replaced before they were sent.
+    /// Number of live frames that newer ones replaced before they were sent.
     pub passed_over: u64,
-    /// Times that the connection was made again.
+    /// Number of times that the connection was made again.
     pub reconnections: u64,
-    /// Datagrams that came back.
+    /// Number of datagrams that were rejected.
     pub refused: u64,
-    /// Times of a live source's frames.
+    /// Timing of a live source's frames.
     pub timing: Option<Timing>,
-    /// Whether the user ended it.
+    /// Whether the user ended the stream.
     pub is_interrupted: bool,
 }
 
@@ -57,7 +57,7 @@ impl Display {
         }
     }
 
-    /// Warns that frames wait although the receiver reports.
+    /// Warns that frames are waiting although the receiver reports.
     pub fn warn<M: Mac, const MTU: usize>(&self, sender: &Sender<Line, MTU, M>) {
         let mut text = format!("{} frames are not acknowledged", sender.in_flight());
         text += match sender.status().and_then(|status| status.published) {
@@ -71,7 +71,7 @@ impl Display {
         self.bar.suspend(|| eprintln!("{text}"));
     }
 
-    /// Shows a line above the progress.
+    /// Prints a line above the progress.
     pub fn note(&self, text: &str) {
         self.bar.suspend(|| eprintln!("{text}"));
     }
@@ -94,7 +94,7 @@ fn line<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>, sent: &Sent) ->
     text
 }
 
-/// What the receiver says of itself; `None` before its first status.
+/// What the receiver reports; `None` before its first status.
 pub fn receiver<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>) -> Option<Report> {
     let status = sender.status()?;
     let mut text = match sender.acknowledged() {

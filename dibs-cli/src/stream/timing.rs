@@ -1,16 +1,16 @@
-//! The rate of a live source, its gaps, and the time from a frame's last byte until it is sent.
+//! The rate of a live source, its gaps, and its latency: from a frame's last byte until the frame is sent.
 
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Bins of 0.1 ms.
+/// Number of bins, each of 0.1 ms.
 const BINS: usize = 1000;
 
 pub struct Timing {
     came: Option<(Instant, Instant)>,
     longest_gap: Duration,
     frames: u64,
-    /// Frames by their latency; the last bin has the longer ones.
+    /// Number of frames by latency; the last bin includes all longer ones.
     bins: Vec<u64>,
     longest: Duration,
 }
@@ -33,7 +33,7 @@ impl Timing {
         self.bins[bin as usize] += 1;
     }
 
-    /// The silence after the last frame is a gap, too.
+    /// Counts the silence after the last frame as a gap.
     pub fn end(&mut self) {
         let silence = self.came.map_or(Duration::ZERO, |(_, last)| last.elapsed());
         self.longest_gap = self.longest_gap.max(silence);
@@ -45,7 +45,7 @@ impl Timing {
         (self.frames - 1) as f64 / (last - first).as_secs_f64().max(1e-9)
     }
 
-    /// The latency that this part of the frames does not exceed, in milliseconds.
+    /// The latency that this fraction of the frames does not exceed, in milliseconds.
     fn latency(&self, part: f64) -> f64 {
         let mut left = (part * self.frames as f64).ceil() as u64;
         let at = self.bins.iter().position(|&frames| {
@@ -90,7 +90,7 @@ mod tests {
         let mut timing = Timing::new();
         assert_eq!((timing.rate(), timing.latency(0.99)), (0.0, 0.0));
         let start = Instant::now().checked_sub(Duration::from_secs(3)).expect("an early time");
-        // One frame of four is late, and its time is that of all bins together.
+        // One frame of four is late, by more than all bins cover.
         for ms in [0, 100, 900, 3000] {
             timing.count(start + Duration::from_millis(ms));
         }

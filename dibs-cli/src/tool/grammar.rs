@@ -1,4 +1,4 @@
-//! A tool in words: `0,0,150,5`, `sphere:0,0,150,5` or `{"sphere": [0, 0, 150, 5]}`, and a chain of them.
+//! Parses a tool: `0,0,150,5`, `sphere:0,0,150,5` or `{"sphere": [0, 0, 150, 5]}`, or a chain of tools.
 
 use super::{REMEDY, ToolSpec, check_chain, of_numbers};
 use anyhow::{Result, anyhow, bail};
@@ -11,7 +11,7 @@ enum JsonTool {
     Capsule([f64; 7]),
 }
 
-/// The only tool of a text.
+/// Parses a text of exactly one tool.
 pub fn one(text: &str) -> Result<ToolSpec> {
     match *chain(text)? {
         [tool] => Ok(tool),
@@ -22,7 +22,7 @@ pub fn one(text: &str) -> Result<ToolSpec> {
     }
 }
 
-/// The tools of a text, at least one.
+/// Parses a text of one or several tools.
 pub fn chain(text: &str) -> Result<Vec<ToolSpec>> {
     let text = text.trim();
     let tools: Vec<ToolSpec> = match text.as_bytes() {
@@ -39,7 +39,7 @@ pub fn chain(text: &str) -> Result<Vec<ToolSpec>> {
     Ok(tools)
 }
 
-/// Whether a line has names of columns instead of numbers.
+/// Whether a line has column names instead of numbers.
 pub fn is_header(line: &str) -> bool {
     !line.starts_with(['[', '{'])
         && !line.contains(':')
@@ -47,8 +47,8 @@ pub fn is_header(line: &str) -> bool {
         && line.split(',').all(|cell| cell.trim().parse::<f32>().is_err())
 }
 
-/// The tools of a text that is not JSON. Each after the first begins at a word with a colon: there may be spaces behind
-/// commas.
+/// The tools of a text that is not JSON. Each tool after the first begins at a word with a colon, because spaces may
+/// follow commas.
 fn tools(text: &str) -> Vec<String> {
     let mut tools: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -60,7 +60,7 @@ fn tools(text: &str) -> Vec<String> {
     tools
 }
 
-/// Numbers, with their shape before them or without it.
+/// Parses numbers, with or without a shape before them.
 fn word(text: &str) -> Result<ToolSpec> {
     let (shape, numbers) =
         text.split_once(':').map_or((None, text), |(shape, numbers)| (Some(shape), numbers));
@@ -81,7 +81,7 @@ fn word(text: &str) -> Result<ToolSpec> {
 fn json<'a, T: Deserialize<'a>>(line: &'a str) -> Result<T> {
     serde_json::from_str(line).map_err(|error| {
         let what = error.to_string();
-        // Its line is always the first.
+        // The error's line is always the first.
         let what = what.rsplit_once(" at line ").map_or(&*what, |(what, _)| what);
         anyhow!(
             "column {}: {what}; give {{\"sphere\": [X, Y, Z, R]}}, {{\"capsule\": [X1, Y1, Z1, X2, Y2, Z2, R]}}, \

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-/// Bytes that are read at once: some thousand tools.
+/// Bytes per read: some thousand tools.
 const BUFFER: usize = 1 << 18;
 
 /// The longest line, in bytes.
@@ -16,7 +16,7 @@ const LONGEST: u64 = 1 << 16;
 pub struct Lines {
     input: BufReader<Box<dyn Read>>,
     pub name: String,
-    /// Of the last line that was read, from 1.
+    /// Number of the last line that was read, from 1.
     pub number: usize,
 }
 
@@ -33,7 +33,7 @@ impl Lines {
         Ok(Self { input: BufReader::with_capacity(BUFFER, input), name, number: 0 })
     }
 
-    /// The next line, `Some(None)` where it has no tool, `None` at the end.
+    /// The next line; `Some(None)` if it has no tool, `None` at the end.
     pub fn next(&mut self) -> Result<Option<Option<String>>> {
         self.number += 1;
         let name = || format!("{}, line {}", self.name, self.number);
@@ -47,20 +47,20 @@ impl Lines {
             bail!("{}: longer than {LONGEST} bytes; give one pose a line", name());
         }
         let line = String::from_utf8(line)
-            .map_err(|_| anyhow!("{}: is no text; give CSV or JSON lines in UTF-8", name()))?;
-        // Excel begins a file with this mark.
+            .map_err(|_| anyhow!("{}: is not text; give CSV or JSON lines in UTF-8", name()))?;
+        // Excel begins a file with a byte order mark.
         let line = line.trim_start_matches('\u{feff}').trim();
         let has_none = line.is_empty() || self.number == 1 && grammar::is_header(line);
         Ok(Some((!has_none).then(|| line.to_owned())))
     }
 
-    /// Whether another line is there already.
+    /// Whether another line is available already.
     pub fn is_waiting(&self) -> bool {
         self.input.buffer().contains(&b'\n')
     }
 }
 
-/// The tool at each tick, a line each, as `each` has it.
+/// Reads the tool at each tick, a line each, converted by `each`.
 pub fn path<T>(path: &Path, each: impl Fn(ToolSpec) -> Result<T>) -> Result<Vec<T>> {
     let mut lines = Lines::open(path)?;
     let mut tools = Vec::new();

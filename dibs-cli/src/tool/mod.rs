@@ -1,4 +1,4 @@
-//! A tool, in one grammar wherever a command takes one: `--tool`, `--poses`, `--path`.
+//! A tool, with one grammar for all commands: `--tool`, `--poses`, `--path`.
 
 mod grammar;
 mod lines;
@@ -10,12 +10,12 @@ use anyhow::{Result, bail};
 use dibs_build::glam::DVec3;
 use dibs_nostd::{Capsule, Sphere};
 
-/// Most tools of a chain.
+/// Largest number of tools in a chain.
 const MOST: usize = 8;
 
 const REMEDY: &str = "give X,Y,Z,R for a sphere or X1,Y1,Z1,X2,Y2,Z2,R for a capsule";
 
-/// A tool in the coordinates of the mesh's file, which f32 may not hold.
+/// A tool in the coordinates of the mesh's file, which may be too large for f32.
 #[derive(Clone, Copy, Debug)]
 pub enum ToolSpec {
     Sphere { centre: DVec3, radius: f32 },
@@ -30,7 +30,7 @@ pub enum LocalTool {
 }
 
 impl ToolSpec {
-    /// The tool for a tree with this origin, which f64 subtracts.
+    /// Converts the tool to the coordinates of a tree with this origin, which is subtracted in f64.
     pub fn local(&self, origin: DVec3) -> Result<LocalTool> {
         let local = |point: DVec3| (point - origin).as_vec3();
         Ok(match *self {
@@ -43,7 +43,7 @@ impl ToolSpec {
         })
     }
 
-    /// The numbers of the tool for a tree with this origin: four of a sphere, seven of a capsule.
+    /// The numbers of the tool for a tree with this origin: four for a sphere, seven for a capsule.
     pub fn numbers(&self, origin: DVec3) -> Result<Vec<f32>> {
         self.local(origin)?;
         let local = |point: DVec3| (point - origin).as_vec3().to_array();
@@ -55,7 +55,7 @@ impl ToolSpec {
         })
     }
 
-    /// A point of the tool.
+    /// A point on the tool's axis.
     fn start(&self) -> DVec3 {
         match *self {
             Self::Sphere { centre, .. } => centre,
@@ -64,7 +64,7 @@ impl ToolSpec {
     }
 }
 
-/// Four numbers are a sphere, seven a capsule.
+/// Four numbers define a sphere, seven a capsule.
 fn of_numbers(numbers: &[f64]) -> Result<ToolSpec> {
     let tool = match *numbers {
         [x, y, z, radius] => {
@@ -76,12 +76,12 @@ fn of_numbers(numbers: &[f64]) -> Result<ToolSpec> {
         }
         _ => bail!("{} numbers are no tool: {REMEDY}", numbers.len()),
     };
-    // Wherever the tree is, its numbers must be finite, and its radius and length possible.
+    // Whatever the tree's origin, the numbers must be finite, and radius and length valid.
     tool.local(if tool.start().is_finite() { tool.start() } else { DVec3::ZERO })?;
     Ok(tool)
 }
 
-/// An error where there are too many tools.
+/// Fails if there are too many tools.
 pub fn check_chain(tools: &[ToolSpec]) -> Result<()> {
     if tools.len() > MOST {
         bail!("{} tools are no chain of at most {MOST}", tools.len());

@@ -1,4 +1,4 @@
-//! `dibs view`: one HTML file in which the real query runs.
+//! `dibs view`: one HTML file that runs the actual query.
 
 mod pack;
 mod page;
@@ -36,17 +36,18 @@ pub struct Args {
     /// The HTML file to write
     #[arg(short, long)]
     output: PathBuf,
-    /// The instrument at each millisecond, as `dibs track` takes it: `-` is standard input; otherwise it is in the viewer's hand
+    /// The instrument's pose at each millisecond, as for `dibs track`: `-` is standard input; by default the viewer
+    /// moves it
     #[arg(long, value_name = "TOOLS")]
     path: Option<PathBuf>,
-    /// What `dibs filter --json` printed for the path: the instrument moves as admitted, and the commanded one is drawn beside
-    /// it. A line may also have `energy`, in mJ
+    /// The output of `dibs filter --json` for the path: the instrument moves as admitted, and the commanded one is
+    /// drawn beside it. A line may also have `energy`, in mJ
     #[arg(long, value_name = "TICKS", requires = "path")]
     ticks: Option<PathBuf>,
     #[command(flatten)]
     motion_rate: MotionRate,
-    /// The page without data; by default dibs-viewer.html beside this program, which a checkout's program makes where it is
-    /// missing and Node.js is there
+    /// The page without data; by default dibs-viewer.html beside this program. If it is missing, a program in a
+    /// checkout makes it, for which Node.js is needed
     #[arg(long, value_name = "PAGE")]
     page: Option<PathBuf>,
     #[command(flatten)]
@@ -66,7 +67,7 @@ pub fn run(args: &Args) -> Result<()> {
         AnyTree::Narrow(tree) => data(args, &tree, &bytes)?,
         AnyTree::Wide(tree) => data(args, &tree, &bytes)?,
     };
-    // The page may have to be made first, which takes long: after every error that the inputs can have.
+    // Last, because the page may have to be made first, which takes long: all errors of the inputs are reported before.
     let page = page.filled(&data)?;
     write_atomically(&args.output, |out| out.write_all(page.as_bytes()))?;
     let name = args.output.display();
@@ -78,7 +79,7 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// The elements with the tree, the motion and the facts about them.
+/// The elements with the tree, the motion and their descriptions.
 fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<String> {
     let (frames, rate) = match args.motion.given() {
         Some(path) => motion(args, tree, path)?,
@@ -124,7 +125,7 @@ fn data<I: Index>(args: &Args, tree: &Tree<'_, I>, bytes: &[u8]) -> Result<Strin
     Ok(data)
 }
 
-/// The frames of a motion, of vertices in the order of the tree's rows or of nodes, none of them stretched too far.
+/// The frames of a motion: of vertices in the order of the tree's rows or of nodes, all within the stretch limit.
 fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec<Vec<Vec3>>, f64)> {
     let name = path.display();
     let motion = args.lengths.motion_of(tree, path)?;

@@ -1,4 +1,4 @@
-//! Packs data into a page, without the loss of a bit.
+//! Packs data into a page, without loss.
 
 use anyhow::Result;
 use base64::Engine;
@@ -8,8 +8,9 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use std::io::Write;
 
-/// Rearranges a motion's words for the compressor. Each word becomes its difference from the frame before, with the sign
-/// in the lowest bit. The lowest bytes of all words come first, then the next bytes. `viewer/src/motion.rs` undoes it.
+/// Rearranges a motion's words for the compressor. Each word becomes its difference from the frame before, with the
+/// sign in the lowest bit. The lowest bytes of all words come first, then the next bytes. `viewer/src/motion.rs`
+/// reverses it.
 pub fn words(frames: &[Vec<Vec3>]) -> Vec<u8> {
     let zero = vec![Vec3::ZERO; frames.first().map_or(0, Vec::len)];
     let befores = std::iter::once(&zero).chain(frames);
@@ -27,14 +28,14 @@ pub fn words(frames: &[Vec<Vec3>]) -> Vec<u8> {
     (0..4).flat_map(|plane| codes.iter().map(move |code| code[plane])).collect()
 }
 
-/// The tools of a path, or the record of its ticks, as little-endian f32: the count of a tool's numbers, which differs between
-/// spheres and capsules, and the numbers. `viewer/page/path.js` undoes it.
+/// The tools of a path, or the record of its ticks, as little-endian f32: how many numbers a tool has, which differs
+/// between spheres and capsules, and the numbers. `viewer/page/path.js` reads it.
 pub fn path(tools: &[Vec<f32>]) -> Vec<u8> {
     let counted = |tool: &Vec<f32>| [&[tool.len() as f32][..], tool].concat();
     tools.iter().flat_map(counted).flat_map(f32::to_le_bytes).collect()
 }
 
-/// Bytes, compressed, as text.
+/// Compressed bytes as text.
 pub fn text(bytes: &[u8]) -> Result<String> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(bytes)?;

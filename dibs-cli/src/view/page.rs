@@ -7,16 +7,16 @@ use std::process::{Command, Stdio};
 
 /// The page, as `cargo xtask viewer` writes it.
 const PAGE: &str = "dibs-viewer.html";
-/// Where the data belongs in it.
+/// Where the data are inserted in it.
 const MARK: &str = "<!--data-->";
 
-/// What makes the page.
+/// The command that makes the page.
 const MAKER: &str = "cargo xtask viewer";
 
-/// The page's file: the one given, or the one beside this program.
+/// The page's file: the given one, or the one beside this program.
 pub struct Page {
     pub path: PathBuf,
-    /// The program that makes the page where it is missing; none for a page that is given.
+    /// The program that makes the page if it is missing; `None` for a page that is given.
     maker: Option<PathBuf>,
 }
 
@@ -30,7 +30,7 @@ impl Page {
         Ok(Self { path: program.with_file_name(PAGE), maker: Some(program) })
     }
 
-    /// Its text, with this data.
+    /// The page's text with this data inserted.
     pub fn filled(&self, data: &str) -> Result<String> {
         match &self.maker {
             Some(program) if !self.path.is_file() => make(program, &self.path)?,
@@ -44,7 +44,7 @@ fn read(path: &Path) -> Result<String> {
     let name = path.display();
     let page = std::fs::read_to_string(path)
         .with_context(|| format!("{name}: cannot be read; `{MAKER}` in the repository writes it, and --page names another"));
-    // One sentence, with the system's reason at its end.
+    // One sentence that ends with the system's reason.
     let page = page.map_err(|error| anyhow::anyhow!("{error:#}"))?;
     ensure!(
         page.contains(MARK),
@@ -53,10 +53,10 @@ fn read(path: &Path) -> Result<String> {
     Ok(page)
 }
 
-/// Makes the page in the checkout that holds this program. It appears whole or not at all.
+/// Makes the page in the checkout that contains this program. It appears completely or not at all.
 fn make(program: &Path, page: &Path) -> Result<()> {
     let name = page.display();
-    // The folder in which a command is run must not decide which program that is, nor may any folder above this program's.
+    // Neither the current folder nor any folder above this program's may decide which program is run.
     let is_own = |folder: &&Path| is_checkout(folder) && program.starts_with(folder.join("target"));
     let Some(root) = program.ancestors().find(is_own) else {
         bail!(
@@ -74,7 +74,7 @@ fn make(program: &Path, page: &Path) -> Result<()> {
     );
     let mut maker = Command::new("cargo");
     maker.args(["xtask", "viewer"]).current_dir(root);
-    // Standard output is this command's own.
+    // Standard output is reserved for this command's results.
     let status = maker.stdin(Stdio::null()).stdout(io::stderr()).status();
     let status = status.with_context(|| format!("`{MAKER}` did not start"))?;
     ensure!(

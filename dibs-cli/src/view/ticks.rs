@@ -1,4 +1,4 @@
-//! The record of the ticks beside an instrument's path: what a filter admitted, and the energy that a wall has left.
+//! The record of the ticks beside an instrument's path: what a filter admitted, and the energy budget of a wall.
 
 use crate::tool::{self, Lines};
 use anyhow::{Result, anyhow, bail, ensure};
@@ -6,32 +6,32 @@ use dibs_build::glam::DVec3;
 use serde::Deserialize;
 use std::path::Path;
 
-/// A tick's line; a key that is null or absent is unknown.
+/// A tick's line; a key that is null or absent means unknown.
 #[derive(Deserialize)]
 struct Line {
     tick: Option<usize>,
-    /// The pose that was admitted, as a tool in words.
+    /// The admitted pose, as the text of a tool.
     admitted: Option<String>,
     /// The least separation during the admitted motion (mm).
     least_separation: Option<f32>,
     reason: Option<String>,
-    /// What the wall may still give to the hand (mJ).
+    /// The energy that the wall may still return to the hand (mJ).
     energy: Option<f32>,
 }
 
 /// The record of a path's ticks.
 #[derive(Default)]
 pub struct Record {
-    /// The admitted poses, of every tick or of none.
+    /// The admitted poses: of every tick, or empty.
     pub admitted: Vec<Vec<f32>>,
-    /// Of each tick: the reason's number, the separation and the energy, NaN where it is unknown.
+    /// For each tick: the reason's index, the separation and the energy, NaN if unknown.
     pub ticks: Vec<Vec<f32>>,
-    /// The reasons in words, by their numbers.
+    /// The reasons as text, by index.
     pub reasons: Vec<String>,
 }
 
 impl Record {
-    /// Of a file with a line for each of the path's `count`.
+    /// Reads a file with a line for each of the path's `count` ticks.
     pub fn read(path: &Path, count: usize, origin: DVec3) -> Result<Self> {
         let mut lines = Lines::open(path)?;
         let mut record = Self::default();
@@ -71,7 +71,7 @@ impl Record {
         Ok(())
     }
 
-    /// The number of a reason.
+    /// The index of a reason.
     fn number(&mut self, reason: String) -> usize {
         let known = self.reasons.iter().position(|known| *known == reason);
         known.unwrap_or_else(|| {

@@ -1,4 +1,4 @@
-//! The command line says one thing one way.
+//! The options of the command line have one name for one value.
 
 // Requirement: P-08
 
@@ -9,11 +9,11 @@ use clap::{Arg, Command};
 use std::collections::{BTreeMap, BTreeSet};
 use table::{WORDS, of_clap, of_table, word};
 
-/// Values that several options may have: units, and numbers without one.
+/// Value names that several options may have: units, and numbers without a unit.
 const UNITS: [&str; 9] =
     ["HZ", "MM", "MM/S", "MS", "SECONDS", "NUMBER", "TOLERANCE", "COUNT", "BYTES"];
 
-/// A line in earlier words, and the same in today's.
+/// A command line with the options of earlier versions, and the same with today's.
 const EARLIER: [(&str, &str); 6] = [
     ("stretch h.ply h.pc2 --margin 0.2", "stretch h.ply --motion h.pc2 --margin 0.2"),
     ("view h.dibs h.pc2 -o h.html", "view h.dibs --motion h.pc2 -o h.html"),
@@ -29,7 +29,7 @@ const EARLIER: [(&str, &str); 6] = [
     ),
 ];
 
-/// The commands of the program, and those below them, each by the name of the one at the top.
+/// The commands of the program and their subcommands, each with the name of its top-level command.
 fn commands() -> Vec<(String, Command)> {
     let top = crate::command();
     let mut found = Vec::new();
@@ -70,7 +70,7 @@ fn a_value_has_one_word_and_a_word_one_value() {
             assert_eq!(kinds.insert(kind, word), None, "{kind} has two words, one of them {word}");
         }
     }
-    // Of one type, too, wherever it is.
+    // An option must have the same type in all commands.
     let mut types = BTreeMap::new();
     for (command, arg) in arguments() {
         let (own, word) = (arg.get_value_parser().type_id(), word(&arg));
@@ -79,7 +79,7 @@ fn a_value_has_one_word_and_a_word_one_value() {
     }
 }
 
-/// A number below 0 is a value that is refused, and no option that nobody knows.
+/// A negative number is a value that is refused, and not an unknown option.
 #[test]
 fn numbers_may_be_negative_where_they_are_fractions() {
     let types = [
@@ -93,7 +93,7 @@ fn numbers_may_be_negative_where_they_are_fractions() {
     }
 }
 
-/// What a line gives to which argument.
+/// The arguments that a command line sets, and their values.
 fn given(line: &str) -> BTreeMap<String, Vec<String>> {
     let matches = crate::command()
         .try_get_matches_from(["dibs"].into_iter().chain(line.split(' ')))

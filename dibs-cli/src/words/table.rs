@@ -1,9 +1,9 @@
-//! The words of `dibs` and of `cargo xtask demo`: each value has one.
+//! The options of `dibs` and of `cargo xtask demo`: one name for each value.
 
 use clap::{Arg, Command};
 use std::collections::BTreeSet;
 
-/// An option's name, its value's name (a switch has none), its meaning, and the commands that have it.
+/// An option's name, the name of its value (a switch has none), its meaning, and the commands that have it.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 #[rustfmt::skip]
@@ -78,13 +78,13 @@ pub const WORDS: &[Row] = &[
     ("seed", "SEED", "the faults' seed", "demo"),
 ];
 
-/// The words of a command with the names of their values, as the table has them.
+/// The options of a command with the names of their values, from the table.
 pub fn of_table(command: &str) -> BTreeSet<(String, String)> {
     let has = |row: &&Row| row.3.split(' ').any(|name| name == command);
     WORDS.iter().filter(has).map(|row| (row.0.to_owned(), row.1.to_owned())).collect()
 }
 
-/// The words of a command and of those below it, as its help has them.
+/// The options of a command and its subcommands, from its help.
 pub fn of_clap(command: &Command) -> BTreeSet<(String, String)> {
     let below = command.get_subcommands().flat_map(of_clap);
     let shown = command.get_arguments().filter(|arg| !arg.is_hide_set());

@@ -12,17 +12,17 @@ pub enum Fault {
     Burst,
     /// The packet is lost.
     Drop,
-    /// The packet comes twice.
+    /// The packet arrives twice.
     Duplicate,
-    /// The packet comes after up to four of its successors.
+    /// The packet arrives after up to four of its successors.
     Reorder,
     /// The end of the packet is missing.
     Truncate,
-    /// Bytes in the middle are missing; on a stream possibly the mark between two packets too.
+    /// Bytes in the middle are missing; on a stream possibly also the delimiter between two packets.
     Overrun,
     /// The packet has an earlier epoch. Sealed.
     StaleEpoch,
-    /// One packet or all packets of an earlier frame come again, unchanged.
+    /// One packet or all packets of an earlier frame are sent again, unchanged.
     Replay,
     /// The packet has another mesh id. Sealed.
     WrongMesh,
@@ -36,9 +36,9 @@ pub enum Fault {
     Stretch,
     /// The tag or a byte that it covers is changed. Sealed. Only for packets with tags.
     Forgery,
-    /// The sender starts anew in the middle of a frame.
+    /// The sender restarts in the middle of a frame.
     SenderRestart,
-    /// The receiver starts anew in the middle of a frame.
+    /// The receiver restarts in the middle of a frame.
     ReceiverRestart,
 }
 
@@ -90,14 +90,14 @@ impl Fault {
         }
     }
 
-    /// Whether the fault damages bytes, as a line can also do to a packet's framing:
+    /// Whether the fault damages bytes, as a line may do even to a packet's framing:
     /// [`Injector::damage`](super::Injector::damage).
     #[must_use]
     pub const fn is_damage(self) -> bool {
         matches!(self, Self::FlipOne | Self::FlipTwo | Self::Burst | Self::Truncate | Self::Overrun)
     }
 
-    /// Whether a program starts anew, which an injector cannot do.
+    /// Whether the fault is the restart of a program, which an injector cannot cause.
     #[must_use]
     pub const fn is_restart(self) -> bool {
         matches!(self, Self::SenderRestart | Self::ReceiverRestart)

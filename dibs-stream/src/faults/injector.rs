@@ -1,4 +1,4 @@
-//! One packet under a fault.
+//! Applies a fault to one packet.
 
 use std::collections::VecDeque;
 
@@ -10,25 +10,25 @@ use fastrand::Rng;
 
 use super::Fault;
 
-/// Frames that a replay chooses from.
+/// Number of frames that a replay may choose from.
 const REMEMBERED: usize = 8;
 
-/// Turns packets into faulty ones. The same seed and the same packets give the same faults.
+/// Turns packets into faulty packets. The same seed and the same packets give the same faults.
 #[derive(Debug)]
 pub struct Injector {
     rng: Rng,
-    /// Packets of the last frames, the present one last.
+    /// Packets of the last frames; the present frame is last.
     frames: VecDeque<Vec<Vec<u8>>>,
-    /// Delayed packets, each with the number of packets that go before it.
+    /// Delayed packets, each with the number of packets that are delivered before it.
     late: Vec<(usize, Vec<u8>)>,
-    /// Rows of the surface, from the last begin.
+    /// Rows of the surface, from the last begin packet.
     rows: u32,
-    /// The correction of the frame's digest.
+    /// Difference of the altered frame's digest from the sent one's.
     digest: u32,
 }
 
 impl Injector {
-    /// An injector that has seen nothing yet.
+    /// An injector that has not seen any packet.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self {
@@ -40,15 +40,16 @@ impl Injector {
         }
     }
 
-    /// Passes a packet unchanged. Returns the packets that the receiver gets: this one, and delayed ones that are due.
+    /// Passes a packet unchanged. Returns the packets that the receiver gets: this packet, and delayed ones that are
+    /// due.
     pub fn pass(&mut self, packet: &[u8]) -> Vec<Vec<u8>> {
         self.watch(packet);
         let packet = self.corrected(packet);
         self.with_late(vec![packet])
     }
 
-    /// Applies a fault to a packet. Returns the packets that the receiver gets, or `None`, without effect, if the fault
-    /// does not apply to this packet (say, a NaN position to a packet without positions).
+    /// Applies a fault to a packet. Returns the packets that the receiver gets. If the fault does not apply to this
+    /// packet (say, a NaN position to a packet without positions), it returns `None` and has no effect.
     pub fn inject(&mut self, fault: Fault, packet: &[u8]) -> Option<Vec<Vec<u8>>> {
         let faulty = match fault {
             Fault::Drop => Vec::new(),
@@ -92,7 +93,7 @@ impl Injector {
             Fault::Burst => {
                 let length = rng.usize(2..=64.min(bits));
                 let first = rng.usize(..=bits - length);
-                // A burst's ends are always flipped, the bits between them at random.
+                // The first and last bit of a burst are always flipped, the bits between them at random.
                 for bit in 0..length {
                     if bit == 0 || bit + 1 == length || rng.bool() {
                         flip(bytes, first + bit);
@@ -108,7 +109,7 @@ impl Injector {
         }
     }
 
-    /// Remembers a packet that was sent.
+    /// Records a packet that was sent.
     fn watch(&mut self, packet: &[u8]) {
         let Ok(Packet { body, .. }) = Packet::decode(packet) else { return };
         if let Body::Begin(begin) = body {
@@ -136,7 +137,7 @@ impl Injector {
         packets
     }
 
-    /// A commit that confirms its altered frame; any other packet unchanged.
+    /// Alters a commit so that it confirms its altered frame; returns any other packet unchanged.
     fn corrected(&mut self, packet: &[u8]) -> Vec<u8> {
         let mut packet = packet.to_vec();
         let commit = match Packet::decode(&packet) {
@@ -151,7 +152,7 @@ impl Injector {
     }
 
     fn replay(&mut self, packet: &[u8]) -> Option<Vec<Vec<u8>>> {
-        // Packets of the present frame would be duplicates.
+        // Packets of the present frame would be duplicates instead.
         let is_begin = matches!(Packet::decode(packet).ok()?.body, Body::Begin(_));
         let earlier = self.frames.len() - usize::from(!is_begin && !self.frames.is_empty());
         if earlier == 0 {
@@ -167,7 +168,7 @@ impl Injector {
         Some(packets)
     }
 
-    /// A packet with one field changed, and its checksum made right.
+    /// A packet with one field changed, and a checksum that matches.
     fn altered(&mut self, fault: Fault, packet: &[u8]) -> Option<Vec<u8>> {
         let decoded = Packet::decode(packet).ok()?;
         let is_tagged = packet[1] & 0x80 != 0;
@@ -199,19 +200,19 @@ impl Injector {
             }
             (Fault::NotFinite | Fault::TooFar, Body::Begin(begin)) => {
                 let Encoding::Quantised(_) = begin.encoding else { return None };
-                // One of the three numbers of the origin.
+                // One of the origin's three coordinates.
                 let number = HEADER_BYTES + 12 + 4 * rng.usize(..3);
                 put(number, &bad_number(fault, rng).to_le_bytes());
             }
             (Fault::Stretch, Body::Vertices(vertices)) => match vertices.rows {
                 Rows::Quantised(rows) => {
-                    // Half the box away.
+                    // Half of the box's extent away.
                     let at = HEADER_BYTES + 2 * rng.usize(..3 * rows.len()) + 1;
                     put(at, &[packet[at] ^ 0x80]);
                 }
                 Rows::Float(rows) => {
                     let at = HEADER_BYTES + 4 * rng.usize(..3 * rows.len());
-                    // Mirrored and doubled, or moved away from zero: still a place for a vertex.
+                    // Mirrored and doubled, or moved away from zero: still a possible position.
                     let value = f32::from_le_bytes([
                         packet[at],
                         packet[at + 1],
@@ -226,7 +227,7 @@ impl Injector {
             (Fault::Forgery, _) if is_tagged => {
                 let tag = packet.len() - CHECKSUM_BYTES - TAG_BYTES;
                 let at = match decoded.body {
-                    // The content under the same tag; changed padding would be malformed.
+                    // Other content under the same tag; changed padding would be malformed.
                     Body::Vertices(_) | Body::Commit(_) if rng.bool() => HEADER_BYTES,
                     _ => tag + rng.usize(..TAG_BYTES),
                 };
@@ -243,8 +244,8 @@ impl Injector {
     }
 }
 
-/// Distance that a float position is moved to violate the stretch, in mm: longer than any triangle, shorter than any
-/// limit on coordinates.
+/// Distance (mm) that a float position is moved by to violate the stretch limit: longer than any triangle, shorter than
+/// any limit on coordinates.
 const FAR: f32 = 100.0;
 
 fn bad_number(fault: Fault, rng: &mut Rng) -> f32 {
@@ -256,7 +257,7 @@ fn bad_number(fault: Fault, rng: &mut Rng) -> f32 {
     values[rng.usize(..values.len())]
 }
 
-/// Makes a packet's checksum right.
+/// Corrects a packet's checksum.
 fn seal(packet: &mut [u8]) {
     if let Some((content, checksum)) = packet.split_last_chunk_mut::<CHECKSUM_BYTES>() {
         *checksum = CRC.checksum(content).to_le_bytes();

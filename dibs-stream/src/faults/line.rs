@@ -8,7 +8,7 @@ use fastrand::Rng;
 use super::{Fault, Injector};
 use crate::transport::{Line, Transport};
 
-/// A line on which faults happen.
+/// A line that injects faults.
 #[derive(Debug)]
 pub struct FaultyLine {
     line: Line,
@@ -23,8 +23,8 @@ pub struct FaultyLine {
 }
 
 impl FaultyLine {
-    /// A line on which each packet meets one of these faults with this probability. Restarts, which are not faults of a
-    /// line, never happen.
+    /// A line that injects one of these faults into each packet with this probability. Restarts are not faults of a
+    /// line and never happen.
     #[must_use]
     pub fn new(line: Line, seed: u64, faults: &[Fault], rate: f64) -> Self {
         let faults: Vec<Fault> = faults.iter().copied().filter(|f| !f.is_restart()).collect();
@@ -45,12 +45,12 @@ impl FaultyLine {
         &self.counts
     }
 
-    /// Probability of a fault a packet from now on.
+    /// Sets the probability of a fault in a packet.
     pub fn set_rate(&mut self, rate: f64) {
         self.rate = rate;
     }
 
-    /// Cuts the line, or joins it again.
+    /// Cuts the line, or reconnects it.
     pub fn cut(&mut self, is_cut: bool) {
         self.is_cut = is_cut;
     }

@@ -1,10 +1,10 @@
-//! Faults on the way from sender to receiver: seeded, reproducible.
+//! Injects faults between sender and receiver: seeded, reproducible.
 //!
 //! [`Injector`] changes packets as a bad line, a bad sender or an attacker would. Put it between any sender and any
 //! receiver; [`FaultyLine`] does so for a [`Line`](crate::transport::Line).
 //!
-//! Faults meant for a layer behind the checksum are *sealed*: their checksum is corrected, as if the sender had made
-//! the mistake. Tags cannot be corrected without the key.
+//! Faults for a layer above the checksum are *sealed*: their checksum is corrected, as if the sender had made the
+//! error. Tags cannot be corrected without the key.
 //!
 //! ```
 //! use dibs_stream::faults::{Fault, Injector};

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 pub(super) struct Clock(Box<dyn Fn() -> Duration + Send>);
 
 impl Clock {
-    /// Time since now.
+    /// A clock that starts at zero now.
     pub fn system() -> Self {
         let start = Instant::now();
         Self(Box::new(move || start.elapsed()))

@@ -19,13 +19,13 @@ pub enum SendError {
         /// Vertices of the frame.
         found: usize,
     },
-    /// The positions are no frame of the tree's surface.
+    /// The positions are not a frame of the tree's surface.
     #[error("the frame {0}")]
     Positions(#[from] dibs_build::FrameError),
-    /// The positions cannot be put into packets.
+    /// The positions cannot be encoded in packets.
     #[error("the frame cannot be sent: {0}")]
     Frame(EncodeError),
-    /// Packets must carry tags, but no status has brought the receiver's challenge.
+    /// Packets must carry tags, but the receiver's challenge is not known yet.
     #[error("no genuine status came from the receiver: is it on, and has it the same key?")]
     NoChallenge,
     /// Another sender has taken over the receiver: a surface has one sender.
@@ -37,16 +37,16 @@ pub enum SendError {
         /// The other sender's session.
         session: u32,
     },
-    /// The receiver has another surface.
+    /// The receiver's surface differs from this sender's.
     #[error(
         "the receiver's surface (mesh {:#010x}) has {}; this sender's (mesh {:#010x}) has {}: build both \
          from one file",
         there.0, there.1, here.0, here.1
     )]
     OtherSurface {
-        /// Mesh id and facts of the receiver's.
+        /// The receiver's mesh id and surface facts.
         there: (u32, SurfaceFacts),
-        /// Mesh id and facts of this sender's.
+        /// This sender's mesh id and surface facts.
         here: (u32, SurfaceFacts),
     },
     /// The connection failed.

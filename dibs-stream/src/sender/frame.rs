@@ -1,4 +1,4 @@
-//! One frame's packets, their effect on the receiver's table, and their count.
+//! One frame's packets, their effect on the receiver's table, and their counts.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Body, Content, Encoding, FrameEncoder, Mac, Packet, QuantisedBox, Rows};
@@ -8,19 +8,19 @@ use dibs_nostd::wire::{Body, Content, Encoding, FrameEncoder, Mac, Packet, Quant
 pub struct Sent {
     /// Its number.
     pub epoch: u32,
-    /// Whether whole, partial or modal.
+    /// Whether the frame is whole, partial or modal.
     pub content: Content,
-    /// Vertices, or weights, in it.
+    /// Number of vertices or weights in it.
     pub rows: usize,
-    /// Packets that it took.
+    /// Number of its packets.
     pub packets: usize,
-    /// Bytes of the packets, without a byte stream's framing.
+    /// Bytes of its packets, without the framing of a byte stream.
     pub bytes: usize,
     /// Largest distance of a vertex from its position at the receiver, in mm.
     pub error: f32,
 }
 
-/// A frame whose packets are made but not sent.
+/// A frame whose packets are encoded but not sent.
 #[derive(Debug)]
 pub struct Prepared {
     pub(super) sent: Sent,
@@ -28,18 +28,18 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// The counts once it is sent.
+    /// The counts that apply once it is sent.
     #[must_use]
     pub const fn sent(&self) -> &Sent {
         &self.sent
     }
 }
 
-/// Packets one after the other, in memory that is used again.
+/// Consecutive packets, in memory that is reused.
 #[derive(Debug, Default)]
 pub(super) struct Packets {
     bytes: Vec<u8>,
-    /// Where each ends.
+    /// End of each packet.
     ends: Vec<usize>,
 }
 
@@ -54,7 +54,7 @@ impl Packets {
         self.ends.push(self.bytes.len());
     }
 
-    /// The packets of this frame, instead of those before.
+    /// Replaces the packets by those of this frame.
     pub fn fill<M: Mac, const MTU: usize>(&mut self, mut frame: FrameEncoder<'_, [Vec3], MTU, M>) {
         self.clear();
         let mut buffer = [0; MTU];
@@ -63,7 +63,7 @@ impl Packets {
         }
     }
 
-    /// What a frame of these packets is once it is sent.
+    /// The description of these packets once they are sent.
     pub fn sent(&self, epoch: u32, content: Content, rows: usize, error: f32) -> Sent {
         let (packets, bytes) = (self.ends.len(), self.bytes.len());
         Sent { epoch, content, rows, packets, bytes, error }
@@ -75,7 +75,7 @@ impl Packets {
     }
 }
 
-/// Applies the packets to the positions as the receiver will; returns their number.
+/// Applies a packet to the positions as the receiver will; returns the number of rows.
 pub(super) fn apply(packet: &[u8], encoding: Encoding, held: &mut [Vec3]) -> usize {
     let Ok(Packet { body: Body::Vertices(vertices), .. }) = Packet::decode(packet) else {
         return 0;
@@ -99,9 +99,9 @@ pub(super) fn apply(packet: &[u8], encoding: Encoding, held: &mut [Vec3]) -> usi
     vertices.rows.len()
 }
 
-/// The box with coarser steps, so that its error is nearly `error` (mm), if it was less.
+/// The box with coarser steps, so that its error is nearly `error` (mm); unchanged if its error is larger already.
 pub(super) fn coarsened(grid: QuantisedBox, error: f32) -> QuantisedBox {
-    // Half a step along each of three axes, and the rounding of the 65,536 steps that the box reaches.
+    // Half a step along each of three axes, and the rounding of positions up to 65,536 steps away.
     let step = error * 1.119 - grid.origin().abs().max_element() * 1e-6;
     if step <= grid.step().max_element() {
         return grid;

@@ -1,17 +1,17 @@
-//! The question to the receiver for its challenge.
+//! The hello, which asks the receiver for its challenge.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
 
 use dibs_nostd::wire::Answer;
 
-/// Between two hellos with one nonce.
+/// Time between two hellos with one nonce.
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// A question that waits for its answer.
+/// A hello that has no answer yet.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Greeting {
-    /// The number that the answer repeats: random.
+    /// A random number that the answer repeats.
     nonce: u64,
     /// Time of the last hello.
     sent: Option<Duration>,
@@ -19,11 +19,11 @@ pub(super) struct Greeting {
 
 impl Greeting {
     pub fn new() -> Self {
-        // Each `RandomState` is seeded anew by the operating system.
+        // The operating system seeds each `RandomState` anew.
         Self { nonce: RandomState::new().build_hasher().finish(), sent: None }
     }
 
-    /// Whether this answer was made after the question.
+    /// Whether this answers the hello.
     pub const fn is_answered_by(&self, answer: &Answer) -> bool {
         self.nonce == answer.nonce
     }

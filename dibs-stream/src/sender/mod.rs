@@ -1,6 +1,6 @@
 //! From positions to packets, and the statuses on the way back.
 //!
-//! One file, because packets and statuses have one state.
+//! One file, because packets and statuses share one state.
 
 // Requirement: B-09
 
@@ -36,7 +36,7 @@ use frame::{Packets, apply, coarsened};
 use greeting::Greeting;
 use objection::Objection;
 
-/// Sends the frames of a moving surface, in packets of at most `MTU` bytes, and takes the receiver's statuses.
+/// Sends the frames of a moving surface, in packets of at most `MTU` bytes, and receives statuses.
 ///
 /// ```
 /// use dibs_stream::{Sender, Settings, SurfaceOrder};
@@ -58,42 +58,42 @@ pub struct Sender<T, const MTU: usize, M = NoMac> {
     transport: T,
     /// `None` until the receiver's challenge is known.
     mac: Option<M>,
-    /// The MAC under a challenge.
+    /// Returns the MAC for a challenge.
     keyed_mac: Box<dyn Fn(u64) -> M + Send>,
     clock: Clock,
-    /// The hello that waits for its answer.
+    /// The hello that has no answer yet.
     greeting: Option<Greeting>,
     surface: SurfaceOrder,
     settings: Settings,
     epoch: u32,
     /// The epoch before the session's first.
     before: u32,
-    /// A frame of this session was acknowledged.
+    /// Whether a frame of this session was acknowledged.
     is_established: bool,
-    /// Why the receiver does not want this sender's frames.
+    /// Why the receiver refuses this sender's frames.
     objection: Option<Objection>,
-    /// An answer has shown the receiver's surface to be this one.
+    /// Whether an answer has shown that the receiver has the same surface.
     is_compared: bool,
     beat: u32,
     last_beat: Option<Duration>,
-    /// The last positions or weights, and the time when they first came.
+    /// The last positions or weights, and the time when they were first given.
     capture: Option<(Vec<f32>, Duration)>,
-    /// The last frame of positions, as the receiver has it if it arrived.
+    /// The last frame of positions, as the receiver has it if all packets arrived.
     held: Option<(u32, Vec<Vec3>)>,
-    /// Memory of the next frame: its rows and its packets.
+    /// Memory for the next frame: its rows and its packets.
     memory: (Vec<Vec3>, Packets),
     since_whole: u32,
     whole_wanted: bool,
-    /// Whether the last frame had a pose: a partial one without would keep it.
+    /// Whether the last frame had a pose: a partial frame without one would keep it.
     has_pose: bool,
-    /// The last whole frame: until it is acknowledged, requests for a whole frame may be from before it.
+    /// The last whole frame and its time. Until it is acknowledged, requests for a whole frame may be older than it.
     whole: Option<(u32, Duration)>,
     status: Option<Status>,
     counters: Counters,
     totals: Totals,
 }
 
-/// Without its key.
+/// Omits the key.
 impl<T: fmt::Debug, const MTU: usize, M> fmt::Debug for Sender<T, MTU, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut sender = f.debug_struct("Sender");
@@ -103,7 +103,7 @@ impl<T: fmt::Debug, const MTU: usize, M> fmt::Debug for Sender<T, MTU, M> {
 }
 
 impl<T: Transport, const MTU: usize> Sender<T, MTU> {
-    /// A sender that has sent nothing yet.
+    /// A sender that has not sent anything.
     #[must_use]
     pub fn new(transport: T, surface: SurfaceOrder, settings: Settings) -> Self {
         let sender = Self::with_mac(transport, surface, settings, |_| NoMac);
@@ -113,10 +113,10 @@ impl<T: Transport, const MTU: usize> Sender<T, MTU> {
 
 impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// A sender of packets with tags. `keyed_mac(challenge)` returns the MAC under the receiver's challenge, which the
-    /// receiver draws when it starts and reports in its answer to a hello. Until one has come, [`poll`](Self::poll)
-    /// sends hellos, and no frame can be sent.
+    /// receiver chooses when it starts and reports in its answer to a hello. Until an answer arrives,
+    /// [`poll`](Self::poll) sends hellos, and no frame can be sent.
     ///
-    /// For a receiver without a way back, which uses the challenge 0: [`challenge`](Self::challenge).
+    /// For a receiver without a return channel, which uses the challenge 0: [`challenge`](Self::challenge).
     #[must_use]
     pub fn with_mac(
         transport: T,
@@ -152,20 +152,20 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         }
     }
 
-    /// Takes a challenge as the receiver's.
+    /// Sets the receiver's challenge.
     pub fn challenge(&mut self, challenge: u64) {
         self.mac = Some((self.keyed_mac)(challenge));
     }
 
-    /// Takes the time from `now` instead of the system's clock, for tests and simulations. It may start anywhere, but
-    /// must not go back.
+    /// Uses `now` instead of the system's clock, for tests and simulations. It may start at any time, but must not go
+    /// back.
     #[must_use]
     pub fn with_clock(mut self, now: impl Fn() -> Duration + Send + 'static) -> Self {
         self.clock = Clock::of(now);
         self
     }
 
-    /// Continues on another transport with a whole frame, as soon as the receiver has answered. Returns the broken
+    /// Continues on another transport, with a whole frame as soon as the receiver has answered. Returns the broken
     /// transport.
     pub fn reconnect(&mut self, transport: T) -> T {
         self.whole_wanted = true;
@@ -180,11 +180,11 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     }
 
     /// Sends a frame of positions (mm) in the mesh's order: whole or partial, as settings and receiver require, with
-    /// heartbeats in between when due.
+    /// heartbeats between its packets when due.
     ///
-    /// The frame counts as captured now, unless its positions equal the last frame's in every bit: then it is as old as
-    /// that frame. So a source that stands still grows old, although its sender lives. If the time of capture is known,
-    /// use [`send_captured`](Self::send_captured).
+    /// The frame counts as captured now, unless its positions equal the last frame's in every bit: then it counts as
+    /// captured at the same time as the last one. So a source that stops moving ages, although its sender is alive. If
+    /// the time of capture is known, use [`send_captured`](Self::send_captured).
     ///
     /// # Errors
     /// [`SendError`] names the vertex that cannot be sent, or the line's error.
@@ -202,8 +202,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.transmit(frame)
     }
 
-    /// Sends a frame that was captured some time ago, with the pose at which its surface is as a whole: the positions are
-    /// those of the mesh's own frame. For a receiver of [`Posed`](dibs_nostd::guard::Posed) frames.
+    /// Sends a frame that was captured some time ago, with a rigid pose of the whole surface: the positions are in the
+    /// mesh's own coordinates. For a receiver of [`Posed`](dibs_nostd::guard::Posed) frames.
     ///
     /// # Errors
     /// As [`send`](Self::send).
@@ -217,7 +217,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.transmit(frame)
     }
 
-    /// The first half of [`send`](Self::send): makes the packets. From here on [`held`](Self::held) includes this
+    /// The first half of [`send`](Self::send): encodes the packets. From here on [`held`](Self::held) includes this
     /// frame, which must be transmitted next.
     ///
     /// # Errors
@@ -270,12 +270,12 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
                 } else {
                     self.since_whole += 1;
                 }
-                // A receiver refuses a frame of an age that cannot be stated: none can build on it.
+                // A receiver refuses a frame whose age is too large for its field, so no partial frame can build on it.
                 self.whole_wanted = freshness.age_ms == u16::MAX;
                 self.has_pose = pose.is_some();
                 Ok(Prepared { sent, packets })
             }
-            // The receiver's frame is the same as before.
+            // Nothing was sent, so the receiver's frame is unchanged.
             Err(error) => {
                 (self.memory, self.held) = (memory, held);
                 Err(error)
@@ -283,7 +283,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         }
     }
 
-    /// Makes a frame's packets in this memory. Returns it, and `held` as it is once it has arrived.
+    /// Encodes a frame's packets in this memory. Returns it, and `held` as it is once the frame has arrived.
     fn make_packets(
         &mut self,
         positions: &[Vec3],
@@ -322,7 +322,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         Ok((packets.sent(id.epoch, content, rows, encoding.error()), held))
     }
 
-    /// Makes the packets of a modal frame: the weights of the receiver's displacement modes.
+    /// Encodes a modal frame: the weights of the receiver's displacement modes.
     ///
     /// # Errors
     /// [`SendError`] names the weight that cannot be sent.
@@ -356,15 +356,15 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         Ok(Prepared { sent, packets })
     }
 
-    /// Sends a prepared frame, with heartbeats in between when due.
+    /// Sends a prepared frame, with heartbeats between its packets when due.
     ///
     /// # Errors
-    /// [`SendError::Line`] when the connection is gone.
+    /// [`SendError::Line`] when the connection is lost.
     pub fn transmit(&mut self, frame: Prepared) -> Result<Sent, SendError> {
         self.transmit_paced(frame, || ())
     }
 
-    /// The same, with a call of `wait` before each packet: a [`Pace`](super::Pace) spreads them.
+    /// The same, but calls `wait` before each packet: a [`Pace`](super::Pace) spreads them.
     ///
     /// # Errors
     /// As [`transmit`](Self::transmit).
@@ -388,11 +388,11 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         Ok(sent)
     }
 
-    /// Sends a heartbeat or a hello if one is due, and takes the statuses that have come. Does not block. Call it a few
-    /// times between two heartbeats.
+    /// Sends a heartbeat or a hello if one is due, and receives the statuses that have arrived. Does not block. Call it
+    /// a few times between two heartbeats.
     ///
     /// # Errors
-    /// [`SendError::Line`] when the connection is gone, [`SendError::Superseded`] while another sender has taken over,
+    /// [`SendError::Line`] when the connection is lost, [`SendError::Superseded`] while another sender has taken over,
     /// [`SendError::OtherSurface`] while the receiver has another surface.
     pub fn poll(&mut self) -> Result<(), SendError> {
         self.greet()?;
@@ -409,7 +409,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         &self.totals
     }
 
-    /// The last frame of positions, as the receiver has it if all of it arrived: its number, and the positions in the
+    /// The last frame of positions, as the receiver has it if all packets arrived: its epoch, and the positions in the
     /// order of the rows.
     #[must_use]
     pub fn held(&self) -> Option<(u32, &[Vec3])> {
@@ -446,13 +446,13 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         if !self.settings.quantised {
             return Ok(Encoding::Float);
         }
-        // No box means a position that is not finite, which the encoder names.
+        // There is no box for a position that is not finite; the encoder names it.
         let Some(grid) = QuantisedBox::covering(rows) else { return Ok(Encoding::Float) };
         let tolerance = self.settings.partial.unwrap_or(0.0);
         Ok(Encoding::Quantised(coarsened(grid, tolerance)))
     }
 
-    /// An error unless a frame can be sent.
+    /// Fails if no frame can be sent.
     fn check(&self) -> Result<(), SendError> {
         self.object()?;
         if self.is_ready() { Ok(()) } else { Err(SendError::NoChallenge) }

@@ -1,4 +1,4 @@
-//! The mesh's vertex, or the volume's node, of each row of the receiver's table.
+//! The mesh vertex, or the volume's node, of each row of the receiver's table.
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Index, SurfaceFacts, Tree};
@@ -11,15 +11,15 @@ use dibs_build::FrameCheck;
 pub struct SurfaceOrder {
     pub(super) mesh_id: u32,
     pub(super) facts: SurfaceFacts,
-    /// The mesh's vertex of each row.
+    /// The mesh vertex of each row.
     order: Vec<u32>,
-    /// Of the tree that it was made of.
+    /// The check of the tree that the order was made from; `None` if it was not made from a tree.
     check: Option<FrameCheck>,
 }
 
 impl SurfaceOrder {
-    /// The order of a tree: the receiver's, or one built from the same mesh in the same way. A tree with nodes is sent
-    /// these, in the order of the volume's file.
+    /// The order of a tree: the receiver's, or one built from the same mesh in the same way. For a tree with nodes it
+    /// is the order of the nodes in the volume's file.
     #[must_use]
     pub fn of<I: Index>(tree: &Tree<'_, I>) -> Self {
         let check = FrameCheck::of(tree);
@@ -29,7 +29,7 @@ impl SurfaceOrder {
         Self { mesh_id: tree.mesh_id(), facts, order, check: Some(check) }
     }
 
-    /// An order from the mesh's vertex of each row of the vertex table. Unit and triangles are not known.
+    /// An order given by the mesh vertex of each row of the vertex table. Unit and triangles are unknown.
     #[must_use]
     pub fn new(mesh_id: u32, order: Vec<u32>) -> Self {
         let vertices = u32::try_from(order.len()).unwrap_or(0);
@@ -49,21 +49,22 @@ impl SurfaceOrder {
         self.order.len()
     }
 
-    /// Positions of a frame in the mesh's order: of its file's vertices, or of the nodes. Where the order is that of no
-    /// tree, up to the last vertex that is sent.
+    /// Number of positions of a frame in the mesh's order: vertices of its file, or nodes. If the order was not made
+    /// from a tree, the positions up to the last vertex that is sent.
     #[must_use]
     pub fn positions(&self) -> usize {
         let last = || self.order.iter().max().map_or(0, |&last| last as usize + 1);
         self.check.as_ref().map_or_else(last, FrameCheck::positions)
     }
 
-    /// Corners of the tree's triangles, by the mesh's numbers. None where the order is that of no tree, or of nodes.
+    /// Corners of the tree's triangles, by the mesh's numbers. Empty if the order was not made from a tree, or holds
+    /// nodes.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         self.check.as_ref().map_or(&[], FrameCheck::triangles)
     }
 
-    /// Checks that the faces of a motion's files are those of the tree, where the order is that of one.
+    /// Checks that the faces of a motion's files are those of the tree, if the order was made from a tree.
     ///
     /// # Errors
     /// [`SendError::Positions`] names the first triangle that is missing.
@@ -72,18 +73,18 @@ impl SurfaceOrder {
         Ok(check.map_or(Ok(()), |check| check.check_faces(faces))?)
     }
 
-    /// Puts positions in the mesh's order into that of the tree's rows.
+    /// Reorders positions from the mesh's order to the tree's rows.
     ///
     /// # Errors
-    /// [`SendError::Vertices`] if a vertex of the tree has no position, and where the order is that of a tree
-    /// [`SendError::Positions`] if they are no frame of its surface.
+    /// [`SendError::Vertices`] if a vertex of the tree has no position; if the order was made from a tree, also
+    /// [`SendError::Positions`] if they are not a frame of its surface.
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
         let mut rows = Vec::new();
         self.to_rows_in(positions, &mut rows)?;
         Ok(rows)
     }
 
-    /// The same in memory that is used again.
+    /// The same, in memory that is reused.
     pub(super) fn to_rows_in(
         &self,
         positions: &[Vec3],

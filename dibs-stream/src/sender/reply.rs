@@ -1,4 +1,4 @@
-//! The sender's reaction to the receiver's statuses.
+//! How the sender reacts to the receiver's statuses.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use super::{SendError, Sender};
 use crate::transport::Transport;
 
 impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
-    /// The frame of this session that the receiver last reported as published.
+    /// The epoch of the latest frame of this session that the receiver has reported as published.
     #[must_use]
     pub fn acknowledged(&self) -> Option<u32> {
         let published = self.status?.published?;
@@ -29,13 +29,13 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.epoch.wrapping_sub(self.acknowledged().unwrap_or(self.before))
     }
 
-    /// Number of this run: that of the settings, or a later one that was free.
+    /// Session number: that of the settings, or a later one if that was taken.
     #[must_use]
     pub const fn session(&self) -> u32 {
         self.settings.session
     }
 
-    /// The receiver's last report.
+    /// The receiver's last status.
     #[must_use]
     pub const fn status(&self) -> Option<&Status> {
         self.status.as_ref()
@@ -47,8 +47,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         &self.counters
     }
 
-    /// Sends hellos until the receiver answers, if its challenge is unknown, it may have started anew, or its objection
-    /// may be over.
+    /// Sends hellos until the receiver answers, if its challenge is unknown, it may have restarted, or its objection
+    /// may be resolved.
     pub(super) fn greet(&mut self) -> Result<(), SendError> {
         let now = self.clock.now();
         let asks_again = self.objection.as_mut().is_some_and(|objection| objection.is_due(now));
@@ -59,7 +59,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             return Ok(());
         };
         let mut buffer = [0; 64];
-        // A hello's tag is the same under every challenge.
+        // A hello's tag does not depend on the challenge.
         let mac = (self.keyed_mac)(0);
         let hello = encode_hello(&self.id(), nonce, &mac, &mut buffer);
         self.put(hello)
@@ -69,7 +69,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         self.greeting.get_or_insert_with(Greeting::new);
     }
 
-    /// The receiver's objection, if it stands.
+    /// Returns the receiver's objection as an error, if it holds.
     pub(super) fn object(&self) -> Result<(), SendError> {
         let now = self.clock.now();
         match self.objection.filter(|objection| now >= objection.holds_from) {
@@ -86,7 +86,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         }
     }
 
-    /// Takes a packet that came back.
+    /// Handles a packet from the receiver.
     pub(super) fn take(&mut self, packet: &[u8]) {
         let Ok(packet) = Packet::decode(packet) else { return };
         let Body::Status(report) = packet.body else { return };
@@ -96,8 +96,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             let is_later =
                 self.status.is_none_or(|last| is_newer(report.status.number, last.number));
             let is_genuine = self.mac.as_ref().is_some_and(|mac| packet.is_genuine(mac, session));
-            // Anything else is a recording, was overtaken, or comes from a receiver that has started anew or has another
-            // surface, which a hello decides.
+            // Anything else is a replay, was overtaken, or comes from a receiver that has restarted or has another
+            // surface. A hello decides between these.
             if is_ours && is_genuine && is_later {
                 self.take_status(&report, M::TAGGED);
             } else if is_ours || self.status.is_none() {
@@ -112,12 +112,12 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         }
     }
 
-    /// Takes a genuine answer to the hello that waits for it.
+    /// Handles an authentic answer to the pending hello.
     fn take_answer(&mut self, mesh_id: u32, report: &StatusReport<'_>, answer: &Answer, mac: M) {
         let facts = answer.surface;
         let (is_ours, now) = (mesh_id == self.surface.mesh_id, self.clock.now());
         if !is_ours || !facts.agrees_with(&self.surface.facts) {
-            // Without a key the answer may be that of another surface's receiver on the same line.
+            // Without a key, the answer may come from another surface's receiver on the same line.
             let is_certain = M::TAGGED || is_ours;
             if is_certain || self.status.is_none() {
                 let wait = if is_certain { Duration::ZERO } else { self.settings.patience };
@@ -139,15 +139,14 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         let is_same = self.mac.as_ref().is_some_and(|known| known.challenge() == mac.challenge());
         let is_later = self.status.is_none_or(|last| is_newer(report.status.number, last.number));
         if !(is_same && is_later) {
-            // A receiver that has started anew has no frame.
+            // A receiver that has restarted has no frame.
             self.mac = Some(mac);
             self.whole_wanted = true;
         }
         self.take_status(report, true);
     }
 
-    /// Takes a status that is new. `is_certain` where nobody else can have made it: it is under a tag, or the answer to a
-    /// hello.
+    /// Handles a new status. `is_certain` means that it is authentic: it has a tag, or answers a hello.
     fn take_status(&mut self, report: &StatusReport<'_>, is_certain: bool) {
         let mut status = report.status;
         if let (Some(_), Some(published)) = (status.answer, &mut status.published) {
@@ -175,8 +174,8 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         }
     }
 
-    /// Reacts to a published frame that this sender has not sent: the receiver would refuse this sender's frames for
-    /// ever. What is not certain, a hello decides.
+    /// Handles a published frame that this sender has not sent: the receiver would never accept this sender's frames.
+    /// If the status is not certainly authentic, a hello decides.
     fn yield_or_take_over(&mut self, is_certain: bool) {
         let Some(published) = self.status.and_then(|status| status.published) else { return };
         let own = self.settings.session;
@@ -189,7 +188,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             let (now, cause) = (self.clock.now(), Cause::Superseded { session: published.session });
             self.objection = Some(Objection::new(cause, now, now));
         } else if !is_newer(own, published.session) {
-            // The frame is from before this sender's start, or another sender used the same session number.
+            // The frame was sent before this sender started, or another sender used the same session number.
             self.settings.session = published.session.wrapping_add(1);
             self.before = self.epoch;
             self.is_established = false;

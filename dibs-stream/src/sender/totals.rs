@@ -5,13 +5,13 @@
 pub struct Totals {
     /// Frames.
     pub frames: u64,
-    /// Of these, partial ones.
+    /// Partial frames among them.
     pub partial: u64,
-    /// Packets, heartbeats included.
+    /// Packets, including heartbeats.
     pub packets: u64,
-    /// Bytes, without a byte stream's framing.
+    /// Bytes, without the framing of a byte stream.
     pub bytes: u64,
-    /// Statuses that came back.
+    /// Statuses received.
     pub statuses: u64,
 }
 

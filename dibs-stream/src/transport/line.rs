@@ -1,4 +1,4 @@
-//! A serial line or a socket, with a thread that reads.
+//! A serial line or a socket, with a reading thread.
 
 use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
@@ -17,10 +17,10 @@ use serial2::SerialPort;
 
 use super::Transport;
 
-/// A line that takes no byte for this long is stuck: on a slow line a packet takes about a second.
+/// A line that accepts no byte for this long is stuck: on a slow line a packet takes about a second.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Time after which a blocked write checks whether it is to stop, and the reading thread whether its owner still exists.
+/// Interval at which a blocked write checks whether to stop, and the reading thread whether its owner still exists.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// A serial line or a socket. A separate thread reads, so that neither direction waits for the other.
@@ -32,16 +32,16 @@ pub struct Line {
     over: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
     refusals: Shared,
-    /// Takes whether what was written need not arrive.
+    /// Ends the connection. The argument tells whether bytes that were written may be dropped.
     hang_up: Box<dyn Fn(bool) + Send>,
 }
 
-/// Datagrams that came back: the network says that nothing listens at the address.
+/// Datagrams that were rejected: the network reports that nothing listens at the address.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Refusals {
-    /// Their number, as far as the network tells.
+    /// Their number, as far as the network reports it.
     pub count: u64,
-    /// When the last one came back.
+    /// Time of the last rejection.
     pub last: Option<Instant>,
 }
 
@@ -54,7 +54,7 @@ impl Shared {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts the answer to an earlier datagram; other errors come back.
+    /// Counts the rejection of an earlier datagram; returns other errors.
     fn count(&self, error: io::Error) -> io::Result<()> {
         match error.kind() {
             ErrorKind::ConnectionRefused
@@ -86,7 +86,7 @@ impl Line {
         port.set_read_timeout(PATIENCE)?;
         port.set_write_timeout(PATIENCE)?;
         let (reader, handle) = (port.try_clone()?, port.try_clone()?);
-        // A close waits for the bytes that the line has not taken.
+        // Closing the port waits for the bytes that have not been sent.
         let discard = move |is_stopped| {
             if is_stopped {
                 drop(handle.discard_output_buffer());
@@ -107,7 +107,7 @@ impl Line {
         Ok(Self::stream(socket, reader, move || drop(handle.shutdown(Shutdown::Both))))
     }
 
-    /// A Unix socket, say that of an emulator's serial line.
+    /// A Unix socket, such as that of an emulator's serial line.
     ///
     /// # Errors
     /// When the socket cannot be shared with the reading thread.
@@ -119,8 +119,8 @@ impl Line {
         Ok(Self::stream(socket, reader, move || drop(handle.shutdown(Shutdown::Both))))
     }
 
-    /// A UDP socket that is connected to its peer: one packet a datagram. Datagrams that nobody takes are lost, since a
-    /// receiver may start later; [`refusals`](Self::refusals) counts those that came back.
+    /// A UDP socket that is connected to its peer: one packet a datagram. Datagrams that nobody receives are lost,
+    /// since a receiver may start later; [`refusals`](Self::refusals) counts those that were rejected.
     ///
     /// # Errors
     /// When the socket cannot be shared with the reading thread.
@@ -128,7 +128,7 @@ impl Line {
         Self::udp_paced(socket, |datagrams| datagrams)
     }
 
-    /// The same, written through a writer of your own, say one that does not overrun a small receiver: it gets one
+    /// The same, through a writer of your own, for example one that does not overrun a small receiver: it gets one
     /// packet a write, then a flush.
     ///
     /// # Errors
@@ -148,8 +148,8 @@ impl Line {
         Ok(line)
     }
 
-    /// Any line that keeps packets apart: a write is a packet, and `read` fills in the next one that came, 0 bytes if
-    /// none. A long read should time out from time to time.
+    /// Any line that preserves packet boundaries: a write is a packet, and `read` returns the next received one, 0
+    /// bytes if there is none. A long read should time out from time to time.
     pub fn datagrams(
         writer: impl Write + Send + 'static,
         mut read: impl FnMut(&mut [u8]) -> io::Result<usize> + Send + 'static,
@@ -168,7 +168,7 @@ impl Line {
     }
 
     /// Any byte stream with a reading and a writing end. A long read should time out from time to time, or end when
-    /// `hang_up` is called: the reading thread lives until it returns.
+    /// `hang_up` is called: the reading thread lives until the read returns.
     pub fn stream(
         writer: impl Write + Send + 'static,
         reader: impl Read + Send + 'static,
@@ -244,21 +244,22 @@ impl Line {
         self.is_stream
     }
 
-    /// The same line, whose writes end with an error within a twentieth of a second once `stop` is set and the line takes
-    /// nothing. Bytes that a serial port has not sent are then dropped. A writer of your own has to time out for it.
+    /// The same line, but once `stop` is set and the line accepts nothing, writes end with an error within a twentieth
+    /// of a second. Bytes that a serial port has not sent are then dropped. A writer of your own must time out for
+    /// this.
     #[must_use]
     pub fn until(mut self, stop: Arc<AtomicBool>) -> Self {
         self.stop = stop;
         self
     }
 
-    /// Datagrams that came back.
+    /// Datagrams that were rejected.
     #[must_use]
     pub fn refusals(&self) -> Refusals {
         self.refusals.get()
     }
 
-    /// Sends bytes as they are, damaged packets too. For fault injection.
+    /// Sends bytes unchanged, even a damaged packet. For fault injection.
     ///
     /// # Errors
     /// The operating system's error.
@@ -282,7 +283,7 @@ impl Transport for Line {
         match self.received.try_recv() {
             Ok(packet) => packet.map(Some),
             Err(TryRecvError::Empty) => Ok(None),
-            // The thread ends only after an error, which was returned before.
+            // The thread ends only after an error, which an earlier call has returned.
             Err(TryRecvError::Disconnected) => Err(ErrorKind::UnexpectedEof.into()),
         }
     }
@@ -295,7 +296,7 @@ impl Drop for Line {
     }
 }
 
-/// Writes all bytes; an error if the line is stuck, or takes nothing when it is to stop.
+/// Writes all bytes; fails if the line is stuck, or accepts nothing when it is to stop.
 fn write(
     writer: &mut (impl Write + ?Sized),
     mut bytes: &[u8],
@@ -329,7 +330,7 @@ fn is_patience(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }
 
-/// A serial port whose bytes count as sent once the system has taken them: a wait for the wire has no time limit.
+/// A serial port whose bytes count as sent once the system has accepted them: waiting for the wire has no time limit.
 struct Port(SerialPort);
 
 impl Write for Port {
@@ -342,13 +343,13 @@ impl Write for Port {
     }
 }
 
-/// A UDP socket to write to: a write is a datagram.
+/// A UDP socket as a writer: a write is a datagram.
 #[derive(Debug)]
 pub struct Datagrams(UdpSocket, Shared);
 
 impl Write for Datagrams {
     fn write(&mut self, packet: &[u8]) -> io::Result<usize> {
-        // An error can be the answer to an earlier datagram: no receiver yet.
+        // An error may concern an earlier datagram: there is no receiver yet.
         let lost = |error| self.1.count(error).map(|()| packet.len());
         self.0.send(packet).or_else(lost)
     }

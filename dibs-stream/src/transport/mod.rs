@@ -15,13 +15,13 @@ pub use target::{Target, TargetError};
 /// [`Line`] implements it for serial lines and sockets; a CAN adapter or a fault injector would be another
 /// implementation.
 pub trait Transport {
-    /// Sends one packet, whole. May block for as long as the line is busy.
+    /// Sends one whole packet. May block for as long as the line is busy.
     ///
     /// # Errors
-    /// The operating system's error; the connection is then useless.
+    /// The operating system's error; the connection is then unusable.
     fn send(&mut self, packet: &[u8]) -> io::Result<()>;
 
-    /// The next packet that came back, if any. Does not block.
+    /// The next received packet, if any. Does not block.
     ///
     /// # Errors
     /// [`io::ErrorKind::UnexpectedEof`] when the other side has closed the connection.

@@ -11,10 +11,10 @@ use thiserror::Error;
 
 use super::Line;
 
-/// Bits a second of a serial line that states none.
+/// Default of a serial line, in bits a second.
 const BAUD: u32 = 115_200;
 
-/// Longest time to connect.
+/// Timeout of a connection attempt.
 const CONNECT: Duration = Duration::from_secs(5);
 
 /// A receiver's address.
@@ -38,12 +38,12 @@ pub enum Target {
     },
     /// A TCP server, `tcp:HOST:PORT`.
     Tcp(String),
-    /// A UDP receiver, `udp:HOST:PORT`, or `udp:HOST:PORT@LOCAL_PORT` for one that answers to a fixed port; by default
-    /// any free port.
+    /// A UDP receiver, `udp:HOST:PORT`, or `udp:HOST:PORT@LOCAL_PORT` if the receiver answers to a fixed port; by
+    /// default any free port.
     Udp {
         /// Host and port.
         address: String,
-        /// The port on this side.
+        /// The local port.
         local: u16,
     },
     /// A listening Unix socket, `unix:PATH`.
@@ -54,7 +54,7 @@ pub enum Target {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TargetError {
-    /// None of the four kinds.
+    /// Not one of the four kinds.
     #[error(
         "`{text}` is no target: serial:PORT[@BAUD], tcp:HOST:PORT, udp:HOST:PORT[@LOCAL_PORT] or unix:PATH"
     )]

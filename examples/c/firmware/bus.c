@@ -9,13 +9,13 @@
 
 /* Rows and triangles that one slice checks or copies. */
 #define WORK 32u
-/* The first of the events that are rejections: docs/wire.md. */
+/* Index of the first event that is a rejection: docs/wire.md. */
 #define FIRST_REJECTION 4u
 
 static alignas(DIBS_ALIGNMENT) uint8_t bus_memory[DIBS_BUS_SIZE];
 static dibs_bus *bus;
 
-/* Words between the contexts. */
+/* Words shared by the contexts. */
 static atomic_uint_least32_t bytes, published, rejected;
 
 void bus_init(void) {
@@ -40,12 +40,12 @@ void bus_byte(uint8_t byte, uint32_t tick) {
 
 void bus_work(void) {
     dibs_advance advance = DIBS_ADVANCE_IDLE;
-    /* A rejection is counted by its cause. */
+    /* The code is not needed: a rejection is counted by its cause. */
     const dibs_code code = dibs_bus_work(bus, WORK, &advance);
     if (code == DIBS_CODE_OK && advance == DIBS_ADVANCE_PUBLISHED) {
         fingerprint_begin(bus);
     } else if (code == DIBS_CODE_OK && advance != DIBS_ADVANCE_PENDING) {
-        /* The published frame is read in full while the next one arrives. */
+        /* The published frame is read completely while the next one arrives. */
         fingerprint_step(bus);
     }
     count();

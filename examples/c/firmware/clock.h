@@ -10,7 +10,7 @@
 /* Starts the free-running clock. */
 void clock_start(void);
 
-/* Counts since then; wraps after 171 s. */
+/* Counts since the start; wraps after 171 s. */
 uint32_t clock_now(void);
 
 /* Starts the control ticks. */

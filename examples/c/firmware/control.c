@@ -33,7 +33,7 @@ static void write_bus(tick_record *record) {
     record->read_digest = counts.read_digest;
 }
 
-/* The surface that was searched, and the pair on it. */
+/* Writes the searched surface, and the pair on it. */
 static void write_searched(const dibs_searched *searched, tick_record *record) {
     const dibs_proximity *found = &searched->tracked.proximity;
     record->epoch_before = searched->before;

@@ -1,4 +1,4 @@
-/* The control tick: pose, answer, force, record. */
+/* The control tick: from a pose to an answer, a force and a record. */
 #ifndef CONTROL_H
 #define CONTROL_H
 

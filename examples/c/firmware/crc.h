@@ -5,13 +5,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Before the first byte. */
+/* The value before the first byte. */
 #define CRC_START UINT32_MAX
 
-/* Takes bytes. */
+/* Adds bytes. */
 uint32_t crc_take(uint32_t crc, const void *bytes, size_t length);
 
-/* After the last byte. */
+/* The checksum after the last byte. */
 uint32_t crc_end(uint32_t crc);
 
 #endif

@@ -9,12 +9,12 @@
 /* Rows that one slice reads. */
 #define ROWS 8u
 
-/* The frame that is being read, its checksum so far, and the next row; behind the last row there is nothing to read. */
+/* The frame that is being read, its checksum so far, and the next row; past the last row, none is read. */
 static uint32_t reading;
 static uint32_t crc;
 static uint32_t next = SURFACE_VERTICES;
 
-/* The frame last read in full. */
+/* The frame that was last read completely. */
 static atomic_uint_least32_t last_epoch, last_digest;
 
 void fingerprint_begin(dibs_bus *bus) {
@@ -35,7 +35,7 @@ void fingerprint_step(dibs_bus *bus) {
         crc = crc_take(crc, &at, sizeof at);
     }
     if (next >= SURFACE_VERTICES) {
-        /* No epoch while the two change: a tick that comes in between takes neither. */
+        /* The epoch is 0 while the two change, so that a tick in between uses neither. */
         atomic_store_explicit(&last_epoch, 0, memory_order_relaxed);
         atomic_store_explicit(&last_digest, crc_end(crc), memory_order_release);
         atomic_store_explicit(&last_epoch, reading, memory_order_release);

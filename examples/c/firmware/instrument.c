@@ -10,9 +10,9 @@
 
 #define TURN 6.28318530717958647692f
 
-/* The sine of so many turns, at least 0, within 4e-6: enough for a script. */
+/* The sine of an angle in turns, at least 0, with an error of at most 4e-6. */
 static float sine(float turns) {
-    /* To the nearest half turn around 0, then to the quarters, where the series is short. */
+    /* Reduces the angle to half a turn around 0, then to a quarter, where a short series suffices. */
     turns -= (float)(uint32_t)(turns + 0.5f);
     if (turns > 0.25f) {
         turns = 0.5f - turns;

@@ -2,8 +2,8 @@
  * The controller of the demo in C, for an MPS2-AN500, a Cortex-M7 that QEMU emulates as `mps2-an500`: `cargo xtask demo --c`.
  * firmware-example is the same in Rust, and sends the same records.
  *
- * Three priorities share the core. The control tick (SysTick, 1 kHz) is the highest: only its previous run delays it. Bus
- * reception (UART 0) is one below. The idle loop checks complete frames and the tree in flash a slice at a time, and sends
+ * Three priorities share the core. The control tick (SysTick, 1 kHz) has the highest: only its last run delays it. Bus
+ * reception (UART 0) is one below. The idle loop checks complete frames and the tree in flash in slices, and sends
  * statuses over UART 0 and telemetry over UART 1.
  */
 #include "main.h"
@@ -18,7 +18,7 @@
 #include "uart.h"
 
 _Noreturn static void send_summary(void) {
-    /* Nothing disables all interrupts: `masked_counts` is 0. */
+    /* This program never disables all interrupts, so `masked_counts` is 0. */
     summary_record summary = {.kind = SUMMARY_KIND};
     schedule_sum_up(&summary);
     summary.bus_overrun = uart_has_overrun(UART_BUS);

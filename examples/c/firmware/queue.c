@@ -2,11 +2,11 @@
 
 #include <stdatomic.h>
 
-/* A power of two: the numbers of records wrap. */
+/* A power of two, because the counts of records wrap. */
 #define CAPACITY 64u
 
 static tick_record records[CAPACITY];
-/* How many records were added and taken. Each has one writer. */
+/* Numbers of records added and taken. Each is written by one context. */
 static atomic_uint added, taken;
 
 bool queue_add(const tick_record *record) {

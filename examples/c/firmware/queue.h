@@ -1,4 +1,4 @@
-/* Records that wait for the line: the control tick adds, the background takes. */
+/* Records that wait for the telemetry line: the control tick adds them, the background takes them. */
 #ifndef QUEUE_H
 #define QUEUE_H
 
@@ -6,10 +6,10 @@
 
 #include "telemetry.h"
 
-/* Adds a record; false if the queue is full. From the control tick alone. */
+/* Adds a record; false if the queue is full. Only for the control tick. */
 bool queue_add(const tick_record *record);
 
-/* Takes the oldest record; false if there is none. From the background alone. */
+/* Takes the oldest record; false if there is none. Only for the background. */
 bool queue_take(tick_record *record);
 
 #endif

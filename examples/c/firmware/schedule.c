@@ -9,32 +9,32 @@
 #include "queue.h"
 #include "uart.h"
 
-/* Registers of the interrupt controller: interrupt 0 is UART 0's. */
+/* Registers of the interrupt controller. UART 0 has interrupt 0. */
 #define NVIC_ENABLE (*(volatile uint32_t *)0xE000E100u)
 #define NVIC_DISABLE (*(volatile uint32_t *)0xE000E180u)
 #define NVIC_PRIORITY ((volatile uint8_t *)0xE000E400u)
 #define SYSTEM_PRIORITY ((volatile uint8_t *)0xE000ED18u)
 #define BUS 0
-/* Place of SysTick, exception 15, among the priorities of the exceptions from number 4 on. */
+/* Index of SysTick (exception 15) in the priorities of the exceptions, which start at number 4. */
 #define SYSTICK 11
 /* A lower value is more urgent. */
 #define CONTROL_PRIORITY 0x00
 #define BUS_PRIORITY 0x80
 
 static atomic_uint_least32_t ticks;
-/* Clock counts that they took. */
+/* Clock counts of the control ticks. */
 static atomic_uint_least32_t control_counts;
 /* Longest section with the bus interrupt disabled, in clock counts. */
 static uint32_t bus_masked;
 
-/* When the running tick was due, on the clock; not known before the first. */
+/* When the running tick was due, on the clock; unknown before the first tick. */
 static uint32_t due;
 static bool is_due_known;
 static uint32_t misses, latency, longest, dropped;
 
 static void mask_bus(void) {
     NVIC_DISABLE = 1u << BUS;
-    /* The interrupt may still come until the write has arrived. */
+    /* The interrupt may still occur until the write has completed. */
     __asm volatile("dsb\n isb" ::: "memory");
 }
 
@@ -57,7 +57,7 @@ void schedule_stop(void) {
     clock_stop_ticks();
 }
 
-/* The clock less the control ticks, which delay the bus anyway; false if a tick came during the reading. */
+/* The clock minus the control ticks, which delay the bus anyway; false if a tick occurred during the reading. */
 static bool own_time(uint32_t *time) {
     const uint32_t control = atomic_load_explicit(&control_counts, memory_order_relaxed);
     *time = clock_now() - control;
@@ -90,7 +90,7 @@ void schedule_sum_up(summary_record *summary) {
     summary->bus_masked_counts = bus_masked;
 }
 
-/* Later due times follow from the first one, so that a tick that never ran is noticed. */
+/* Later due times are computed from the first one, so that a tick that never ran is noticed. */
 static void meet(uint32_t now, uint32_t late) {
     if (!is_due_known) {
         is_due_known = true;

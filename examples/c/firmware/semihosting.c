@@ -5,7 +5,7 @@
 #define SYS_WRITE0 0x04u
 #define SYS_GET_CMDLINE 0x15u
 #define SYS_EXIT 0x18u
-/* Reasons of an exit. */
+/* Reason codes of an exit. */
 #define RUN_TIME_ERROR 0x20023u
 #define APPLICATION_EXIT 0x20026u
 

@@ -2,7 +2,7 @@
 
 #define PAINT 0xCCCCCCCCu
 
-/* Of memory.x: the stack grows down from its start to its end. */
+/* From memory.x: the stack grows down from its start to its end. */
 extern uint32_t _stack_start[], _stack_end[];
 
 void stack_paint(void) {

@@ -7,7 +7,7 @@
 /* Paints the stack below the caller. */
 void stack_paint(void);
 
-/* Bytes in use since then at the deepest, interrupts included: those whose paint is gone. */
+/* Largest use of the stack since then in bytes, including interrupts: the bytes whose paint was overwritten. */
 uint32_t stack_used(void);
 
 #endif

@@ -12,11 +12,11 @@
 #define CPACR (*(volatile uint32_t *)0xE000ED88u)
 #define CPACR_FPU (0xFu << 20)
 
-/* Of the linker script. */
+/* From the linker script. */
 extern uint32_t data_start[], data_end[], data_in_flash[], bss_start[], bss_end[], _stack_start[];
 
-/* A fault is broken hardware, a defect or a stack overflow: the program ends, so that a test sees it. The stack pointer
-   cannot be trusted, so it is set anew. */
+/* A fault is broken hardware, a defect or a stack overflow: the program ends, so that a test notices. The stack pointer
+may be invalid, so it is reset. */
 __attribute__((naked)) static void fault(void) {
     __asm volatile("ldr r0, =_stack_start\n mov sp, r0\n b stop_on_fault");
 }
@@ -26,7 +26,7 @@ void stop_on_fault(void) {
 }
 
 void reset(void) {
-    /* First: with the hard-float convention any function may use the FPU. */
+    /* This comes first, because with the hard-float convention any function may use the FPU. */
     CPACR |= CPACR_FPU;
     __asm volatile("dsb\n isb" ::: "memory");
     stack_paint();
@@ -41,7 +41,7 @@ void reset(void) {
 
 typedef void (*handler)(void);
 
-/* The processor's table: the stack, 15 exceptions, and the board's interrupts, of which number 0 is in use. */
+/* The vector table: the stack, 15 exceptions, and the board's interrupts, of which number 0 is used. */
 __attribute__((section(".vectors"), used)) static const struct {
     uint32_t *stack;
     handler exceptions[15];

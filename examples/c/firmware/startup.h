@@ -5,7 +5,7 @@
 /* The first code after reset. */
 _Noreturn void reset(void);
 
-/* Where every fault ends. */
+/* The end of every fault. */
 _Noreturn void stop_on_fault(void);
 
 #endif

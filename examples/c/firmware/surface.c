@@ -8,7 +8,7 @@
 /* Ticks of the control loop a second: a tick is a millisecond. */
 #define TICK_RATE 1000u
 
-/* Of tree.S. */
+/* From tree.S. */
 extern const uint8_t tree_bytes[], tree_end[];
 
 /* Limits in ms, the first degraded and the second safe. The emulated line takes one to three seconds for a frame; those
@@ -27,14 +27,14 @@ static const dibs_limits trust = {
 };
 
 static const dibs_guard_limits limits = {
-    /* Twice the generated heart's. */
+    /* Twice the largest speed of the generated heart. */
     .speed = 100.0f,
     .age = 6000,
     .ticks_a_second = TICK_RATE,
-    /* More than the closest pair on the heart needs, and within a tick on every admitted surface. The spring tells depths
-       of a quarter of a millimetre apart. */
+    /* The budget exceeds the needs of the closest pair on the heart, and fits in a tick on every admitted surface. The
+       tolerance changes the spring's force by a quarter of a newton. */
     .options = {.budget = 1750, .depth_tolerance = 0.25f},
-    /* Nobody acknowledges here; a real robot leaves this out. */
+    /* Nobody acknowledges here; leave this out for a real robot. */
     .automatic = 1,
     .trust = &trust,
 };
@@ -52,7 +52,7 @@ static void include(float at, float *low, float *high) {
     *high = at > *high ? at : *high;
 }
 
-/* Reads the rest shape once, so that no figure of the mesh has to be written here by hand. */
+/* Computes the bounding box of the rest shape, so that no dimension of the mesh has to be written here. */
 static void measure(uint32_t vertices) {
     dibs_vec3 low, high;
     must(dibs_tree_rest_position(tree, 0, &low));

@@ -15,10 +15,10 @@ void surface_init(void);
 /* The tree. */
 dibs_tree *surface_tree(void);
 
-/* The buffers: the bus fills one, the control tick reads the other two. */
+/* The buffers: the bus fills one, and the control tick reads the other two. */
 dibs_surface *surface_buffers(void);
 
-/* How far the surface is trusted: for both of its ends. */
+/* Limits of the trust in the surface, for both of its ends. */
 const dibs_guard_limits *surface_limits(void);
 
 /* Centre of the rest shape's bounding box, in mm. */

@@ -3,7 +3,7 @@
 #include "crc.h"
 #include "uart.h"
 
-/* The largest record, its checksum, COBS's first byte and its zero. COBS takes one more byte for each 254. */
+/* The largest record; its checksum and COBS's two bytes are added. From 254 bytes on COBS needs another byte. */
 #define LARGEST (sizeof(tick_record) > sizeof(summary_record) ? sizeof(tick_record) : sizeof(summary_record))
 #define FRAMED (LARGEST + sizeof(uint32_t) + 2)
 _Static_assert(LARGEST + sizeof(uint32_t) < 254, "one block of COBS");
@@ -35,12 +35,12 @@ uint32_t telemetry_cause(dibs_code cause) {
     case DIBS_CODE_NOT_FINITE:
         return 8;
     default:
-        /* The query failed. */
+        /* Any other cause: the query failed. */
         return 3;
     }
 }
 
-/* A block of COBS under construction: each zero becomes the distance to the next one. */
+/* A block of COBS that is being written: each zero is replaced by the distance to the next one. */
 typedef struct {
     uint8_t bytes[FRAMED];
     size_t length;
@@ -72,7 +72,7 @@ void telemetry_send(const void *record, size_t size) {
     for (uint32_t shift = 0; shift < 32; shift += 8) {
         put(&line, (uint8_t)(checksum >> shift));
     }
-    /* The last distance leads to the zero that ends the frame. */
+    /* The last distance is that to the zero that ends the frame. */
     put(&line, 0);
     line.bytes[line.length - 1] = 0;
     uart_write(UART_TELEMETRY, line.bytes, line.length);

@@ -70,10 +70,10 @@ typedef struct {
 
 #define SUMMARY_KIND 2u
 
-/* A cause of the fail-safe machine's as a number of the record's. */
+/* The number that a record has for a cause of the fail-safe machine. */
 uint32_t telemetry_cause(dibs_code cause);
 
-/* Sends a record, whichever it is. */
+/* Sends a record of any kind. */
 void telemetry_send(const void *record, size_t size);
 
 #endif

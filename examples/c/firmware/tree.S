@@ -1,4 +1,4 @@
-/* The tree in flash: the bytes of `dibs build`, as they are. */
+/* The tree in flash: the unchanged bytes of `dibs build`. */
     .section .rodata.tree, "a"
     .balign 8
     .global tree_bytes

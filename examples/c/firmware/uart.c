@@ -7,7 +7,7 @@
 #define RECEIVE_ENABLE (1u << 1)
 #define RECEIVE_INTERRUPT_ENABLE (1u << 3)
 #define RECEIVE_INTERRUPT (1u << 1)
-/* 25 MHz / 16, the fastest rate. An emulated UART ignores it. */
+/* 25 MHz / 16, the highest rate. An emulated UART ignores it. */
 #define DIVISOR 16u
 
 void uart_start_receiving(uart *port) {

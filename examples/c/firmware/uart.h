@@ -25,16 +25,16 @@ void uart_start_receiving(uart *port);
 /* Enables sending. */
 void uart_start_sending(uart *port);
 
-/* Acknowledges the receive interrupt, before the read: the other order loses interrupts. */
+/* Acknowledges the receive interrupt. Call it before reading: otherwise interrupts are lost. */
 void uart_acknowledge(uart *port);
 
-/* The byte that has arrived; false if there is none. */
+/* The received byte; false if there is none. */
 bool uart_read(uart *port, uint8_t *byte);
 
-/* Whether a byte was ever lost because the one before was not read in time. */
+/* Whether a byte was ever lost because the previous one was not read in time. */
 bool uart_has_overrun(uart *port);
 
-/* Sends bytes, and waits until each has left: an emulator that ends would take a waiting byte along. */
+/* Sends bytes, and waits until each is sent: an emulator that ends would lose a waiting byte. */
 void uart_write(uart *port, const uint8_t *bytes, size_t length);
 
 #endif

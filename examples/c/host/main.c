@@ -1,5 +1,5 @@
 /*
- * The control loop on this computer: answers a script of events. Floats are printed by their bits.
+ * The control loop on a host computer: executes a script of events. Floats are printed as their bits.
  *
  *     dibs-host TREE SCRIPT
  *
@@ -7,10 +7,10 @@
  * SCRIPT  lines, with the receiver's clock in ms:
  *     receive NOW BYTES            bytes of a serial line, in hexadecimal
  *     packet NOW BYTES             a packet
- *     frame NOW CAPTURED POSITIONS a frame of this process: x, y and z of each vertex, in the mesh's order
+ *     frame NOW CAPTURED POSITIONS a frame from this process: x, y and z of each vertex, in the mesh's order
  *     work ROWS                    a slice of the checks
  *     status NOW FRAMED            the status for the sender
- *     tick NOW START END RADIUS    a control tick: a capsule, or a sphere where both ends are one
+ *     tick NOW START END RADIUS    a control tick: a capsule, or a sphere if both ends are equal
  *     touch NOW START END RADIUS   a control tick with the contacts within 5 mm
  *     admit NOW START END RADIUS   a control tick whose command, a tenth of a millimetre along -x, is filtered
  *     blind NOW                    a control tick without a pose
@@ -122,7 +122,7 @@ static dibs_tool take_tool(char *text) {
     return tool;
 }
 
-/* A whole file, and a zero. */
+/* Reads a whole file, and appends a zero. */
 static uint8_t *file_read(const char *path, size_t *length) {
     FILE *file = fopen(path, "rb");
     long size = -1;

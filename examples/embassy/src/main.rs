@@ -1,5 +1,5 @@
-//! The smallest loop in Embassy, on the emulated board: the control task runs on an executor in an interrupt, above
-//! the bus's task in the main thread. It ends with the first force that comes from a received surface.
+//! The smallest loop in Embassy, on the emulated board: the control task runs on an executor in an interrupt, which has
+//! a higher priority than the bus's task in the main thread. It ends with the first force from a received surface.
 #![no_std]
 #![no_main]
 
@@ -24,7 +24,7 @@ use embassy_sync::signal::Signal;
 dibs_nostd::include_tree!("heart");
 static SURFACE: heart::Surface = heart::Surface::new();
 
-/// Tissue that hardly moves: 1 mm/s. The emulated line takes long for a frame, and brings no status back.
+/// Tissue that hardly moves: 1 mm/s. On the emulated line a frame takes long, and no status is returned.
 const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
     .without_transit()
     .automatic()
@@ -33,16 +33,16 @@ const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static TICK: Signal<CriticalSectionRawMutex, Millis> = Signal::new();
 static BYTES: Pipe<CriticalSectionRawMutex, 4096> = Pipe::new();
-/// Control ticks so far: the time, in ms.
+/// Number of control ticks so far: the time, in ms.
 static NOW: AtomicU32 = AtomicU32::new(0);
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
-    // Anything wrong here is wrong before the robot moves: stop.
+    // Any error here occurs before the robot moves: stop.
     end(bus().await.is_ok())
 }
 
-/// Starts the control task, and takes the bus's packets.
+/// Starts the control task, and receives the bus's packets.
 async fn bus() -> Result<(), Error> {
     let (mut receiver, guard) = heart::start(&SURFACE, LIMITS)?;
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
@@ -107,7 +107,7 @@ extern "C" fn control_executor() {
     unsafe { CONTROL.on_interrupt() };
 }
 
-/// Follows the exceptions in the vector table.
+/// Placed after the exceptions in the vector table.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [extern "C" fn(); 2] = [uart, control_executor];

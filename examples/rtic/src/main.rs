@@ -1,12 +1,12 @@
-//! The smallest loop in RTIC, on the emulated board: the bus interrupt fills one buffer, the control interrupt of higher
-//! priority reads the other, and neither waits. It ends with the first force that comes from a received surface.
+//! The smallest loop in RTIC, on the emulated board: the bus interrupt fills one buffer, the control interrupt of
+//! higher priority reads the other, and neither waits. It ends with the first force from a received surface.
 #![no_std]
 #![no_main]
 
 #[path = "../../board.rs"]
 mod board;
 
-// Linked for its vectors and its start.
+// Linked for its vector table and start-up code.
 use cortex_m_rt as _;
 
 dibs_nostd::include_tree!("heart");
@@ -16,7 +16,7 @@ unsafe extern "C" {
     fn UART0();
 }
 
-/// Follows the exceptions in the vector table.
+/// Placed after the exceptions in the vector table.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [unsafe extern "C" fn(); 1] = [UART0];
@@ -34,13 +34,13 @@ mod app {
     use crate::board::{self, end};
     use crate::{SURFACE, heart};
 
-    /// Tissue that hardly moves: 1 mm/s. The emulated line takes long for a frame, and brings no status back.
+    /// Tissue that hardly moves: 1 mm/s. On the emulated line a frame takes long, and no status is returned.
     const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
         .without_transit()
         .automatic()
         .budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
 
-    /// Control ticks so far: the time, in ms.
+    /// Number of control ticks so far: the time, in ms.
     static NOW: AtomicU32 = AtomicU32::new(0);
 
     #[shared]
@@ -55,7 +55,7 @@ mod app {
 
     #[init]
     fn init(mut cx: init::Context) -> (Shared, Local) {
-        // Anything wrong here is wrong before the robot moves: stop.
+        // Any error here occurs before the robot moves: stop.
         let Ok(local) = start() else { end(false) };
         board::start_bus();
         board::start_ticks(&mut cx.core.SYST);

@@ -16,8 +16,8 @@ pub const FDCAN_HERTZ: u32 = INPUT / 2 * 240 / 12;
 
 const INPUT: u32 = 8_000_000;
 
-/// Starts the clocks, and gives the part's peripherals.
-// Not inlined, as all code of this program that has panic paths: those of the driver.
+/// Starts the clocks, and returns the part's peripherals.
+// Not inlined, like all code of this program that contains the driver's panic paths.
 #[inline(never)]
 pub fn start() -> Peripherals {
     embassy_stm32::init(config())

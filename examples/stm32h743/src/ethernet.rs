@@ -1,5 +1,5 @@
-//! The bus over Ethernet: the part's controller, and the board's LAN8742A by RMII. Polled by the idle loop; the
-//! interrupt only acknowledges.
+//! The bus over Ethernet: the part's controller, and the board's LAN8742A by RMII. The idle loop polls it; the
+//! interrupt handler only acknowledges.
 
 use core::mem::MaybeUninit;
 use core::task::{Context, Waker};
@@ -15,19 +15,19 @@ use embassy_stm32::{Peripherals, bind_interrupts};
 
 pub const TRUST: Trust = Trust::ETHERNET;
 
-/// Frames that wait to be sent, and to be taken: the control tick may last while these arrive.
+/// Queues of frames to send and of received frames; the second covers the frames that arrive during a control tick.
 type Queue = PacketQueue<2, 16>;
 
-/// Frames taken in one round of the idle loop.
+/// Most frames received in one iteration of the idle loop.
 const FRAMES: u32 = 4;
 
-/// Ticks between two looks at the link.
+/// Ticks between two polls of the link.
 const LINK_INTERVAL: u32 = 500;
 
 /// The LAN8742A's address on its management bus.
 const PHY: u8 = 0;
 
-// DMA reaches SRAM3 and not the TCMs, and SRAM3 is not cached.
+// In SRAM3, because the DMA does not reach the TCMs, and SRAM3 is not cached.
 #[unsafe(link_section = ".sram3.queue")]
 static mut QUEUE: MaybeUninit<Queue> = MaybeUninit::uninit();
 
@@ -38,16 +38,16 @@ bind_interrupts!(struct Interrupts {
 /// The network.
 pub struct Bus {
     device: Ethernet<'static, ETH, GenericPhy<Sma<'static, ETH_SMA>>>,
-    /// Sender of the last good packet: statuses go there, and not to whoever floods the port.
+    /// Sender of the last good packet: statuses are sent to it, and not to others that flood the port.
     peer: Option<Peer>,
     is_up: bool,
-    /// Tick of the last look at the link.
+    /// Tick of the last poll of the link.
     looked: u32,
 }
 
 impl Bus {
     /// Starts the chip.
-    // Never `None`: the start of FDCAN may fail.
+    // Never `None`; the return type is that of FDCAN, whose start may fail.
     #[expect(clippy::unnecessary_wraps, reason = "one signature for both buses")]
     #[inline(never)]
     pub fn start(parts: Peripherals) -> Option<Self> {
@@ -74,7 +74,7 @@ impl Bus {
         Some(Self { device, peer: None, is_up: false, looked: 0 })
     }
 
-    /// Takes a few frames at most: a flood slows the idle loop's other work down, and does not stop it. `take` tells
+    /// Receives only a few frames: a flood slows the idle loop's other work down, but does not stop it. `take` returns
     /// whether a packet was a good one.
     #[inline(never)]
     pub fn poll(&mut self, tick: u32, mut take: impl FnMut(&[u8]) -> bool) {
@@ -82,7 +82,7 @@ impl Bus {
         for _ in 0..FRAMES {
             let context = &mut Context::from_waker(Waker::noop());
             let Some((received, to_send)) = self.device.receive(context) else { return };
-            // The Ethernet checksum is still behind the frame, where it is taken for padding.
+            // The frame is still followed by its Ethernet checksum, which is treated as padding.
             let answer = received.consume(|frame| match read(frame) {
                 Content::Question(answer) => Some(answer),
                 Content::Packet(packet, from) => {
@@ -99,7 +99,7 @@ impl Bus {
         }
     }
 
-    /// Announces the controller's addresses each time that the link comes up.
+    /// Announces the controller's addresses whenever the link comes up.
     fn watch_link(&mut self, tick: u32) {
         if tick.wrapping_sub(self.looked) < LINK_INTERVAL {
             return;
@@ -113,7 +113,7 @@ impl Bus {
         self.is_up = is_up;
     }
 
-    /// Sends a status, once there is a sender.
+    /// Sends a status, if a sender is known.
     #[inline(never)]
     pub fn send(&mut self, status: &[u8]) {
         let mut frame = [0; MAX_REPLY];
@@ -122,7 +122,7 @@ impl Bus {
         }
     }
 
-    /// Sends a frame, or drops it where the queue is full.
+    /// Sends a frame, or drops it if the queue is full.
     fn put(&mut self, frame: &[u8]) {
         let context = &mut Context::from_waker(Waker::noop());
         if let Some(token) = self.device.transmit(context) {

@@ -1,4 +1,4 @@
-//! The bus over FDCAN1: pins PD0 and PD1, a transceiver between them and the bus. Polled by the idle loop; the interrupt
+//! The bus over FDCAN1: pins PD0 and PD1, with a transceiver to the bus. The idle loop polls it; the interrupt handler
 //! only acknowledges.
 
 use core::num::{NonZeroU8, NonZeroU16};
@@ -26,10 +26,10 @@ pub const TRUST: Trust = Trust::SERIAL;
 /// Largest status, in bytes: one message.
 pub const STATUS_MTU: usize = 64;
 
-/// Messages taken in one round of the idle loop: as many as the driver's FIFO holds.
+/// Messages received in one iteration of the idle loop: as many as the driver's FIFO holds.
 const MESSAGES: u32 = 3;
 
-/// The first identifier: heartbeats. Frames have the last of three.
+/// The first of three identifiers: heartbeats. Frames have the last one.
 const BASE: u16 = 0x120;
 
 /// 1 Mbit/s, sampled at 80 %.
@@ -40,7 +40,7 @@ const NOMINAL: NominalBitTiming = NominalBitTiming {
     sync_jump_width: quanta(8),
 };
 
-/// 2 Mbit/s for the data. Above that a sender has to compensate its transceiver's delay, and the driver does not.
+/// 2 Mbit/s for the data. Higher rates need compensation of the transceiver's delay, which the driver does not support.
 const DATA: DataBitTiming = DataBitTiming {
     transceiver_delay_compensation: false,
     prescaler: PRESCALER,
@@ -89,19 +89,19 @@ impl Bus {
         Some(Self { can: can.into_normal_mode(), identifiers })
     }
 
-    /// Takes a few messages.
+    /// Receives a few messages.
     #[inline(never)]
     pub fn poll(&mut self, _tick: u32, mut take: impl FnMut(&[u8]) -> bool) {
         for _ in 0..MESSAGES {
             let context = &mut Context::from_waker(Waker::noop());
-            // An error of the bus is counted by the controller; lost messages show as gaps.
+            // The controller counts errors of the bus; lost messages are noticed as gaps.
             let Poll::Ready(Ok(message)) = pin!(self.can.read_fd()).poll(context) else { return };
             let (frame, _) = message.parts();
             take(frame.data());
         }
     }
 
-    /// Sends a status, or drops it where the queue is full.
+    /// Sends a status, or drops it if the queue is full.
     #[inline(never)]
     pub fn send(&mut self, status: &[u8]) {
         let Some(identifier) = StandardId::new(self.identifiers.of(status)) else { return };

@@ -1,8 +1,8 @@
 //! The controller on a NUCLEO-H743ZI2: `docs/boards.md`.
 //!
-//! The control tick (`SysTick`, 1 kHz) runs above everything else, from memory without wait states. The idle loop takes
-//! packets from Ethernet, or from FDCAN with the feature `fdcan`, checks complete frames and the tree in flash a slice
-//! at a time, and sends statuses.
+//! The control tick (`SysTick`, 1 kHz) has the highest priority, and runs from memory without wait states. The idle
+//! loop receives packets from Ethernet, or from FDCAN with the feature `fdcan`, checks complete frames and the tree in
+//! flash in slices, and sends statuses.
 
 // Requirement: P-10
 
@@ -36,7 +36,7 @@ static BUS: BusStatus = BusStatus::new();
 fn main() -> ! {
     match start() {
         Some((receiver, bus)) => idle(receiver, bus),
-        // Anything wrong here is wrong before the robot moves.
+        // Any error here occurs before the robot moves.
         None => loop {
             cortex_m::asm::wfi();
         },
@@ -66,14 +66,14 @@ fn idle(mut receiver: Receiver, mut bus: Bus) -> ! {
     }
 }
 
-/// Takes a packet. Returns whether it was a good one.
-// Not inlined, so that the panic paths of the driver that calls it are not mixed with code of the controller.
+/// Receives a packet. Returns whether it was a good one.
+// Not inlined, so that the panic paths of the calling driver are not mixed with code of the controller.
 #[inline(never)]
 fn take(receiver: &mut Receiver, packet: &[u8]) -> bool {
     receiver.packet(packet, tick::now())
 }
 
-/// The drivers have panic paths: `docs/boards.md`. A reset makes the output zero.
+/// The drivers have panic paths: `docs/boards.md`. A reset sets the output to zero.
 #[panic_handler]
 fn panic(_: &PanicInfo) -> ! {
     SCB::sys_reset()

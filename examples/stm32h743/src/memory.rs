@@ -1,12 +1,12 @@
-//! The memories: the TCMs are filled, the regions of the protection unit (MPU) set, the caches on.
+//! The memories: fills the TCMs, sets the regions of the memory protection unit (MPU), and turns the caches on.
 
 use core::arch::global_asm;
 
 use cortex_m::Peripherals;
 use embassy_stm32::pac::RCC;
 
-// Copies code and state of the control tick to the TCMs. It runs before anything else, and so without Rust. The steps
-// of 8 bytes write whole units of the TCMs' error correction.
+// Copies code and state of the control tick to the TCMs. It runs before everything else, so it cannot be written in
+// Rust. It copies 8 bytes at a time, whole units of the TCMs' error correction.
 global_asm!(
     ".pushsection .text.__pre_init, \"ax\", %progbits",
     ".global __pre_init",
@@ -58,17 +58,17 @@ const READ_ONLY: u32 = 0b110 << 24;
 const ORDERED: u32 = 1 << 18;
 const NOT_CACHED: u32 = 1 << 19 | 1 << 18;
 const CACHED: u32 = 1 << 19 | 0b11 << 16;
-/// Eighths of a region that are not part of it.
+/// Bits for the eighths of a region that are excluded from it.
 const EXCEPT: u32 = 8;
 
-/// Later ones prevail. Kept as a table, in which a check of the binary finds the region of the DMA's memory.
+/// Later regions take precedence. A table, so that a check of the binary finds the region of the DMA's memory.
 #[used]
 static REGIONS: [Region; 4] = [
-    // External memory, of which the board has none: without this the processor may read it ahead.
+    // External memory, which the board does not have: without this the processor may prefetch from it.
     Region { base: 0, log2: 32, attributes: NO_CODE | NO_ACCESS | ORDERED | 0b1000_0111 << EXCEPT },
-    // Descriptors and buffers of the Ethernet DMA in SRAM3: what one side writes, the other reads.
+    // Descriptors and buffers of the Ethernet DMA in SRAM3: each side reads the other's writes.
     Region { base: 0x3004_0000, log2: 15, attributes: NO_CODE | READ_WRITE | NOT_CACHED },
-    // The code in the ITCM, once it is there.
+    // The code in the ITCM, after it is copied.
     Region { base: 0, log2: 16, attributes: READ_ONLY | CACHED },
     // Null pointers.
     Region { base: 0, log2: 5, attributes: NO_CODE | NO_ACCESS | ORDERED },

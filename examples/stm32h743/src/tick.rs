@@ -1,4 +1,4 @@
-//! The control tick: `SysTick`, 1 kHz, above all other interrupts.
+//! The control tick: `SysTick`, 1 kHz, with the highest priority of all interrupts.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -18,22 +18,22 @@ const PERIOD: u32 = clocks::HERTZ / TICK_RATE;
 #[unsafe(link_section = ".dtcm.control")]
 static CONTROL: Exclusive<Option<Control<Script>>> = Exclusive::new(None);
 
-/// What a debugger reads, in words. In the TCM, where no cache is between.
+/// Values for a debugger, in words. In the TCM, which is not cached.
 #[repr(C)]
 pub struct Watch {
     /// Control ticks run so far.
     ticks: AtomicU32,
-    /// Most cycles from the moment a tick was due to its first instruction.
+    /// Most cycles from a tick's due time to its first instruction.
     latest_start: AtomicU32,
-    /// Most cycles from the moment a tick was due to its end.
+    /// Most cycles from a tick's due time to its end.
     latest_end: AtomicU32,
-    /// Ticks that were due before the one before had ended.
+    /// Ticks that were due before the previous one had ended.
     deadlines_missed: AtomicU32,
-    /// The force on the instrument in N, as bits of `f32`. Here a robot has its actuators.
+    /// The force on the instrument in N, as bits of `f32`. A real robot has its actuators here.
     force: [AtomicU32; 3],
 }
 
-/// The run so far.
+/// The values of the run so far.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".dtcm.watch")]
 pub static WATCH: Watch = Watch {
@@ -44,7 +44,7 @@ pub static WATCH: Watch = Watch {
     force: [const { AtomicU32::new(0) }; 3],
 };
 
-/// The controller's time: that of the ticks so far.
+/// The controller's clock: the number of ticks so far.
 pub fn now() -> Millis {
     time_of(Ticks(WATCH.ticks.load(Ordering::Relaxed).into()))
 }
@@ -55,7 +55,7 @@ pub fn start(core: &mut Peripherals, control: Control<Script>) {
     core.DCB.enable_trace();
     DWT::unlock(); // the M7's lock access register
     core.DWT.enable_cycle_counter();
-    // SAFETY: no critical section relies on priorities, and the handler's state is in place.
+    // SAFETY: no critical section relies on priorities, and the handler's state is initialised.
     unsafe { core.SCB.set_priority(SystemHandler::SysTick, 0) };
     core.SYST.set_clock_source(SystClkSource::Core);
     core.SYST.set_reload(PERIOD - 1);
@@ -64,11 +64,11 @@ pub fn start(core: &mut Peripherals, control: Control<Script>) {
     core.SYST.enable_interrupt();
 }
 
-/// The vector leads here without a step through flash.
+/// The vector table points here directly, so that no code in flash is executed.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".itcm.tick")]
 extern "C" fn SysTick() {
-    // It has counted down since this tick was due.
+    // The timer has counted down since this tick was due.
     let late = PERIOD.wrapping_sub(SYST::get_current()) % PERIOD;
     let start = DWT::cycle_count();
     let record = CONTROL.with(|control| Some(control.as_mut()?.tick(DWT::cycle_count))).flatten();

@@ -1,15 +1,15 @@
-//! Measures a query's `Cost` in cycles on your board, by the cycle counter of the debug watchpoint unit (DWT). Where
-//! that stands still, as in an emulator, it uses `SysTick` and says so.
+//! Measures a query's `Cost` in cycles on your board, by the cycle counter of the debug watchpoint unit (DWT). If that
+//! does not count, as in an emulator, it uses `SysTick` and says so.
 //!
-//! Change `memory.x` to your part, raise its clock before the measurement as your product does, and run
-//! this with a debugger that shows semihosting output:
+//! Adapt `memory.x` to your part, set its clock as your product does before the measurement, and run this with a
+//! debugger that shows semihosting output:
 //!
 //! ```text
 //! cargo build -p firmware-example --bin cycles --features cycles --profile firmware --target thumbv7em-none-eabihf
 //! ```
 //!
-//! It searches the heart at rest from many poses, each with warm and with empty caches, and with three budgets: zero,
-//! node tests only, and unlimited. The resulting constants are above every measured query. Add a margin for others.
+//! It searches the heart at rest from many poses, alternately with warm and with empty caches, and with three budgets:
+//! zero, node tests only, and unlimited. The resulting constants bound every measured query. Add a margin for others.
 #![no_std]
 #![no_main]
 
@@ -24,7 +24,7 @@ use dibs_nostd::{Budget, Capsule, Cost, FrameLabel, Millis, Options, Proximity};
 
 const POSES: u32 = 2_000;
 
-/// Half the capsule's axis, and its radius: those of the paper's table 3, in mm.
+/// Half the capsule's axis, and its radius, in mm: those of the paper's table 3.
 const HALF_AXIS: f32 = 75.0;
 const RADIUS: f32 = 3.0;
 
@@ -65,7 +65,7 @@ fn measure() -> Result<(), &'static str> {
         let half = random.within().normalize_or(Vec3::X) * HALF_AXIS;
         let Ok(tool) = Capsule::new(centre - half, centre + half, RADIUS) else { continue };
         let mut cycles = |tests| {
-            // Every other pose finds both caches empty, the worst case.
+            // Every other pose starts with empty caches, the worst case.
             if pose % 2 == 1 {
                 core.SCB.clean_invalidate_dcache(&mut core.CPUID);
                 core.SCB.invalidate_icache();
@@ -76,7 +76,7 @@ fn measure() -> Result<(), &'static str> {
             let cycles = counter.since(start);
             answer.map(|answer| (cycles, answer)).map_err(|_| "the query failed")
         };
-        // With no more than a triangle counts as, none is tested.
+        // A budget of no more than one triangle test allows none.
         let [none, nodes, all] = [cycles(0)?, cycles(Budget::TRIANGLE)?, cycles(u32::MAX)?];
         raise(&mut bound, none, nodes, all);
         sum += u64::from(all.0);
@@ -90,12 +90,12 @@ fn measure() -> Result<(), &'static str> {
     Ok(())
 }
 
-/// The counter.
+/// The counter that is used.
 #[derive(Clone, Copy, PartialEq)]
 enum Counter {
     /// The core's cycles, in 32 bits.
     Cycles,
-    /// Counts of `SysTick`, downwards in 24 bits: the only ones of an emulator.
+    /// `SysTick`, which counts down in 24 bits: the only counter in an emulator.
     SysTick,
 }
 

@@ -1,5 +1,5 @@
-//! The controller as a program on this computer: the same logic as on the board, with a thread for the bus interrupt.
-//! It claims no deadline.
+//! The controller as a program on a host computer: the same logic as on the board, with a thread as the bus interrupt.
+//! It guarantees no deadline.
 //!
 //! `host BUS TELEMETRY TICKS [hand]`: two Unix sockets to connect to, the length of the run, and whether a simulated hand
 //! pushes the instrument.
@@ -17,7 +17,7 @@ use controller::{BusStatus, Either, STATUS_FRAMED, TICK_RATE, Trust, start, surf
 use dibs_nostd::Millis;
 use dibs_nostd::wire::{Counters, Event};
 
-/// Slices of background work between two looks at the bus.
+/// Slices of background work between two polls of the bus.
 const SLICES: u32 = 1_000;
 
 static SURFACE: surface::Surface = surface::Surface::new();

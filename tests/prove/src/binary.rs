@@ -1,9 +1,9 @@
-//! The deepest stack, from the binary alone: every function's frame, and the call graph.
+//! The deepest stack, computed from the binary alone: from every function's frame and the call graph.
 //!
-//! Frames come from the compiler's `.stack_sizes` where the build has them, and from the instructions that move the
-//! stack pointer, whichever is more; calls come from the branch instructions. Encodings are those of the ARMv7-M
-//! Architecture Reference Manual, A5 and A7. Branches to an address in a register, which cannot be followed, are
-//! listed; in the control path they are an error, as is recursion anywhere.
+//! Frame sizes come from the compiler's `.stack_sizes`, if the build has them, and from the instructions that move the
+//! stack pointer; the larger one counts. Calls come from the branch instructions. Encodings are those of the ARMv7-M
+//! Architecture Reference Manual, A5 and A7. Branches to an address in a register cannot be followed and are listed; in
+//! the control path they are an error, as is recursion anywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -14,17 +14,16 @@ use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
 use crate::bound::decode::{far, long_branch, near, signed};
 
-/// Stack of an exception's entry: 26 words with the FPU's registers, and alignment.
+/// Stack of an exception's entry: 26 words with the FPU's registers, plus alignment.
 pub const EXCEPTION_FRAME: u32 = 26 * 4 + 8;
 
-/// One function of the binary.
 #[derive(Default)]
 struct Function {
     name: String,
     frame: u32,
-    /// Targets of branches out of it, and where they are.
+    /// Targets of branches out of it, each with the addresses of the branches.
     calls: BTreeMap<u32, Vec<u32>>,
-    /// Branches to an address in a register.
+    /// Number of branches to an address in a register.
     indirect: u32,
 }
 
@@ -32,7 +31,7 @@ struct Function {
 pub struct Binary {
     functions: BTreeMap<u32, Function>,
     vectors: Vec<u32>,
-    /// Bytes between the linker's two marks.
+    /// Size of the stack: bytes between two symbols of the linker.
     pub stack_room: u32,
     /// Functions that mask interrupts.
     pub masking: Vec<String>,
@@ -46,19 +45,18 @@ pub struct Worst {
     pub bus: u32,
     /// The control tick.
     pub control: u32,
-    /// All of them on top of each other, with the exceptions' entries between them, and a fault.
+    /// The three levels on top of each other, with an exception entry between them, and a fault.
     pub total: u32,
 }
 
 impl Binary {
-    /// Reads a linked program.
     pub fn read(program: &Path) -> Result<Self> {
         let bytes = fs::read(program)
             .with_context(|| format!("cannot read the firmware {}", program.display()))?;
         let file = object::File::parse(&*bytes)?;
         let mut functions = BTreeMap::new();
         let mut masking = BTreeSet::new();
-        // The starts of code and of data, by the linker's mapping symbols.
+        // The starts of code and of data, from the linker's mapping symbols.
         let marks: BTreeMap<u32, bool> = file
             .symbols()
             .filter_map(|symbol| {
@@ -103,7 +101,7 @@ impl Binary {
         Ok(Self { functions, vectors, stack_room, masking: masking.into_iter().collect() })
     }
 
-    /// The deepest stack of the three levels and of a fault on top of them.
+    /// The deepest stack of the three levels and a fault on top of them.
     pub fn worst(&self) -> Result<Worst> {
         // Vectors after the initial stack pointer: reset, NMI, hard fault, ...; SysTick is the 15th,
         // the bus the first interrupt.
@@ -121,7 +119,7 @@ impl Binary {
         Ok(Worst { idle, bus, control, total })
     }
 
-    /// The handler of an exception, by its number: `SysTick` is the 15th.
+    /// The handler of an exception, by number: `SysTick` is the 15th.
     pub fn handler(&self, exception: usize) -> Result<u32> {
         self.vectors.get(exception - 1).copied().context("vector missing")
     }
@@ -132,17 +130,16 @@ impl Binary {
         Ok(place.with_context(|| format!("no vector leads to {name}"))? + 1)
     }
 
-    /// The name of the function at an address.
     pub fn name(&self, address: u32) -> Option<&str> {
         self.functions.get(&address).map(|function| &*function.name)
     }
 
-    /// Functions below `root`, itself included, by address.
+    /// Functions below `root` in the call graph, including `root`, by address.
     pub fn below(&self, root: u32) -> BTreeSet<u32> {
         self.below_but(root, |_| false)
     }
 
-    /// Functions below `root`, itself included, but for those that are left out, by address, and what they alone call.
+    /// The same without the functions that are left out, and those that only they call.
     pub fn below_but(&self, root: u32, is_left_out: impl Fn(u32) -> bool) -> BTreeSet<u32> {
         let mut seen = BTreeSet::from([root]);
         let mut next = vec![root];
@@ -158,7 +155,7 @@ impl Binary {
         self.deepest(self.handler(exception)?, &mut Vec::new())
     }
 
-    /// Functions below `root` that branch to an address in a register.
+    /// Functions below `root` that contain branches to an address in a register.
     pub fn indirect(&self, root: u32) -> Vec<String> {
         let below = self.below(root);
         let functions = below.iter().filter_map(|address| self.functions.get(address));
@@ -166,7 +163,7 @@ impl Binary {
         found.map(|function| function.name.clone()).collect()
     }
 
-    /// Functions that panic: the handler, and those of `core` that lead to it.
+    /// Functions that panic: the handler, and functions of `core` that call it.
     pub fn panicking(&self) -> BTreeSet<u32> {
         let is_start = |name: &str| name.contains("begin_unwind") || name.contains("panicking::");
         let named = self.functions.iter().filter(|(_, function)| is_start(&function.name));
@@ -184,7 +181,7 @@ impl Binary {
         }
     }
 
-    /// Branches to one of these functions from any other function, by address.
+    /// Addresses of branches to one of these functions from any other function.
     pub fn branches_to(&self, targets: &BTreeSet<u32>) -> Vec<u32> {
         let others = self.functions.iter().filter(|(address, _)| !targets.contains(address));
         let calls = others.flat_map(|(_, function)| &function.calls);
@@ -192,7 +189,7 @@ impl Binary {
         wanted.flat_map(|(_, places)| places).copied().collect()
     }
 
-    /// Indirect calls of start-up and the idle loop.
+    /// Indirect calls in start-up code and the idle loop.
     pub fn indirect_when_idle(&self) -> Vec<String> {
         self.vectors.first().map(|&reset| self.indirect(reset)).unwrap_or_default()
     }
@@ -234,7 +231,7 @@ fn declared(file: &object::File<'_>) -> Result<Vec<(u32, u32)>> {
     Ok(sizes)
 }
 
-/// Reads a function's instructions for moves of the stack pointer and branches out of the function.
+/// Reads a function's instructions: those that move the stack pointer, and branches out of the function.
 fn decode(
     start: u32,
     body: &[u8],
@@ -275,7 +272,7 @@ fn decode(
                 _ => {}
             }
             function.frame += wide_push(first, second);
-            // LDR pc, except from the stack, which is a return.
+            // LDR pc; from the stack it is a return.
             if first & 0xFF70 == 0xF850 && second >> 12 == 15 && first & 15 != 13 {
                 function.indirect += 1;
             }
@@ -285,7 +282,7 @@ fn decode(
             }
         } else {
             match first {
-                // BLX, and BX other than a return.
+                // BLX, and BX unless it is a return.
                 _ if first & 0xFF80 == 0x4780 => function.indirect += 1,
                 _ if first & 0xFF80 == 0x4700 && first >> 3 & 15 != 14 => function.indirect += 1,
                 // MOV pc, and ADD pc.
@@ -312,7 +309,7 @@ fn decode(
     }
 }
 
-/// Bytes by which a wide instruction lowers the stack pointer.
+/// Bytes by which a 32-bit instruction lowers the stack pointer.
 fn wide_push(first: u32, second: u32) -> u32 {
     match first {
         // STMDB sp!, and STR [sp, #-n]!

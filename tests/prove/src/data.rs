@@ -1,4 +1,4 @@
-//! The real anatomy, beside the repository on some machines.
+//! Real anatomical meshes, which some machines have beside the repository.
 
 use std::path::PathBuf;
 

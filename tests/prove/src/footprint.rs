@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
 
-/// A linked program's needs of the board.
+/// The memory that a linked program needs.
 pub struct Footprint {
     /// Code, constants and the initial values of variables.
     pub flash: u64,
@@ -14,7 +14,7 @@ pub struct Footprint {
     pub ram: u64,
     /// Names of allocator functions, of which there must be none.
     pub allocators: Vec<String>,
-    /// Names of functions that panic, of which there must be none either.
+    /// Names of functions that panic, of which there must be none.
     pub panics: Vec<String>,
 }
 

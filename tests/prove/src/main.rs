@@ -33,17 +33,17 @@ enum Task {
         /// Seconds of the controller's time in the demo.
         #[arg(long)]
         demo_seconds: u32,
-        /// Also the checks on request, and a few mutants of the lines that changed.
+        /// Also the checks that run on request, and a few mutants of changed lines.
         #[arg(long)]
         whole: bool,
         /// Where to list the steps.
         #[arg(long)]
         steps: PathBuf,
     },
-    /// Runs those checks that run beside the others, for another process.
+    /// Runs the checks of the second lane, for another process.
     #[command(hide = true)]
     Beside {
-        /// Through which the two talk.
+        /// The folder through which the two processes communicate.
         folder: PathBuf,
     },
 }

@@ -1,6 +1,6 @@
 //! `cargo xtask mutants`: changes operators of the core by `cargo-mutants`, and lists the changes that no test notices.
 //!
-//! `.cargo/mutants.toml` lists accepted survivors with their reasons, and those among mutants tried by hand.
+//! `.cargo/mutants.toml` lists accepted survivors with their reasons, including mutants that were tried by hand.
 
 use std::fs;
 use std::process::Command;
@@ -11,11 +11,11 @@ use xtask::process::{quiet, run};
 use xtask::steps::Outcome;
 use xtask::workspace;
 
-/// The version of cargo-mutants for which the lists of survivors are written.
+/// The version of cargo-mutants that the lists of survivors are for.
 const VERSION: &str = "27.1.0";
 
-/// Folders of the core, each with the test programs and tests that try its mutants. The tests are few, so that a trial
-/// takes seconds besides its build.
+/// Folders of the core, each with the test programs and tests that try its mutants. There are few tests, so that a
+/// trial takes only seconds in addition to its build.
 const AREAS: [(&str, &[&str], &[&str]); 7] = [
     ("dibs-nostd/src/tool", &["query"], &["kernels", "refusals"]),
     (
@@ -37,16 +37,16 @@ const AREAS: [(&str, &[&str], &[&str]); 7] = [
 /// A part of the path of every unit test of the core.
 const UNIT_TESTS: &str = "tests::";
 
-/// The exit code of cargo-mutants where mutants survived.
+/// The exit code of cargo-mutants if mutants survived.
 const SURVIVED: i32 = 2;
 
-/// Its exit code where mutants made the tests hang, and none survived.
+/// Its exit code if mutants made the tests hang, and none survived.
 const TIMED_OUT: i32 = 3;
 
-/// Its exit code where the tests fail without a mutant.
+/// Its exit code if the tests fail without a mutant.
 const BASELINE_FAILED: i32 = 4;
 
-/// Most mutants of changed lines that CI tries: each takes a build of the core and its tests.
+/// Most mutants of changed lines that CI tries: each needs a build of the core and its tests.
 const SAMPLE: usize = 4;
 
 /// Changes operators of the core one by one, and lists the changes that no test notices. The whole core takes
@@ -56,15 +56,15 @@ pub struct Options {
     /// Only this file, or the files below this folder.
     #[arg(long, default_value = "dibs-nostd/src")]
     below: String,
-    /// Every mutant of these parts only, as `1/20`: the second twentieth.
+    /// Only every mutant of this part, such as `1/20`: the second twentieth.
     #[arg(long, default_value = "0/1")]
     shard: String,
-    /// Instead a few mutants of the lines that changed since `main`, or in the last commit.
+    /// Instead, a few mutants of the lines that changed since `main`, or in the last commit.
     #[arg(long, conflicts_with_all = ["below", "shard"])]
     changed: bool,
 }
 
-/// Tries the mutants asked for.
+/// Tries the requested mutants.
 pub fn mutants(options: &Options) -> Result<()> {
     if !options.changed {
         return whole(options);
@@ -75,7 +75,7 @@ pub fn mutants(options: &Options) -> Result<()> {
     }
 }
 
-/// Tries every mutant of the folders asked for.
+/// Tries every mutant of the requested folders.
 fn whole(options: &Options) -> Result<()> {
     install()?;
     let mut areas = 0;
@@ -117,7 +117,7 @@ pub fn sample() -> Result<Outcome> {
                 command(&[&changed[..], &["--shard", &shard]].concat(), programs, tests);
             let status = trial.status().context("cannot start cargo-mutants")?;
             match status.code() {
-                // Tests that a mutant makes hang notice it.
+                // A test that hangs because of a mutant has noticed it.
                 Some(0 | TIMED_OUT) => (),
                 Some(SURVIVED) => {
                     bail!("no test notices a mutant of a changed line: see target/mutants.out")
@@ -139,8 +139,8 @@ pub fn sample() -> Result<Outcome> {
 fn command(arguments: &[&str], programs: &[&str], tests: &[&str]) -> Command {
     let mut cargo = Command::new("cargo");
     cargo.current_dir(workspace::root());
-    // The mutants share a target folder of their own. In the workspace's folder, the next build would take a mutant for
-    // the core, because the core's sources are older.
+    // The mutants have their own target folder. In the workspace's folder, the next build would use a mutant as the
+    // core, because the core's sources are older.
     cargo.env("CARGO_TARGET_DIR", workspace::root().join("target/mutants"));
     cargo.args(["mutants", "--package", "dibs-nostd", "--output", "target"]).args(arguments);
     cargo.args(["--", "--package", "dibs-tests", "--package", "dibs-nostd", "--lib"]);

@@ -1,4 +1,4 @@
-//! The rows of docs/processors.md, each checked by the compiler on the core crate.
+//! The rows of docs/processors.md, each checked by compiling the core crate.
 
 use std::fs;
 use std::process::Command;
@@ -10,19 +10,19 @@ use xtask::steps::Outcome;
 use xtask::toolchain::add_target;
 use xtask::workspace;
 
-/// Fewer rows than this were not read from the page.
+/// If fewer rows than this are found, the page was not parsed correctly.
 const LEAST: usize = 10;
 
-/// The feature with which a core crate without compare-and-swap works, as a row names it.
+/// The feature that a core crate without compare-and-swap needs, as a row names it.
 const PORTABLE: &str = "portable-atomic";
 
-/// The error of a core crate that has no compare-and-swap.
+/// The compiler's error for a core crate without compare-and-swap.
 const NO_SWAP: &str = "no method named `compare_exchange`";
 
 /// Longest time of a check.
 const LIMIT: Duration = Duration::from_mins(10);
 
-/// Checks all rows. Where rustup does not have a target, nothing is said of its row.
+/// Checks all rows. A row whose target rustup does not have is skipped.
 pub fn check() -> Result<Outcome> {
     let page = workspace::root().join("docs/processors.md");
     let page = fs::read_to_string(&page).context("docs/processors.md")?;
@@ -45,7 +45,7 @@ pub fn check() -> Result<Outcome> {
     Ok(Outcome::Skipped(format!("not to be had: {}", skipped.join(", "))))
 }
 
-/// The targets, and whether they work without the feature.
+/// The targets, each with whether it works without the feature.
 fn rows(page: &str) -> Result<Vec<(&str, bool)>> {
     let rows = page.lines().filter_map(|line| {
         let mut cells = line.split('|').map(str::trim).skip(2);
@@ -75,7 +75,7 @@ fn compiles(target: &str, feature: Option<&str>) -> Result<()> {
     built.map(drop).with_context(|| format!("docs/processors.md says {target} works"))
 }
 
-/// Fails for want of compare-and-swap, and for nothing else.
+/// Checks that the build fails for lack of compare-and-swap, and for no other reason.
 fn lacks_swap(target: &str) -> Result<()> {
     let output = check_of(target).output()?;
     ensure!(

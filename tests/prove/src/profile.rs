@@ -1,7 +1,7 @@
 //! `cargo xtask profile`: where a query's instructions go on the emulated board.
 //!
-//! Every executed instruction of the query is logged, looked up in the program's debug information, and counted for the
-//! innermost of its inlined functions that has a separate part.
+//! Every executed instruction of the query is logged, looked up in the program's debug information, and assigned to the
+//! innermost inlined function that has its own part.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -28,7 +28,7 @@ struct Part {
     functions: &'static [&'static str],
 }
 
-/// An instruction belongs to the first part that names one of its functions.
+/// An instruction belongs to the first part that lists one of its functions.
 const PARTS: [Part; 6] = [
     Part {
         name: "exact tests of triangles",
@@ -46,7 +46,6 @@ const PARTS: [Part; 6] = [
     Part { name: "spheres of children", functions: &["expand"] },
     Part { name: "setting up, warm start, answer", functions: &["start", "finish"] },
 ];
-/// The rest.
 const REST: &str = "loop over subtrees";
 
 /// Measures, and writes docs/evidence/performance.md.
@@ -70,7 +69,7 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// Addresses of the functions of a query, or that it is inlined into.
+/// Address ranges of the functions of a query, and of functions that it is inlined into.
 fn ranges(program: &Path) -> Result<Vec<Range<u64>>> {
     let bytes = fs::read(program)?;
     let file = object::File::parse(&*bytes)?;
@@ -83,7 +82,7 @@ fn ranges(program: &Path) -> Result<Vec<Range<u64>>> {
     Ok(file
         .symbols()
         .filter(|symbol| symbol.kind() == SymbolKind::Text && symbol.name().is_ok_and(is_ours))
-        // Bit 0 of an address means Thumb.
+        // Bit 0 of an address is the Thumb bit.
         .map(|symbol| (symbol.address() & !1)..(symbol.address() & !1) + symbol.size())
         .collect())
 }
@@ -96,7 +95,7 @@ fn part(loader: &Loader, address: u64) -> Result<Option<&'static str>> {
     while let Some(frame) = frames.next().map_err(|error| anyhow!("{error}"))? {
         if let Some(function) = frame.function {
             let name = function.demangle().map_err(|error| anyhow!("{error}"))?.into_owned();
-            // `closest_to_segment<...>` and `a::b::closest_to_segment` alike.
+            // Matches `closest_to_segment<...>` as well as `a::b::closest_to_segment`.
             let bare = name.split('<').next().unwrap_or_default();
             names.push(bare.rsplit("::").next().unwrap_or_default().to_owned());
         }

@@ -1,4 +1,4 @@
-//! A tree of axis-aligned boxes: built once by the surface area heuristic, then refitted.
+//! A tree of axis-aligned boxes: built once with the surface area heuristic, then refitted.
 
 use std::ops::Range;
 
@@ -9,9 +9,9 @@ use super::bounds::Axis;
 use super::boxes::{self, BoxTree, Node, Rows, Start, each_once};
 use crate::method::Found;
 
-/// Most triangles of a leaf.
+/// Largest number of triangles in a leaf.
 const LEAF: usize = 6;
-/// Bins of the surface area heuristic, and the cost of a box test in triangle tests.
+/// Bins of the surface area heuristic, and the cost of a box test relative to a triangle test.
 const BINS: usize = 16;
 const BOX_COST: f32 = 1.0;
 /// Entries of the traversal's stack; `new` checks the tree's depth against them.
@@ -22,17 +22,16 @@ pub type Bounds = [Vec3A; 2];
 
 pub(super) const NOTHING: Bounds = [Vec3A::INFINITY, Vec3A::NEG_INFINITY];
 
-/// A node. Children are adjacent, after their parent, and all descendants of a node are one
-/// range.
+/// A node. Children are adjacent and after their parent, and all descendants of a node are one range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Link {
     /// The first child, or the first triangle.
     pub first: u32,
-    /// 0 for an inner node, a leaf's number of triangles, or [`DEFERRED`] and more for the hybrid's cuts.
+    /// 0 for an inner node; a leaf's number of triangles; [`DEFERRED`] and more for the hybrid's cut nodes.
     pub count: u32,
 }
 
-/// Counts from here on mark an inner node with outdated descendants.
+/// Counts from this value on mark an inner node whose descendants' boxes are outdated.
 pub const DEFERRED: u32 = 1 << 31;
 
 /// The tree. Its triangles are in the order of the leaves, its vertices in the order of the triangles.
@@ -41,10 +40,10 @@ pub struct AabbTree {
     pub(super) boxes: Vec<Bounds>,
     pub(super) links: Vec<Link>,
     pub(super) rows: Rows,
-    /// The numbers of leaves and of inner nodes, ascending, so that a loop over either has no unpredictable branch.
+    /// The indices of leaves and of inner nodes, ascending, so that a loop over either has no unpredictable branch.
     leaves: Vec<u32>,
     inner: Vec<u32>,
-    /// The vertices of each leaf, each once, and the start of each leaf's part.
+    /// The vertices of each leaf without duplicates, and the start of each leaf's part.
     leaf_vertices: Vec<u32>,
     leaf_start: Vec<u32>,
 }
@@ -89,14 +88,14 @@ impl AabbTree {
         self.refit_to(nodes, |positions, bounds, row| grown(bounds, positions[row]));
     }
 
-    /// Refits all nodes to two frames, the one loaded and `before`. A box holds every position between the two.
+    /// Refits all nodes to two frames, the loaded one and `before`. A box contains every position between the two.
     pub(super) fn refit_over(&mut self, before: &[Vec3A]) {
         self.refit_to(0..self.links.len(), |positions, bounds, row| {
             grown(grown(bounds, positions[row]), before[row])
         });
     }
 
-    /// Leaves are first; inner nodes follow from the last to the first, so that children come before parents.
+    /// Refits the leaves first, then the inner nodes from the last to the first, so that children come before parents.
     #[inline(always)]
     fn refit_to(&mut self, nodes: Range<usize>, grow: impl Fn(&[Vec3A], Bounds, usize) -> Bounds) {
         let leaves = within(&self.leaves, &nodes);
@@ -115,7 +114,7 @@ impl AabbTree {
         }
     }
 
-    /// The vertices below a range of nodes, each once, in ascending order.
+    /// The vertices below a range of nodes, without duplicates, in ascending order.
     pub(super) fn vertices_of(&self, nodes: &Range<usize>) -> Vec<u32> {
         let Range { start, end } = within(&self.leaves, nodes);
         let vertices = self.leaf_start[start] as usize..self.leaf_start[end] as usize;
@@ -146,7 +145,7 @@ impl AabbTree {
     }
 }
 
-/// A tree during a search.
+/// A tree whose nodes are refitted during a search.
 struct Refreshed<'t, F> {
     tree: &'t mut AabbTree,
     refresh: F,
@@ -173,7 +172,7 @@ impl<F: FnMut(&mut AabbTree, usize) -> u32> BoxTree for Refreshed<'_, F> {
     }
 }
 
-/// The range of an ascending list whose numbers are in `range`.
+/// The range of an ascending list whose values are in `range`.
 fn within(numbers: &[u32], range: &Range<usize>) -> Range<usize> {
     let below = |limit: usize| numbers.partition_point(|&number| (number as usize) < limit);
     below(range.start)..below(range.end)
@@ -202,7 +201,7 @@ pub(super) struct Built {
     pub depth: usize,
 }
 
-/// Builds a tree over some boxes, with at most so many in a leaf.
+/// Builds a tree over some boxes, with at most `most` in a leaf.
 pub(super) fn build(boxes: Vec<Bounds>, most: usize) -> Built {
     let count = boxes.len();
     let mut builder = Builder {

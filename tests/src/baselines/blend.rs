@@ -1,10 +1,10 @@
-//! What a volume's nodes make of a vertex and of a box.
+//! Positions of vertices, and boxes around them, computed from a volume's nodes.
 
 use glam::Vec3A;
 
 use super::aabb_tree::{Bounds, NOTHING, grown};
 
-/// What a vertex is bound to.
+/// The binding of a vertex to the nodes of a volume.
 #[derive(Clone, Copy, Debug)]
 pub struct Blend {
     /// The four nodes of its element.
@@ -24,10 +24,10 @@ impl Blend {
     }
 }
 
-/// What f32 may round a blend by, relative to its coordinates.
+/// Largest rounding of a blend in f32, relative to its coordinates.
 const ROUNDING: f32 = 1e-6;
 
-/// A box around all vertices that are bound to these nodes alone.
+/// A box around all vertices that are bound only to these nodes.
 pub(super) fn around(nodes: &[Vec3A], of: &[u32]) -> Bounds {
     let [low, high] = of.iter().fold(NOTHING, |b, &node| grown(b, nodes[node as usize]));
     let rounding = Vec3A::splat(ROUNDING) * low.abs().max(high.abs());

@@ -1,18 +1,18 @@
-//! Lower bounds of the distance between a tool's axis and a box.
+//! Lower bounds on the distance between a tool's axis and a box.
 
 use dibs_nostd::{Capsule, Sphere, Tool};
 use glam::{Vec3, Vec3A};
 
 /// A tool whose axis' distance from boxes can be bounded.
 pub trait Axis: Tool {
-    /// The axis in the form for bounds.
+    /// The axis, prepared for computing bounds.
     type Prepared: Copy;
 
-    /// Makes that form, once for each query.
+    /// Prepares the axis, once for each query.
     fn prepare(&self) -> Self::Prepared;
 
-    /// A lower bound of the squared distance between the axis and the box. It is exact for a point. For a segment it is
-    /// rarely more than two percent below, unless it is above `limit`.
+    /// A lower bound on the squared distance between the axis and the box. It is exact for a point. For a segment it is
+    /// rarely more than two per cent too low, unless it is above `limit`.
     fn bound(axis: &Self::Prepared, low: Vec3A, high: Vec3A, limit: f32) -> f32;
 }
 
@@ -49,8 +49,8 @@ impl Axis for Capsule {
         Segment { start: start.into(), span, inverse }
     }
 
-    /// The squared distance to the box is a convex, piecewise quadratic function of the place on the segment: Newton's
-    /// method finds its minimum in a few steps, and each step's tangent bounds it from below.
+    /// The squared distance to the box is a convex, piecewise quadratic function of the parameter along the segment:
+    /// Newton's method finds its minimum in a few steps, and each step's tangent is a lower bound.
     #[inline(always)]
     fn bound(axis: &Segment, low: Vec3A, high: Vec3A, limit: f32) -> f32 {
         let Segment { start, span, inverse } = *axis;

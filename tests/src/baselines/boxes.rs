@@ -1,4 +1,4 @@
-//! The common part of trees of boxes: rows in the order of the leaves, and one search, near child first.
+//! The common part of trees of boxes: rows in the order of the leaves, and one search that visits the near child first.
 
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ pub enum Node {
 
 /// A tree of boxes.
 pub trait BoxTree {
-    /// A node, whose children's boxes are up to date.
+    /// A node whose children's boxes are up to date.
     fn node(&mut self, node: u32) -> Node;
 
     /// A node's box: its lowest and highest corner.
@@ -29,17 +29,17 @@ pub trait BoxTree {
     fn corners(&self, triangle: usize) -> [Vec3; 3];
 }
 
-/// A search's start, and the triangle that it ends with.
+/// The start of a search, updated with the triangle that it finds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {
-    /// Nothing is known.
+    /// No earlier answer.
     #[default]
     Cold,
-    /// A warm start from the last answer's triangle, if there is one.
+    /// A warm start from the triangle of the last answer, if there is one.
     Last(Option<usize>),
 }
 
-/// The closest pair of a tool of either kind, and the next search's start.
+/// The closest pair of a tool of either kind; updates the start for the next search.
 #[inline(always)]
 pub fn closest_to<T: BoxTree, const STACK: usize>(
     tree: &mut T,
@@ -158,18 +158,18 @@ impl Rows {
         &self.positions
     }
 
-    /// The positions by row, to be written.
+    /// The positions by row, for writing.
     pub fn positions_mut(&mut self) -> &mut [Vec3A] {
         &mut self.positions
     }
 
-    /// The mesh's vertex of a row.
+    /// The mesh vertex of a row.
     #[must_use]
     pub fn vertex(&self, row: usize) -> u32 {
         self.order[row]
     }
 
-    /// Exchanges the positions for others by row, or for zeros where those are of another mesh.
+    /// Exchanges the positions by row for others; if those are of another mesh, for zeros.
     pub fn swap(&mut self, positions: &mut Vec<Vec3A>) {
         positions.resize(self.order.len(), Vec3A::ZERO);
         std::mem::swap(&mut self.positions, positions);
@@ -189,14 +189,14 @@ impl Rows {
         self.triangles[triangle].map(|v| Vec3::from(self.positions[v as usize]))
     }
 
-    /// The vertices of some triangles, each once, in ascending order.
+    /// The vertices of some triangles, without duplicates, in ascending order.
     #[must_use]
     pub fn vertices(&self, triangles: Range<usize>) -> Vec<u32> {
         each_once(self.triangles[triangles].iter().flatten().copied().collect())
     }
 }
 
-/// Numbers, each once, in ascending order.
+/// Sorts the numbers, and removes duplicates.
 #[must_use]
 pub fn each_once(mut numbers: Vec<u32>) -> Vec<u32> {
     numbers.sort_unstable();

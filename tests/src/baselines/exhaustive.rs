@@ -6,14 +6,14 @@ use glam::Vec3;
 
 use crate::method::{Found, Method, Probe};
 
-/// A search of every triangle at every query.
+/// Searches every triangle at every query.
 pub struct Exhaustive {
     triangles: Vec<[u32; 3]>,
     positions: Vec<Vec3>,
 }
 
 impl Exhaustive {
-    /// The mesh's triangles, in its own order.
+    /// Uses the mesh's triangles in the mesh's order.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
         Self { triangles: mesh.triangles.clone(), positions: mesh.positions.clone() }

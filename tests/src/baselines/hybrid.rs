@@ -24,7 +24,7 @@ pub(super) struct Cut {
     node: u32,
     first_child: u32,
     end: u32,
-    /// The vertices below the node: the rows from `rows.0` to `rows.1`, and others.
+    /// The vertices below the node: the rows from `rows.0` to `rows.1`, and the others.
     rows: (u32, u32),
     others: Vec<u32>,
     /// The last frame for which the descendants were refitted.
@@ -32,7 +32,7 @@ pub(super) struct Cut {
 }
 
 impl Hybrid {
-    /// Refits this tree, with the cut `level` levels below the root.
+    /// Wraps this tree, with the cut `level` levels below the root.
     #[must_use]
     pub fn new(mut tree: AabbTree, level: u32) -> Self {
         let (mut top, mut cut) = (Vec::new(), Vec::new());
@@ -57,7 +57,7 @@ impl Hybrid {
         Self { tree, top, cut, frame: 0, start: Start::Cold }
     }
 
-    /// The same, with every search started from the last answer's triangle.
+    /// The same, but every search starts from the triangle of the last answer.
     #[must_use]
     pub fn warm(self) -> Self {
         Self { start: Start::Last(None), ..self }
@@ -69,7 +69,7 @@ impl Cut {
         let below = tree.descendants(node);
         let itself = node..node + 1;
         let vertices = tree.vertices_of(if below.is_empty() { &itself } else { &below });
-        // Rows are numbered in the order of the leaves: most rows of a subtree are its last ones, and consecutive.
+        // Rows have the order of the leaves: most rows of a subtree are consecutive, and at the end of its list.
         let run = vertices.windows(2).rev().take_while(|pair| pair[0] + 1 == pair[1]).count() + 1;
         let (others, rows) = vertices.split_at(vertices.len() - run);
         Self {
@@ -87,7 +87,7 @@ impl Cut {
         (self.rows.0..self.rows.1).chain(self.others.iter().copied())
     }
 
-    /// Whether it is a leaf, which no search refits.
+    /// Whether it is a leaf, which a search does not refit.
     pub const fn is_leaf(&self) -> bool {
         self.first_child == self.end
     }
@@ -115,7 +115,7 @@ impl Method for Hybrid {
 }
 
 impl Hybrid {
-    /// Refits the boxes at and above the cut: `bounds` gives those of each subtree, with its number.
+    /// Refits the boxes at and above the cut: `bounds` returns those of each subtree, by index.
     #[inline(always)]
     pub(super) fn update_by(&mut self, bounds: impl Fn(&mut AabbTree, usize, &Cut) -> Bounds) {
         self.frame += 1;

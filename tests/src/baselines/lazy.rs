@@ -1,8 +1,9 @@
-//! The hybrid on a surface that nodes carry: no vertex moves before a search reads it.
+//! The hybrid on a surface that nodes move: no vertex is computed before a search reads it.
 //!
 //! The box of a subtree at the cut is around the nodes that its vertices are bound to: a box over the elements. When a
-//! query first enters it, its vertices are moved, and the subtree is refitted. Boxes below that are mapped by their
-//! element instead, and never refitted, were measured and are slower: half of the triangles lie across elements.
+//! query first enters it, its vertices are computed, and the subtree is refitted. An alternative was measured and is
+//! slower: boxes below the cut that are mapped by their element, and never refitted. Half of the triangles lie across
+//! elements.
 
 use glam::{Vec3, Vec3A};
 
@@ -12,10 +13,10 @@ use super::boxes::{Start, each_once};
 use super::hybrid::Hybrid;
 use crate::method::{Found, Method, Probe};
 
-/// A hybrid whose vertices are moved when they are read.
+/// A hybrid whose vertices are computed when they are read.
 pub struct Lazy {
     hybrid: Hybrid,
-    /// What each position is bound to, by row.
+    /// The binding of each row.
     blends: Vec<Blend>,
     /// The nodes of each subtree.
     of_cut: Vec<Vec<u32>>,
@@ -23,7 +24,7 @@ pub struct Lazy {
 }
 
 impl Lazy {
-    /// With what each vertex of the mesh is bound to, and positions of the vertices and the nodes.
+    /// From the binding of each mesh vertex, and positions of the vertices and the nodes.
     #[must_use]
     pub fn new(mut hybrid: Hybrid, blends: &[Blend], rest: &[Vec3], nodes: &[Vec3]) -> Self {
         hybrid.load(rest);
@@ -37,7 +38,7 @@ impl Lazy {
         Self { hybrid, blends, of_cut, nodes }
     }
 
-    /// The positions of the nodes, to be written.
+    /// The positions of the nodes, for writing.
     pub fn nodes_mut(&mut self) -> &mut [Vec3A] {
         &mut self.nodes
     }
@@ -57,7 +58,7 @@ impl Lazy {
     /// The closest pair between the tool and the current surface.
     pub fn find(&mut self, tool: &Probe) -> Found {
         let Self { hybrid, blends, nodes, .. } = self;
-        // The search begins with it, wherever that is.
+        // The search starts with this triangle, whatever subtree it is in.
         if let Start::Last(Some(triangle)) = hybrid.start {
             let corners = hybrid.tree.rows.triangle(triangle);
             moved(&mut hybrid.tree, blends, nodes, corners.into_iter());
@@ -66,7 +67,7 @@ impl Lazy {
     }
 }
 
-/// Moves vertices to where the nodes have them.
+/// Computes vertices from the nodes.
 #[inline(always)]
 fn moved(tree: &mut AabbTree, blends: &[Blend], nodes: &[Vec3A], rows: impl Iterator<Item = u32>) {
     let positions = tree.rows.positions_mut();

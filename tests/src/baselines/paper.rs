@@ -1,9 +1,9 @@
-//! The paper's search, for the counts of its tables 1 and 2.
+//! The paper's search, for the test counts of its tables 1 and 2.
 //!
 //! It is recursive and depth first, on a binary tree with one triangle a leaf. A node's bound is the separation of its
-//! pin less its radius; a leaf's radius is elastic, the largest distance now from its pin to its corners. Of two
-//! children the nearer comes first, and a child is entered while its bound is below the least separation so far. The
-//! library's upper bounds from pins, planes, slack and warm starts are absent.
+//! pin minus its radius; a leaf's radius is elastic: the largest present distance from its pin to its corners. The
+//! nearer of two children is visited first, and a child is only entered while its bound is below the least separation
+//! so far. The library's upper bounds from pins, planes, slack and warm starts are not used.
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::Link;
@@ -16,7 +16,7 @@ use crate::method::{Found, Method, Probe};
 enum Node {
     /// Two children, and the radius at the stretch limit.
     Inner { pin: u32, radius: f32, children: [u32; 2] },
-    /// One triangle, its first corner the pin of the elastic sphere.
+    /// One triangle; its first corner is the pin of the elastic sphere.
     Leaf { corners: [u32; 3] },
 }
 
@@ -31,7 +31,7 @@ impl<'t> Paper<'t> {
     /// Reads the nodes of a built tree.
     ///
     /// # Panics
-    /// If the tree is not binary with one triangle a leaf, which trees of `Construction::Paper` are.
+    /// If the tree is not binary with one triangle a leaf, as trees of `Construction::Paper` are.
     #[must_use]
     pub fn new(built: &'t BuiltTree) -> Self {
         let nodes = match built.index_bits() {
@@ -45,7 +45,7 @@ impl<'t> Paper<'t> {
         self.rows[row as usize]
     }
 
-    /// The separation of a node's pin less its radius.
+    /// The separation of a node's pin minus its radius.
     fn bound(&self, node: u32, tool: &impl Tool) -> f32 {
         let (pin, radius) = match self.nodes[node as usize] {
             Node::Inner { pin, radius, .. } => (pin, radius),
@@ -57,7 +57,7 @@ impl<'t> Paper<'t> {
         tool.axis_distance_squared(self.position(pin)).sqrt() - tool.radius() - radius
     }
 
-    /// Lowers the separation found so far by a node's subtree.
+    /// Lowers the separation found so far by searching a node's subtree.
     fn search(&self, node: u32, tool: &impl Tool, found: &mut Found, tests: &mut [u32; 2]) {
         match self.nodes[node as usize] {
             Node::Leaf { corners } => {

@@ -6,20 +6,20 @@ use super::aabb_tree::AabbTree;
 use super::boxes::Start;
 use crate::method::{Found, Layout, Method, Probe};
 
-/// A tree of boxes, all of them refitted before the first query of a frame.
+/// A tree of boxes that are all refitted before the first query of a frame.
 pub struct Refit {
     tree: AabbTree,
     start: Start,
 }
 
 impl Refit {
-    /// Refits this tree.
+    /// Wraps this tree.
     #[must_use]
     pub fn new(tree: AabbTree) -> Self {
         Self { tree, start: Start::Cold }
     }
 
-    /// The same, with every search started from the last answer's triangle.
+    /// The same, but every search starts from the triangle of the last answer.
     #[must_use]
     pub fn warm(self) -> Self {
         Self { start: Start::Last(None), ..self }

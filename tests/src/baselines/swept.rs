@@ -1,7 +1,7 @@
-//! The AABB tree refitted once a frame to that frame and the one before, for a surface that moves between the two.
+//! The AABB tree, refitted once a frame to that frame and the previous one, for a surface that moves between the two.
 //!
-//! A box around both ends of a vertex's way holds all of the way, so one refit serves every tick of the period. Corners
-//! are interpolated as they are read.
+//! A box around both ends of a vertex's path contains the whole path, so one refit serves every tick of the period.
+//! Corners are interpolated when they are read.
 
 use glam::{Vec3, Vec3A};
 
@@ -18,27 +18,26 @@ pub struct Swept {
 }
 
 impl Swept {
-    /// Refits this tree. Searches start from the last answer's triangle.
+    /// Wraps this tree. Searches start from the triangle of the last answer.
     #[must_use]
     pub fn new(tree: AabbTree) -> Self {
         Self { tree, before: Vec::new(), share: 0.0, start: Start::Last(None) }
     }
 
-    /// Loads the next frame. The one loaded last becomes the one before.
+    /// Loads the next frame. The frame that was loaded last becomes the previous one.
     pub fn load(&mut self, positions: &[Vec3]) {
         self.arriving();
         self.tree.rows.load(positions);
     }
 
-    /// The next frame's positions, to be written. The one written last becomes the one
-    /// before.
+    /// The next frame's positions, for writing. The frame that was written last becomes the previous one.
     pub fn arriving(&mut self) -> &mut [Vec3A] {
         let rows = &mut self.tree.rows;
         rows.swap(&mut self.before);
         rows.positions_mut()
     }
 
-    /// The mesh's vertex that a position is of.
+    /// The mesh vertex of a row.
     #[must_use]
     pub fn vertex(&self, row: usize) -> u32 {
         self.tree.rows.vertex(row)
@@ -49,7 +48,7 @@ impl Swept {
         self.tree.refit_over(&self.before);
     }
 
-    /// The closest pair between the tool and the surface at `share` of the way between the two frames.
+    /// The closest pair of tool and surface at the fraction `share` of the interval between the two frames.
     pub fn find(&mut self, tool: &Probe, share: f32) -> Found {
         self.share = share;
         let found;

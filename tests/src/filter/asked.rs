@@ -1,35 +1,35 @@
-//! What a filter was asked, so that another machine can be asked the same.
+//! Records a filter's inputs, so that another machine can be tested with the same.
 
 use dibs_nostd::filter::{Admitted, Motion};
 use glam::Vec3;
 
-/// A walk's numbers.
+/// The settings of a walk.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// mm.
+    /// Stand-off (mm).
     pub stand_off: f32,
     /// The robot's largest speed (mm/s).
     pub robot: f32,
     /// Time constant of the approach (s).
     pub approach: f32,
-    /// Instructions of a tick's queries.
+    /// Instruction budget of a tick's queries.
     pub instructions: u32,
-    /// s.
+    /// Period (s).
     pub period: f32,
-    /// Whether queries take the measured stretch of both frames.
+    /// Whether queries use the measured stretch of both frames.
     pub is_measured: bool,
 }
 
 /// A tick, and its answer.
 #[derive(Clone, Copy, Debug)]
 pub struct Asked {
-    /// How far the surface is on the way between the last two frames; `None` for the last one.
+    /// The fraction of the interval between the last two frames; `None` for the last frame.
     pub share: Option<f32>,
     /// The instrument's joints.
     pub joints: [Vec3; 3],
     /// Its capsules' radii.
     pub radii: [f32; 2],
-    /// About the first joint.
+    /// The command, about the first joint.
     pub command: Motion,
     /// The tissue's speed (mm/s), and two errors (mm).
     pub tissue: [f32; 3],
@@ -37,9 +37,9 @@ pub struct Asked {
     pub admitted: Admitted,
 }
 
-/// Hears what a walk asks.
+/// Receives the inputs of a walk.
 pub trait Listener {
-    /// A walk begins.
+    /// A walk starts.
     fn walk(&mut self, settings: &Settings);
     /// A new frame, in the tree's order.
     fn frame(&mut self, rows: &[Vec3]);
@@ -47,7 +47,7 @@ pub trait Listener {
     fn tick(&mut self, asked: &Asked);
 }
 
-/// Nobody.
+/// Ignores all inputs.
 impl Listener for () {
     fn walk(&mut self, _: &Settings) {}
     fn frame(&mut self, _: &[Vec3]) {}

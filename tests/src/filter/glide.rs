@@ -12,37 +12,37 @@ use fastrand::Rng;
 
 /// Seconds of a tick.
 const TICK: f32 = 0.001;
-/// mm.
+/// Stand-off (mm).
 const STAND_OFF: f32 = 1.0;
-/// mm/s.
+/// Speed of the robot (mm/s).
 const ROBOT: f32 = 200.0;
-/// Instructions of a tick's queries.
+/// Instruction budget of a tick's queries.
 const INSTRUCTIONS: u32 = 200_000;
-/// mm.
+/// Radius of the capsules (mm).
 const RADIUS: f32 = 2.5;
 
-/// What a glide took, and what it left of the commands.
+/// The cost of a glide, and the parts of the commands that were admitted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Glided {
     /// Ticks after the first hundred.
     pub ticks: u32,
-    /// Instructions by the cost model: their sum and the most of a tick.
+    /// Sum of the instructions, by the cost model.
     pub instructions: u64,
-    /// The most of a tick.
+    /// Most instructions of a tick.
     pub most: u32,
-    /// The same of the first hundred ticks, in which the trackers start.
+    /// Most instructions of one of the first hundred ticks, in which the trackers start.
     pub most_at_start: u32,
-    /// Queries.
+    /// Number of queries.
     pub queries: u64,
-    /// Ticks in free space, and those whose command was admitted whole.
+    /// Ticks in free space.
     pub free: u32,
-    /// Of these, those whose command was admitted whole.
+    /// Ticks in free space whose command was admitted unchanged.
     pub whole: u32,
-    /// Ticks along one wall, the least and the sum of their share of the commanded speed along it.
+    /// Ticks along one wall.
     pub along: u32,
-    /// The least share of the commanded speed along the wall.
+    /// The least ratio of the admitted to the commanded speed along the wall.
     pub least_along: f32,
-    /// The sum of these shares.
+    /// The sum of these ratios.
     pub sum_along: f64,
     /// Ticks without a safe motion.
     pub unsafe_ticks: u32,
@@ -50,7 +50,7 @@ pub struct Glided {
     pub against: u32,
 }
 
-/// Glides about a mesh that moves, for so many ticks.
+/// Glides near a moving mesh, for this many ticks.
 ///
 /// # Panics
 /// If the tree cannot be built or a query fails.
@@ -59,7 +59,7 @@ pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64
     glide_told(mesh, motion, stretch, (ticks, seed), &mut ())
 }
 
-/// The same, with a listener.
+/// The same with a listener.
 ///
 /// # Panics
 /// If the tree cannot be built or a query fails.
@@ -118,7 +118,7 @@ pub fn glide_told(
         let surface = step.at(share);
         let uncertainty = Uncertainty::new(tissue);
         if tick % 700 == 0 {
-            // Into it, along it, away from it.
+            // Towards it, along it, away from it.
             outward = (joints[0] - middle).normalize();
             goal = match tick / 700 % 4 {
                 0 | 2 => middle,

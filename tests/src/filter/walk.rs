@@ -1,4 +1,4 @@
-//! Walks of an instrument whose commands are filtered, towards and along a moving surface.
+//! Walks of an instrument with filtered commands, towards and along a moving surface.
 
 use std::collections::VecDeque;
 use std::ops::AddAssign;
@@ -13,30 +13,30 @@ use super::{Asked, Course, Listener, Scene, Settings};
 use crate::deform::unit;
 use crate::oracle::least_distance;
 
-/// Times of a tick at which the truth is computed.
+/// Number of times in a tick at which the true separation is computed.
 const INSTANTS: u32 = 5;
 
-/// By how much (mm) a separation may be below the stand-off, besides the accuracy.
+/// Allowance (mm) for a separation below the stand-off, in addition to the accuracy.
 pub const SLACK: f64 = 0.02;
 
 type Follower<'t> = Tracker<'t, u16, MAX_STACK, 128>;
 
-/// A walk's numbers.
+/// The settings of a walk.
 #[derive(Clone, Copy, Debug)]
 pub struct Episode {
-    /// Ticks.
+    /// Number of ticks.
     pub ticks: u32,
-    /// s.
+    /// Period (s).
     pub period: f64,
-    /// mm.
+    /// Stand-off (mm).
     pub stand_off: f32,
-    /// Largest speeds of the robot and of the tissue (mm/s).
+    /// Largest speed of the robot (mm/s).
     pub robot: f32,
     /// Largest speed of the tissue (mm/s).
     pub tissue: f32,
-    /// Ticks between frames, at most; frames are late by as many at most, and lost now and then.
+    /// Most ticks between frames; frames are late by at most as many ticks, and sometimes lost.
     pub frames: u32,
-    /// mm.
+    /// Error of the registration (mm).
     pub registration: f32,
     /// Budget of a tick, in instructions of a Cortex-M7.
     pub instructions: u32,
@@ -47,7 +47,7 @@ pub struct Episode {
 }
 
 impl Episode {
-    /// Any.
+    /// Random settings.
     #[must_use]
     pub fn any(rng: &mut Rng) -> Self {
         Self {
@@ -65,34 +65,34 @@ impl Episode {
     }
 }
 
-/// What happened.
+/// The results of walks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
-    /// Ticks.
+    /// Number of ticks.
     pub ticks: u64,
-    /// Ticks with a separation below the stand-off and no word of it.
+    /// Ticks with a separation below the stand-off whose reason promised otherwise.
     pub violations: u64,
-    /// Ticks with a separation below the least that was certified.
+    /// Ticks with a separation below the certified one.
     pub uncertain: u64,
-    /// Ticks without a safe motion, and of these those with a separation below the stand-off.
+    /// Ticks without a safe motion.
     pub unsafe_ticks: u64,
-    /// Of these, those with a separation below the stand-off.
+    /// Ticks without a safe motion and with a separation below the stand-off.
     pub below: u64,
-    /// Ticks that began to say so, on a convex surface whose frames are new, with a robot that is faster than it.
+    /// Ticks in which the safe motion was lost, on a convex surface with new frames, with a robot faster than it.
     pub cries: u64,
     /// Ticks near the surface.
     pub near: u64,
-    /// Largest instructions of a tick, and their sum.
+    /// Most instructions of a tick.
     pub most_instructions: u32,
-    /// Their sum.
+    /// Sum of the instructions.
     pub instructions: u64,
-    /// Queries.
+    /// Number of queries.
     pub queries: u64,
-    /// Ticks in which the robot would have moved faster than it can.
+    /// Ticks in which the admitted motion was faster than the robot.
     pub too_fast: u64,
     /// Ticks by reason: commanded, nearest, shortened, stopped, retreating.
     pub reasons: [u64; 5],
-    /// Deepest shortfall (mm) of the stand-off where nothing was said.
+    /// Largest shortfall (mm) from the stand-off in ticks whose reason promised otherwise.
     pub worst: f64,
 }
 
@@ -126,7 +126,7 @@ struct Truth<'a> {
 }
 
 impl Truth<'_> {
-    /// The least separation of any tool at a share of the tick.
+    /// The least separation of any tool at a fraction of the tick.
     fn separation(&self, axes: &[[Vec3; 2]; 2], motion: &Motion, share: f64, by_arc: bool) -> f64 {
         let time = self.start + share * self.period;
         let rows: Vec<DVec3> = self.scene.rest.iter().map(|&p| self.course.at(p, time)).collect();
@@ -148,7 +148,7 @@ impl Truth<'_> {
     }
 }
 
-/// Walks.
+/// Runs a walk.
 ///
 /// # Panics
 /// If a query fails.
@@ -157,7 +157,7 @@ pub fn walk(scene: &Scene, episode: &Episode, seed: u64) -> Tally {
     walk_told(scene, episode, seed, &mut ())
 }
 
-/// The same, with a listener.
+/// The same with a listener.
 ///
 /// # Panics
 /// If a query fails.
@@ -184,7 +184,7 @@ pub fn walk_told(
     let mut trackers = [(); 2].map(|()| Follower::new(&tree).expect("deep enough"));
     let course = Course::any(scene, f64::from(episode.tissue), &mut rng);
     let radii = [0.5 + 2.0 * rng.f32(), 1.0];
-    // A tip of 10 mm on a shaft of 40 mm that turns away.
+    // A tip of 10 mm on a shaft of 40 mm at an angle.
     let outward = (scene.from - scene.middle).normalize();
     let lean = (outward + 0.6 * unit(&mut rng)).normalize();
     let from = scene.from + outward * (episode.stand_off + radii[0] + 2.0);
@@ -204,7 +204,7 @@ pub fn walk_told(
     let (mut goal, mut spin, mut until) = (Vec3::ZERO, Vec3::ZERO, 0);
     for tick in 0..episode.ticks {
         let start = f64::from(tick) * episode.period;
-        // Frames are captured at every tick, and shown late.
+        // Frames are captured at every tick, and delivered late.
         let now: Vec<Vec3> =
             scene.rest.iter().map(|&p| course.at(p, start).as_vec3() + registration).collect();
         frames.push_front((tick, now));
@@ -233,7 +233,7 @@ pub fn walk_told(
         let age = f64::from(tick - shown.0) * episode.period;
         let aged = (f64::from(episode.tissue) * age * (1.0 + 1e-6)) as f32;
         let uncertainty = Uncertainty::new(episode.tissue).error(aged).error(episode.registration);
-        // A goal beyond the surface, a way along it, or anything.
+        // A target beyond the surface, a path along it, or a random one.
         if tick >= until {
             until = tick + 1 + rng.u32(..60);
             goal = match rng.u32(..4) {
@@ -249,7 +249,7 @@ pub fn walk_told(
         let mut command = Motion::new(joints[0], goal.normalize_or_zero() * most, spin * most);
         let truth = Truth { scene, course, start, period: episode.period, radii };
         if episode.climbs {
-            // The worst of a few commands, by the separation that the admitted motion leads to.
+            // The worst of a few commands, by the separation that results from the admitted motion.
             let mut worst = f64::INFINITY;
             for other in 0..3 {
                 let tried = if other == 0 {
@@ -324,7 +324,7 @@ impl Tally {
         }
         let certified = f64::from(admitted.least_separation);
         let stand_off = f64::from(episode.stand_off);
-        // Where the separation is large, nothing can be wrong unless the tool came much nearer.
+        // If the separation is large, there is nothing to check unless the tool came much closer.
         let end = truth.separation(axes, motion, 1.0, by_arc);
         let moved = axes.iter().flatten().map(|&p| motion.apply(p).distance(p)).fold(0.0, f32::max);
         let moved = f64::from(moved) + f64::from(episode.tissue) * episode.period;

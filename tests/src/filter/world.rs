@@ -1,4 +1,4 @@
-//! Surfaces that move at their limit of speed.
+//! Surfaces that move at their speed limit.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 
 use crate::surfaces::{self, ball, cuboid, sheet};
 
-/// A surface, and a place near it.
+/// A surface, and a point near it.
 pub struct Scene {
     /// Its name.
     pub name: &'static str,
@@ -18,9 +18,9 @@ pub struct Scene {
     pub rest: Vec<Vec3>,
     /// Its triangles.
     pub triangles: Vec<[u32; 3]>,
-    /// Where tools start: outside.
+    /// Where tools start: outside the surface.
     pub from: Vec3,
-    /// Size (mm) of the region to walk in, around the middle.
+    /// Middle of the region to walk in.
     pub middle: Vec3,
     /// Whether the walls may close on the tool.
     pub closes: bool,
@@ -77,23 +77,23 @@ pub fn scenes() -> Vec<Scene> {
     ]
 }
 
-/// The way in which a surface moves, no point faster than its speed.
+/// A motion of a surface in which no point exceeds its speed limit.
 #[derive(Clone, Copy, Debug)]
 pub enum Course {
-    /// It rests.
+    /// It does not move.
     Rests,
-    /// It swings as one body.
+    /// It oscillates rigidly.
     Swings(Vec3, f64),
-    /// A wave runs over it.
+    /// A wave travels over it.
     Waves(Vec3, Vec3, f64),
-    /// Its walls move towards and from the plane x = 0.
+    /// Its walls move towards the plane x = 0 and back.
     Squeezes(f64),
-    /// It drifts as one body.
+    /// It drifts rigidly.
     Drifts(Vec3),
 }
 
 impl Course {
-    /// One of them, at a limit of speed (mm/s).
+    /// A random one of these, with a speed limit (mm/s).
     #[must_use]
     pub fn any(scene: &Scene, speed: f64, rng: &mut Rng) -> Self {
         let unit = crate::deform::unit(rng);
@@ -105,7 +105,7 @@ impl Course {
             0 => Self::Rests,
             1 | 2 => Self::Swings(unit * size, rate),
             3 => {
-                // Stretched by a tenth at most.
+                // The wave stretches by at most a tenth.
                 let wave = crate::deform::unit(rng) * (0.1 / size).min(0.3);
                 Self::Waves(unit * size, wave, rate)
             }
@@ -125,7 +125,7 @@ impl Course {
                 rest64 + size.as_dvec3() * ((phase + rate * time).sin() - phase.sin())
             }
             Self::Squeezes(speed) => {
-                // Points farther out move faster, the farthest with the whole speed.
+                // Speed grows with the distance from the plane; the farthest points have the full speed.
                 let rate = speed / 20.0 / 0.5;
                 rest64 * DVec3::new(1.0 - 0.5 * (rate * time).sin().abs(), 1.0, 1.0)
             }

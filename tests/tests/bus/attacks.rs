@@ -1,5 +1,4 @@
-//! Attacks on bus and sender by somebody without the key, and accidents of the same effect. Each of them once
-//! succeeded.
+//! Attacks on bus and sender by somebody without the key, and accidents with the same effect. Each once succeeded.
 
 // Requirement: B-03
 
@@ -46,8 +45,8 @@ fn a_replayed_begin_displaces_nothing() {
     assert_eq!(assembler.health().rejections, 0, "replays are no trouble of the line");
 }
 
-/// The receiver has published a frame of the sender's session that the sender has not sent: one of its earlier run, or
-/// one that somebody made up, 2^31 - 1 epochs ahead. The sender moves to the next session.
+/// The receiver has published a frame of the sender's session that the sender has not sent: one from its earlier run,
+/// or a forged one, 2^31 - 1 epochs ahead. The sender moves to the next session.
 #[test]
 fn a_sender_is_not_locked_out_of_its_session() {
     for ahead in [5000, i32::MAX as u32] {
@@ -70,7 +69,7 @@ fn a_sender_is_not_locked_out_of_its_session() {
     }
 }
 
-/// The later of two senders wins, and the earlier one is told to stop: frames of both never alternate.
+/// The later of two senders takes over, and the earlier one gets an error: frames of both never alternate.
 #[test]
 fn of_two_senders_one_is_told_to_stop() {
     let (mut assembler, _reader) = guarded(mac());
@@ -94,7 +93,7 @@ fn of_two_senders_one_is_told_to_stop() {
     assert_eq!(assembler.published().map(|id| id.session), Some(101));
 }
 
-/// Recorded statuses, of this run and of an earlier one, change nothing in the sender.
+/// Replayed statuses, of this run and of an earlier one, change nothing in the sender.
 #[test]
 fn recorded_statuses_are_not_believed() {
     let (mut assembler, _reader) = guarded(mac());
@@ -122,14 +121,14 @@ fn recorded_statuses_are_not_believed() {
         let published = deliver(&mut assembler, &source.pipe.sent(), 20 * n);
         assert!(published.is_some(), "the challenge is still the receiver's");
     }
-    // A receiver that really started anew is believed, once it answers the sender's hello.
+    // A receiver that really restarted is accepted, once it answers the sender's hello.
     let (mut anew, _reader) = guarded(keyed(78));
     source.set_clock(9999);
     source.meet(&mut anew, 9999);
     assert!(source.frame(&mut anew, 3, 10_000).is_some());
 }
 
-/// A delay of ten minutes, of the frames or of the statuses, shows in the transit time.
+/// A delay of ten minutes, of the frames or of the statuses, appears in the transit time.
 #[test]
 fn delay_shows_whoever_is_delayed() {
     for (frames_late, statuses_late) in [(0, 0), (600_000, 0), (0, 600_000)] {
@@ -137,7 +136,7 @@ fn delay_shows_whoever_is_delayed() {
         let mut source = Source::new(9, keyed);
         source.meet(&mut assembler, 0);
         let start = 1_000_000;
-        // The sender has last heard a status made at `heard`, and sends at `start`.
+        // The sender's last status was made at `heard`, and it sends at `start`.
         let heard = start - 30 - statuses_late;
         source.hear(&mut assembler, heard, 1).unwrap();
         source.set_clock(start);
@@ -153,7 +152,7 @@ fn delay_shows_whoever_is_delayed() {
             assembler.status(Millis(start + 2 + frames_late + 5), 1).published.unwrap().age_ms;
         assert_eq!(age, 12 + 5, "the age counts from the capture");
     }
-    // A sender that heard no status, and senders that echo a clock which this receiver has not reached.
+    // A sender that has received no status, and senders that echo a time that this receiver's clock has not reached.
     for echo in [None, Some(1017), Some(1 << 31)] {
         let (mut assembler, _reader) = guarded(mac());
         for packet in tagged(id(1), &surface(1), Freshness { age_ms: 3, echo }) {
@@ -194,7 +193,7 @@ fn the_worse_delay_counts_from_before_the_publication() {
     }
 }
 
-/// The source repeats its last frame, while its sender goes on sending.
+/// The source repeats its last frame, while its sender keeps sending.
 #[test]
 fn a_frozen_source_grows_old() {
     let (mut assembler, mut reader) = guarded(NoMac);
@@ -207,7 +206,7 @@ fn a_frozen_source_grows_old() {
         assert_eq!(assembler.health().source_age, Millis(age));
         assert_eq!(reader.latest(Millis(1000 * n + 7)).frame().unwrap().age, Millis(age + 7));
     }
-    // Older than a packet can say: the surface stays the last one whose age was known.
+    // The age exceeds what a packet can state: the surface stays the last one whose age was known.
     assert!(source.frame(&mut assembler, 5, 200_000).is_none());
     assert_eq!(assembler.health().source_age, Millis(4_000));
     assert_eq!(reader.latest(Millis(200_000)).frame().unwrap().age, Millis(195_000));
@@ -215,8 +214,8 @@ fn a_frozen_source_grows_old() {
     assert_eq!(assembler.health().source_age, Millis(0));
 }
 
-/// Two frames of one session and epoch, both with genuine tags, are mixed. The mixture is refused: the digest sums
-/// contributions that nobody without the key can compute.
+/// Two frames of one session and epoch, both with authentic tags, are mixed. The mixture is refused: the digest is the
+/// sum of contributions that nobody can compute without the key.
 #[test]
 fn two_frames_of_one_name_are_not_spliced() {
     let rows: [Vec<Vec3>; 2] = [surface(1), surface(500)];
@@ -233,7 +232,7 @@ fn two_frames_of_one_name_are_not_spliced() {
         assert!(matches!(outcome, Err(ReceiveError::Digest { .. })), "{outcome:?}");
         assert!(published(&mut reader).is_none());
     }
-    // The digest sums the contributions, which are in no packet.
+    // The digest is the sum of the contributions, which are not in any packet.
     let code = |i: usize| mac().code(Direction::ToReceiver, 1, &a[i][..a[i].len() - 10]);
     let sum = (0..last).fold(0_u32, |sum, i| sum.wrapping_add(code(i).contribution));
     assert_eq!(a[last][18..22], sum.to_le_bytes());
@@ -243,7 +242,7 @@ fn two_frames_of_one_name_are_not_spliced() {
     }
 }
 
-/// The same packet has another tag for another receiver, and another for the other direction.
+/// The same packet has different tags for different receivers, and for the other direction.
 #[test]
 fn keys_differ_by_receiver_and_direction() {
     let packet = [7; 40];
@@ -263,7 +262,7 @@ fn keys_differ_by_receiver_and_direction() {
     }
 }
 
-/// The fail-safe machine counts one rejection for a fault, however many packets are rejected with it.
+/// The fail-safe machine counts one rejection for a fault, however many packets are rejected because of it.
 #[test]
 fn a_frame_counts_once() {
     let (mut assembler, _reader) = bus();
@@ -271,20 +270,20 @@ fn a_frame_counts_once() {
     for packet in frame(1, true) {
         give(&mut assembler, &packet).unwrap();
     }
-    // The begin is lost, and no packet after it is expected.
+    // The begin is lost, so none of the following packets is expected.
     for packet in &frame(2, true)[1..] {
         give(&mut assembler, packet).unwrap_err();
     }
     assert_eq!(rejections(&assembler), 1);
     assert!(assembler.counters().rejected() > 5);
-    // The next frame's begin is damaged, and its packets come twice: damage has no name, the other packets have.
+    // The next frame's begin is damaged, and its packets arrive twice: damage has no frame, but the other packets have.
     let mut third = frame(3, true);
     third[0][30] ^= 1;
     for packet in third.iter().chain(&third) {
         give(&mut assembler, packet).unwrap_err();
     }
     assert_eq!(rejections(&assembler), 2);
-    // Packets of other meshes and of past frames do not count, however often they are repeated.
+    // Packets of other meshes and of past frames are not counted, however often they are repeated.
     let other = FrameId { mesh_id: MESH ^ 1, ..id(9) };
     let rows = surface(9);
     let foreign = collect(FrameEncoder::<_, 64>::new(other, Encoding::Float, &rows[..]).unwrap());
@@ -294,7 +293,7 @@ fn a_frame_counts_once() {
         }
     }
     assert_eq!(rejections(&assembler), 2);
-    // Damage is counted by cause alone, until it costs a frame.
+    // Damage is only counted by cause, until it costs a frame.
     for _ in 0..9 {
         give(&mut assembler, &[0; 64]).unwrap_err();
     }
@@ -313,7 +312,7 @@ fn a_frame_counts_once() {
         give(&mut assembler, packet).unwrap();
     }
     assert_eq!(rejections(&assembler), 0);
-    // Recordings of past frames, before any other fault.
+    // Replays of past frames, before any other fault.
     for packet in frame(5, true).iter().chain(&frame(1, true)) {
         give(&mut assembler, packet).unwrap_err();
     }
@@ -337,7 +336,7 @@ impl Mac for &Counting {
     }
 }
 
-/// Forgeries have a count of their own, and the receiver computes one code for each.
+/// Forgeries are counted separately, and the receiver computes one code for each.
 #[test]
 fn a_forgery_is_verified_once_and_counted_apart() {
     let counting = Box::leak(Box::new(Counting(mac(), Cell::new(0))));
@@ -365,7 +364,7 @@ fn a_forgery_is_verified_once_and_counted_apart() {
     assert_eq!(assembler.health().forgeries, 0);
 }
 
-/// The sender has died, and somebody repeats its packets or says hello in its name.
+/// The sender has stopped, and somebody repeats its packets or sends hellos in its name.
 #[test]
 fn repetitions_are_no_sign_of_life() {
     let (mut assembler, _reader) = bus();

@@ -64,7 +64,7 @@ fn everything_fits_a_can_message() {
     assert_eq!(packets, 4, "nine weights");
 }
 
-/// Flips each bit of the begin, of a packet of rows and of the commit, under a right checksum.
+/// Flips each bit of the begin, of a packet of rows and of the commit, and corrects the checksum.
 #[test]
 fn no_changed_bit_passes() {
     let packets = tagged(1, 1, &mac());
@@ -81,7 +81,7 @@ fn no_changed_bit_passes() {
             assert!(outcome.is_err(), "bit {bit} of packet {which}: {outcome:?}");
         }
         assert!(assembler.counters().of(Event::Forged) >= 60);
-        // The genuine packets are still taken.
+        // The authentic packets are still accepted.
         let mut last = None;
         for packet in &packets[which..] {
             last = give(&mut assembler, packet).unwrap();
@@ -91,7 +91,7 @@ fn no_changed_bit_passes() {
     }
 }
 
-/// Packets under another key, another challenge or another receiver's id, or without tags.
+/// Packets made with another key, another challenge or another receiver's id, or without tags.
 #[test]
 fn without_key_and_challenge_nothing_is_published() {
     let wrong_key = AesCmac::new(b"0123456789abcdeF", RECEIVER, CHALLENGE);
@@ -115,7 +115,7 @@ fn without_key_and_challenge_nothing_is_published() {
         }
         assert_eq!(assembler.health().rejections, 0);
         let before = assembler.counters().of(Event::Forged) as usize;
-        // Forgeries within a genuine frame are refused too.
+        // Forgeries within an authentic frame are refused as well.
         let genuine = tagged(1, 1, &mac());
         give(&mut assembler, &genuine[0]).unwrap();
         for packet in &packets {
@@ -128,12 +128,12 @@ fn without_key_and_challenge_nothing_is_published() {
         assert_eq!(published(&mut reader).unwrap().0, 1);
         assert_eq!(assembler.counters().of(Event::Forged) as usize, packets.len() + before);
     }
-    // A receiver without a key takes no tags.
+    // A receiver without a key accepts no tags.
     let (mut open, _) = bus();
     assert_eq!(give(&mut open, &tagged(1, 1, &mac())[0]), Err(ReceiveError::Forged { epoch: 1 }));
 }
 
-/// All packets that were ever sent are sent again: no frame comes back.
+/// All packets that were ever sent are sent again: no frame is published a second time.
 #[test]
 fn recordings_are_worth_nothing() {
     let (mut assembler, mut reader) = guarded();
@@ -155,7 +155,7 @@ fn recordings_are_worth_nothing() {
         assert_eq!(refused as usize, recorded.len());
         assert_eq!(assembler.published(), Some(name));
     }
-    // A receiver that started again has another challenge, and takes none of them.
+    // A receiver that has restarted has another challenge, and accepts none of them.
     let frames = Frames::<N>::new();
     let (writer, _reader) = frames.split().unwrap();
     let other = mac().with_challenge(CHALLENGE + 1);
@@ -206,7 +206,7 @@ fn heartbeats_and_statuses_are_under_the_tag() {
     assert!(!Packet::decode(&plain).unwrap().is_genuine(&mac(), 0));
 }
 
-/// Only who has the key gets an answer, under the tag and the receiver's challenge, once for each hello.
+/// Only a sender with the key gets an answer, with a tag for the receiver's challenge, once for each hello.
 #[test]
 fn hellos_and_answers_are_under_the_tag() {
     let (mut assembler, _) = guarded();
@@ -223,7 +223,7 @@ fn hellos_and_answers_are_under_the_tag() {
         assert_eq!(assembler.accept(hello, Millis(0)), Err(ReceiveError::Forged { epoch: 9 }));
         assert_eq!(assembler.status(Millis(0), 1).answer, None);
     }
-    // The sender knows no challenge yet, or an old one.
+    // The sender does not know the challenge yet, or knows an old one.
     for known in [0, CHALLENGE, CHALLENGE - 1] {
         let mac = mac().with_challenge(known);
         let hello = encode_hello(&id(9), nonce ^ known, &mac, &mut buffer).to_vec();
@@ -242,7 +242,7 @@ fn hellos_and_answers_are_under_the_tag() {
         assert!(!decoded.is_genuine(&NoMac, 0));
         assert_eq!(decoded.is_genuine(&self::mac(), 0), known == CHALLENGE);
     }
-    // A hello's tag is none of a frame's: kind and direction differ.
+    // A hello's tag is not valid for a frame: kind and direction differ.
     let hello = encode_hello(&id(9), nonce, &mac(), &mut buffer).to_vec();
     let mut heartbeat = hello;
     heartbeat[1] = 0x86;
@@ -250,7 +250,7 @@ fn hellos_and_answers_are_under_the_tag() {
     assert_eq!(assembler.health().rejections, 0);
 }
 
-/// The challenge is the one of the MAC in use, by value or by reference; without a MAC it is 0.
+/// The challenge is that of the MAC in use, by value or by reference; without a MAC it is 0.
 #[test]
 fn the_challenge_is_that_of_the_mac() {
     assert_eq!(mac().challenge(), CHALLENGE);
@@ -259,7 +259,7 @@ fn the_challenge_is_that_of_the_mac() {
 }
 
 proptest! {
-    /// Guessed tags, and any bytes.
+    /// Guessed tags on random bytes.
     #[test]
     fn guesses_are_forgeries(
         tags in prop::collection::vec(any::<[u8; TAG_BYTES]>(), 1..20),

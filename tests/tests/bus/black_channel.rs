@@ -1,4 +1,4 @@
-//! Checks `docs/black-channel.md`: the tests that it names exist, and the arithmetic that it shows is right.
+//! Checks `docs/black-channel.md`: the tests that it names exist, and its arithmetic is correct.
 
 // Requirement: B-06
 
@@ -16,7 +16,7 @@ const FRAMES_A_SECOND: f64 = 40.0;
 const HEARTBEATS_A_SECOND: f64 = 10.0;
 const FORGERIES_A_SECOND: f64 = 10_000.0;
 const HOUR: f64 = 3_600.0;
-/// 1 % of the allowance of a function of SIL 3.
+/// 1 % of the failure rate allowed for a SIL 3 function (1/h).
 const ALLOWANCE_AN_HOUR: f64 = 1e-9;
 
 /// A number between 1,000 and 999,999, with a comma.
@@ -32,7 +32,7 @@ fn arithmetic() -> String {
     let packets = f64::from(VERTICES.div_ceil(ROWS[0]) + 1) * FRAMES_A_SECOND * HOUR;
     let heartbeats = HEARTBEATS_A_SECOND * HOUR;
     let forgeries = FORGERIES_A_SECOND * HOUR;
-    // At this rate the receiver forgets as many as come; and no watch is set higher than the most that it remembers.
+    // At this rate the receiver forgets as many forgeries as arrive; no limit may exceed the number that it remembers.
     let slow = f64::from(BusHealth::FORGERIES_A_SECOND) * HOUR;
     let most = f64::from(BusHealth::MOST_FORGERIES);
     let mut text = String::new();
@@ -85,7 +85,7 @@ fn the_rates_compare_with_the_allowance_as_the_page_says() {
     assert!(is_below("with a key, the most that a watch lets by at once: the same"));
 }
 
-/// The change of the checksum's remainder by each single flipped bit of a packet.
+/// The syndrome of each single flipped bit of a packet: how it changes the checksum's remainder.
 fn syndromes(bytes: usize) -> Vec<u32> {
     let mut packet = vec![0; bytes - 4];
     let undamaged = CRC.checksum(&packet);
@@ -98,7 +98,7 @@ fn syndromes(bytes: usize) -> Vec<u32> {
     syndromes
 }
 
-/// Damage is missed where the syndromes of its bits cancel. No two or three cancel in a packet of 1,024 bytes, and no
+/// Damage is undetected if the syndromes of its bits cancel. No two or three cancel in a packet of 1,024 bytes, and no
 /// four in one of 375.
 #[test]
 fn the_checksum_finds_as_many_flips_as_the_page_says() {

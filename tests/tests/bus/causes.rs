@@ -1,4 +1,4 @@
-//! Rejections: each names its cause, is counted once and leaves no trace.
+//! Rejections: each states its cause, is counted once and has no other effect.
 
 // Requirement: B-02
 
@@ -10,14 +10,14 @@ use dibs_nostd::wire::{
 use dibs_nostd::{Millis, Progress, ReceiveError, VertexTable};
 use dibs_tests::bus::*;
 
-/// A packet with some bytes changed, and a right checksum.
+/// A packet with some bytes changed, and a correct checksum.
 fn edit(packet: &[u8], at: usize, value: &[u8]) -> Vec<u8> {
     let mut packet = packet.to_vec();
     packet[at..at + value.len()].copy_from_slice(value);
     reseal(packet)
 }
 
-/// Bytes of a body, all zero but one.
+/// Bytes of a body, all zero except one.
 fn with(bytes: usize, at: usize, value: u8) -> Vec<u8> {
     let mut body = vec![0; bytes];
     body[at] = value;
@@ -35,7 +35,7 @@ fn rejection_of(fault: &[u8]) -> ReceiveError {
     assert_eq!(assembler.counters().of(rejection.event()), 1);
     assert!(rejection.event().is_rejection());
     assert!(!rejection.to_string().is_empty());
-    // The fault leaves no trace: the frame goes on and is published.
+    // The fault has no effect: the frame continues and is published.
     for packet in &good[1..] {
         give(&mut assembler, packet).unwrap();
     }
@@ -61,7 +61,7 @@ fn what_is_no_packet() {
         assert_eq!(rejection_of(&fault), packet(PacketError::Version { version }));
     }
     for (fault, expected) in [
-        // A kind of later versions, and others.
+        // Kinds of later versions, and unknown kinds.
         (edit(vertices, 1, &[11]), PacketError::Kind { kind: 11 }),
         (edit(vertices, 1, &[12]), PacketError::Kind { kind: 12 }),
         (edit(vertices, 1, &[0]), PacketError::Kind { kind: 0 }),
@@ -161,7 +161,7 @@ fn what_is_a_packet_and_not_right() {
         let fault = edit(vertices, 15, &u32::to_le_bytes(first)[..3]);
         rejected(&fault, ReceiveError::OutOfRange { first, count: 3 });
     }
-    // Packet 3 has brought rows 6 to 8, so packet 2 can only have rows 3 to 5.
+    // Packet 3 contains rows 6 to 8, so packet 2 can only contain rows 3 to 5.
     for first in [0, 2, 4, 5, 6, 7, 9, 20] {
         let fault = edit(&good[2], 15, &u32::to_le_bytes(first)[..3]);
         rejected(&fault, ReceiveError::Order { sequence: 2 });
@@ -179,7 +179,7 @@ fn what_is_a_packet_and_not_right() {
     rejected(&raw_begin(1, 2, 1, N as u32, 1), ReceiveError::Base { epoch: 1 });
 }
 
-/// A quantisation box may reach beyond the receiver's limit on coordinates; a vertex may not.
+/// A quantisation box may exceed the receiver's limit on coordinates; a vertex may not.
 #[test]
 fn a_box_may_be_larger_than_the_surface() {
     let coarse = QuantisedBox::new(Vec3::splat(-60.0), Vec3::splat(0.1)).unwrap();
@@ -201,7 +201,7 @@ fn a_box_may_be_larger_than_the_surface() {
 fn packets_beyond_the_commit_do_not_belong() {
     let good = frame(1, false);
     let (commit, others) = good.split_last().unwrap();
-    // The commit comes first and says that there are fewer packets.
+    // The commit arrives first and claims that there are fewer packets.
     let (mut assembler, mut reader) = bus();
     give(&mut assembler, &good[0]).unwrap();
     give(&mut assembler, &edit(commit, 12, &3_u16.to_le_bytes())).unwrap();
@@ -209,7 +209,7 @@ fn packets_beyond_the_commit_do_not_belong() {
         let outcome = give(&mut assembler, packet);
         match sequence {
             1 => assert_eq!(outcome, Ok(None)),
-            // The frame would be complete, but the commit's digest is the one of all packets.
+            // The frame would be complete, but the commit's digest is that of all packets.
             2 => assert!(matches!(outcome, Err(ReceiveError::Digest { .. }))),
             _ => {
                 let cause = Event::Digest;
@@ -236,7 +236,7 @@ fn packets_beyond_the_commit_do_not_belong() {
     assert!(published(&mut reader).is_none());
 }
 
-/// A frame that ends early, with a right digest.
+/// A frame that ends early, with a correct digest.
 #[test]
 fn a_frame_without_its_last_rows_is_not_published() {
     let good = frame(1, false);
@@ -257,7 +257,7 @@ fn a_frame_without_its_last_rows_is_not_published() {
     assert_eq!(refused.to_string(), "frame 1 was refused before: row count");
 }
 
-/// Packets of a frame whose begin was refused name its cause.
+/// Packets of a frame whose begin was refused report the same cause.
 #[test]
 fn the_cause_of_a_refused_begin_stays() {
     let good = frame(1, false);
@@ -279,7 +279,7 @@ fn the_cause_of_a_refused_begin_stays() {
     }
 }
 
-/// Every second packet of a frame is lost: more gaps than the receiver can note.
+/// Every second packet of a frame is lost: more gaps than the receiver can record.
 #[test]
 fn gaps_are_bounded() {
     let positions: Vec<Vec3> = (0..200).map(|i| Vec3::splat(i as f32 * 0.01)).collect();
@@ -298,7 +298,7 @@ fn gaps_are_bounded() {
     let gaps = packets.len() / 2 - 1 - refused.len();
     assert!((5..=20).contains(&gaps), "{gaps} gaps are noted");
     assert_eq!(assembler.counters().of(Event::Gaps) as usize, refused.len());
-    // All packets come again, in order, until none is missing.
+    // All packets are sent again, in order, until none is missing.
     let published = packets.iter().find_map(|packet| give(&mut assembler, packet).unwrap());
     assert_eq!(published, Some(1));
     let frame = reader.read().expect("complete");
@@ -332,7 +332,7 @@ fn every_event_has_its_place_and_name() {
     assert_ne!(Content::Whole, Content::Modal);
 }
 
-/// Packets of a frame that a later one displaced come late, and say so.
+/// Packets of a frame that a later one displaced arrive late, and report that cause.
 #[test]
 fn the_late_packets_of_an_abandoned_frame_name_the_cause() {
     let (first, second) = (frame(1, false), frame(2, false));

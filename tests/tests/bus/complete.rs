@@ -1,4 +1,4 @@
-//! The bus: packets, COBS, and the assembler, which publishes only complete and right frames.
+//! The bus: packets, COBS, and the assembler, which only publishes complete and correct frames.
 
 // Requirement: B-01
 
@@ -109,8 +109,7 @@ fn a_frame_without_any_one_of_its_packets_is_not_published() {
     }
 }
 
-/// A sender starts again within a frame, and numbers its frames from the same epoch: a mixture of both frames is not
-/// published.
+/// A sender restarts within a frame, and numbers from the same epoch: a mixture of both frames is not published.
 #[test]
 fn two_frames_of_one_epoch_are_never_mixed() {
     let (old, new) = (surface(1), surface(500));
@@ -128,7 +127,7 @@ fn two_frames_of_one_epoch_are_never_mixed() {
             let rejection = give(&mut assembler, commit).unwrap_err();
             assert!(matches!(rejection, ReceiveError::Digest { .. }), "{rejection}");
             assert!(published(&mut reader).is_none());
-            // The next whole frame is taken, under the same number.
+            // The next whole frame with the same number is accepted.
             for packet in &new {
                 give(&mut assembler, packet).unwrap();
             }
@@ -179,7 +178,7 @@ fn a_refused_surface_is_not_published_and_the_last_one_stays() {
             assert_eq!(give(&mut assembler, packet), Ok(None));
         }
         if refuse {
-            // All rows have come: the check need not wait for the commit.
+            // All rows have arrived: the check need not wait for the commit.
             let rejection = give(&mut assembler, last).unwrap_err();
             assert_eq!(rejection, ReceiveError::Stretch(StretchError::NoMetric));
             assert_eq!(assembler.advance(1), Ok(Advance::Idle), "the frame is gone");
@@ -231,7 +230,7 @@ impl Gate for Slow {
     }
 }
 
-/// The check runs between the packets, and a complete frame is not given up for a newer one.
+/// The check runs between the packets, and a complete frame is not abandoned for a newer one.
 #[test]
 fn a_frame_is_checked_in_slices_and_then_published() {
     let [began, moved, done] = [(); 3].map(|()| Rc::new(Cell::new(0)));
@@ -277,7 +276,7 @@ fn a_frame_that_meets_a_read_is_held_and_published_later() {
     drop(guard);
     assert_eq!(assembler.advance(9), Ok(Advance::Published { epoch: 2 }));
     assert_eq!(published(&mut reader).unwrap().0, 2);
-    // The next frame's begin publishes a held frame, too.
+    // The next frame's begin publishes a held frame as well.
     let guard = reader.read().unwrap();
     for packet in frame(3, false) {
         assembler.accept(&packet, Millis(0)).unwrap();

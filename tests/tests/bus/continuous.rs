@@ -1,4 +1,4 @@
-//! The surface between the frames that a bus brings, and beyond the last.
+//! The surface between received frames, and its extrapolation beyond the last one.
 
 // Requirement: F-05
 
@@ -18,7 +18,7 @@ use fastrand::Rng;
 /// Vertices of the heart of 320 triangles.
 const ROWS: usize = 162;
 
-/// Three buffers, and so a surface that moves.
+/// Three buffers, which extrapolation needs.
 type Continuous = Frames<ROWS, 3>;
 type Reader = FrameReader<'static>;
 type Bus<G> = Assembler<'static, G>;
@@ -30,7 +30,7 @@ fn heart() -> (Mesh, Vec<Vec<Vec3>>, BuiltTree) {
     (mesh, frames, built)
 }
 
-/// Sends a frame, whole or on the base of the one that was published last; true if it was published.
+/// Sends a frame, either whole or based on the published one; true if it was published.
 fn send<G: Gate>(
     bus: &mut Bus<G>,
     mesh_id: u32,
@@ -61,12 +61,11 @@ fn send<G: Gate>(
     bus.published() == Some(id)
 }
 
-/// A surface's positions.
 fn positions(surface: &impl VertexTable) -> Vec<Vec3> {
     (0..ROWS as u32).map(|row| surface.position(row).expect("a row")).collect()
 }
 
-/// The largest distance of a row from its place on the way between two frames and beyond.
+/// The largest distance of a row from its true position between two frames or beyond.
 fn off(rows: &[Vec3], before: &[Vec3], after: &[Vec3], share: f32) -> f64 {
     let of = |((row, a), b): ((&Vec3, &Vec3), &Vec3)| {
         a.as_dvec3().lerp(b.as_dvec3(), f64::from(share)).distance(row.as_dvec3())
@@ -83,9 +82,9 @@ fn truth(mesh: &Mesh, built: &BuiltTree, tree: &Tree<'_, u16>, rows: &[Vec3]) ->
     stretch::largest(mesh, &moved, tree.paths())
 }
 
-/// Frames of a beating, drifting heart, some of them partial, refused or skipped. At every tick both surfaces are where
-/// two frames put them, no triangle is stretched more than they state, and the tracker's answer is that of a whole
-/// query.
+/// Frames of a beating, drifting heart, some of them partial, refused or skipped. At every tick the interpolated and
+/// the extrapolated surface have the positions that follow from two frames, no triangle is stretched more than they
+/// state, and the tracker's answer equals that of a whole query.
 #[test]
 fn the_surface_between_frames_is_where_the_frames_put_it() {
     let mut rng = Rng::with_seed(7);
@@ -103,7 +102,7 @@ fn the_surface_between_frames_is_where_the_frames_put_it() {
     // The published frames, with epoch and time.
     let mut known = Vec::<(u32, u32, Vec<Vec3>)>::new();
     let mut now = 5_u32.wrapping_neg();
-    // The errors of the extrapolation to the last frame.
+    // The residuals: errors of the extrapolation when the last frames arrived.
     let mut errors = [0.0; 2];
     let mut told = 0;
     let (mut moving, mut held, mut refused, mut tightest, mut kept) = (0, 0, 0, 0.0_f64, 0);
@@ -172,11 +171,11 @@ fn the_surface_between_frames_is_where_the_frames_put_it() {
             if let [.., (_, t0, a), (_, t1, b)] = known.as_slice() {
                 let share = now.wrapping_sub(*t1) as f32 / t1.wrapping_sub(*t0) as f32;
                 let share = share.min(2.0);
-                // After as long a time again as this step took.
+                // After another interval of the same length.
                 let growth = f64::from(2.0 * share / (1.0 + share)).max(1.0);
                 exact[1] = off(&rows, a, b, 1.0 + share) * growth;
             }
-            // Of a surface that is held nothing is said.
+            // A held surface states no residual.
             if let Some(shown) = shown {
                 let larger = exact[0].max(exact[1]);
                 assert!((f64::from(shown) - larger).abs() < 1e-3, "{epoch}: {shown} for {larger}");
@@ -195,7 +194,7 @@ fn the_surface_between_frames_is_where_the_frames_put_it() {
     assert!(tightest < 0.4, "the stated stretch is {tightest} above the true one");
 }
 
-/// An extrapolation that would stretch the surface beyond the tree's limit is none, and the next one is measured anew.
+/// An extrapolation that would exceed the tree's stretch limit is not used, and the next one is measured again.
 #[test]
 fn a_surface_is_held_where_its_extrapolation_would_tear() {
     let mut rng = Rng::with_seed(8);
@@ -208,7 +207,8 @@ fn a_surface_is_held_where_its_extrapolation_would_tear() {
         Assembler::continuous(writer, tree, SurfaceLimits::reach_mm(1e3)).expect("a metric");
     let rest = &motion[0];
     let longer = |by: f32| -> Vec<Vec3> { rest.iter().map(|row| *row * (1.0 + by)).collect() };
-    // The first step shows no error yet; of the others, that to 1.3 goes on beyond the limit of 1.5, and the last.
+    // The first step has no known residual; among the others, the one to 1.3 would continue beyond the limit of 1.5,
+    // and so would the last.
     let steps =
         [(0.0, false), (0.05, false), (0.1, true), (0.3, false), (0.25, true), (0.4, false)];
     for (epoch, (by, is_moving)) in (1..).zip(steps) {
@@ -217,12 +217,12 @@ fn a_surface_is_held_where_its_extrapolation_would_tear() {
         let surface = frame.extrapolated();
         assert_eq!(surface.t(), if is_moving { 1.5 } else { 1.0 }, "{epoch}");
         assert!(surface.stretch().expect("measured").sigma() <= 1.5001);
-        // It is between the frames at least.
+        // Interpolation between the frames is still possible.
         assert_eq!(frame.interpolated().t(), if epoch == 1 { 1.0 } else { 0.5 });
     }
 }
 
-/// Without a measurement of the motion or of the extrapolation, or with two frames of one time, the surface is held.
+/// If motion or extrapolation was not measured, or two frames have one time, the surface is held at the last frame.
 #[test]
 fn a_surface_of_unknown_motion_is_held() {
     let mut rng = Rng::with_seed(9);
@@ -233,7 +233,7 @@ fn a_surface_of_unknown_motion_is_held() {
         let surfaces = [frame.interpolated(), frame.extrapolated()];
         surfaces.map(|surface| surface.t() == 1.0 && surface.residual().is_none())
     };
-    // By hand.
+    // Frames written directly.
     let frames: &'static Continuous = Box::leak(Box::new(Frames::new()));
     let (mut writer, mut reader) = frames.split().expect("once");
     for epoch in 0..4 {
@@ -251,7 +251,7 @@ fn a_surface_of_unknown_motion_is_held() {
         assert!(send(&mut bus, tree.mesh_id(), epoch, rows, None, 20 * epoch, &mut rng));
         assert_eq!(is_held(&mut reader, 20 * epoch + 5), [true; 2]);
     }
-    // With one that measures each frame, but not the way from it, and a frame of the same time.
+    // With a gate that measures each frame but not the motion from it, and a frame of the same time.
     let frames: &'static Continuous = Box::leak(Box::new(Frames::new()));
     let (writer, mut reader) = frames.split().expect("once");
     let leaked: &'static Tree<'static, u16> =
@@ -266,7 +266,7 @@ fn a_surface_of_unknown_motion_is_held() {
     }
 }
 
-/// A frame that was read without the time is as it was received.
+/// A frame that is read without a time is not extrapolated.
 #[test]
 fn without_the_time_nothing_moves_on() {
     let mut rng = Rng::with_seed(10);
@@ -287,12 +287,12 @@ fn without_the_time_nothing_moves_on() {
     assert_eq!(surface.motion(), frame.motion());
     assert_eq!(frame.interpolated().t(), 0.0);
     drop(frame);
-    // Two frames of one time have no velocity.
+    // Two frames of the same time define no velocity.
     assert!(send(&mut bus, tree.mesh_id(), 4, &motion[4], None, 60, &mut rng));
     let frame = reader.latest(Millis(70)).of_any_age().expect("published");
     assert_eq!((frame.extrapolated().t(), frame.interpolated().t()), (1.0, 1.0));
     drop(frame);
-    // Nor have two in the wrong order, by a clock's jitter.
+    // Nor do two in the wrong order, because of a clock's jitter.
     assert!(send(&mut bus, tree.mesh_id(), 5, &motion[5], None, 55, &mut rng));
     let frame = reader.latest(Millis(70)).of_any_age().expect("published");
     assert_eq!((frame.extrapolated().t(), frame.interpolated().t()), (1.0, 1.0));

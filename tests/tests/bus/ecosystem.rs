@@ -43,7 +43,7 @@ fn line(built: &BuiltTree, positions: &[Vec3]) -> Vec<u8> {
     bytes
 }
 
-/// A line that gives and takes so many bytes a call, and then fails.
+/// A line that transfers this many bytes a call, and then fails.
 struct Line<'b> {
     bytes: &'b [u8],
     taken: Vec<u8>,
@@ -92,7 +92,7 @@ fn work(bus: &mut Bus<'_, '_, u16>) -> bool {
     }
 }
 
-/// The answer once the surface is trusted: the first second is safe.
+/// The answer once the surface is trusted: the state is safe in the first second.
 fn after_a_while<P: Copy + Into<Vec3>>(built: &BuiltTree, frame: &[P], tool: &Capsule) -> Answer {
     let (mut bus, mut guard) = start(built);
     for now in 1_000.. {
@@ -202,7 +202,7 @@ fn settings_come_back_as_they_were() {
     for limits in [limits, limits.speed(0.2).shrinkage(0.1), limits.recovery_mm(f32::INFINITY)] {
         assert_eq!(from_str::<SurfaceLimits>(&to_string(&limits).unwrap()).unwrap(), limits);
     }
-    // No limit in the place of one that refuses all would be the wrong one.
+    // A limit that refuses everything must not become no limit.
     assert!(to_string(&limits.speed(f32::NAN)).is_err());
     assert!(to_string(&limits.speed(f32::NEG_INFINITY)).is_err());
     let misspelt =

@@ -1,4 +1,4 @@
-//! The receiver on surfaces so small that every case can be tried.
+//! The receiver on surfaces so small that every case can be tested.
 
 // Requirement: B-01
 
@@ -17,16 +17,16 @@ fn receiver<const R: usize>(frames: &Frames<R>) -> (Assembler<'_, NoGate>, Frame
     (Assembler::new(writer, NoGate, MESH, 1e3), reader)
 }
 
-/// A model of the specification for a line without damage: it keeps the set of packets that have come.
+/// A model of the specification for a line without damage: it stores which packets have arrived.
 #[derive(Default)]
 struct Model {
     published: Option<u32>,
-    /// Epoch, the packets that have come, and the time of the last one taken.
+    /// Epoch, the packets that have arrived, and the time of the last accepted one.
     frame: Option<(u32, [bool; 5], u32)>,
 }
 
 impl Model {
-    /// Takes packet `which` of a frame: 0 is the begin, 1 to 3 have rows, 4 is the commit. Returns the published epoch.
+    /// Receives packet `which` of a frame: 0 is the begin, 1 to 3 rows, 4 the commit. Returns the published epoch.
     fn take(&mut self, epoch: u32, which: usize, now: u32) -> Option<u32> {
         if self.published.is_some_and(|published| epoch <= published) {
             return None;
@@ -53,7 +53,7 @@ impl Model {
 }
 
 /// Sends every sequence of six packets of two frames, then the later frame. The receiver publishes exactly the model's
-/// frames, and only whole ones.
+/// frames, and only complete ones.
 #[test]
 fn every_sequence_of_packets_of_two_frames() {
     let positions = |epoch: u32| [Vec3::splat(epoch as f32); ROWS];
@@ -69,9 +69,9 @@ fn every_sequence_of_packets_of_two_frames() {
         let (mut assembler, mut reader) = receiver(&buffers);
         let mut model = Model::default();
         let digits = (0..6).map(|place| case / 10_u32.pow(place) % 10);
-        // The later frame follows: first without its begin, then whole.
+        // The later frame follows: first without its begin, then complete.
         for (place, letter) in (0..).zip(digits.chain([6, 7, 8, 9, 5, 6, 7, 8, 9])) {
-            // After three packets that it does not take, an unfinished frame may be displaced (100 ms).
+            // After three packets that are not accepted, an unfinished frame may be displaced (100 ms).
             let now = 40 * place;
             let (epoch, which) = (letter / 5 + 1, (letter % 5) as usize);
             let packet = &frames[letter as usize / 5][which];
@@ -97,8 +97,8 @@ fn every_sequence_of_packets_of_two_frames() {
     println!("{cases} sequences, {publications} publications");
 }
 
-/// A sender makes up first rows, counts and sequence numbers, with right checksums and digests. Every published row was
-/// sent exactly once.
+/// A sender invents first rows, counts and sequence numbers, with correct checksums and digests. Every published row
+/// was sent exactly once.
 #[test]
 fn no_row_that_was_not_sent_is_published() {
     const SMALL: usize = 3;

@@ -1,4 +1,4 @@
-//! The guard: its velocities, its limits, and what it does before the first frame and after the last.
+//! The guard: its velocities, its limits, and its behaviour before the first frame and after the last.
 
 // Requirements: C-01, C-07
 
@@ -50,7 +50,7 @@ impl<'t> World<'t> {
         FLOW * ((self.now - 1_000) as f32 * 1e-3)
     }
 
-    /// One frame, at once.
+    /// Sends one frame, all packets at once.
     fn frame(&mut self) {
         let rows: Vec<Vec3> = self.rest.iter().map(|&row| row + self.shift()).collect();
         let epoch = self.now;
@@ -68,7 +68,7 @@ impl<'t> World<'t> {
         while self.ends.0.work(100).expect("admitted") == Advance::Pending {}
     }
 
-    /// A tick with a tool whose centre is so far from the rest shape's.
+    /// A tick with a tool whose centre is at this offset from the rest shape's.
     fn tick(&mut self, at: Vec3) -> Answer {
         let tool = Capsule::new(at, at + Vec3::new(30.0, 4.0, 10.0), 2.0).expect("valid");
         self.now += 1;
@@ -89,7 +89,7 @@ fn the_velocity_is_that_of_the_tool_relative_to_the_tissue() {
             world.is_serial = tick % 2 == 0;
             world.frame();
         }
-        // With the tissue, and then at rest beside it.
+        // First moving with the tissue, then at rest beside it.
         let is_along = tick < 1_200;
         let next = world.now + 1 - 1_000;
         let at = if is_along { start + FLOW * (next as f32 * 1e-3) } else { start + FLOW * 1.2 };
@@ -106,7 +106,7 @@ fn the_velocity_is_that_of_the_tool_relative_to_the_tissue() {
     assert!(along > 1_000 && still > 700);
 }
 
-/// Ticks that were left out make no tool faster than it is.
+/// Skipped ticks do not increase the tool's velocity.
 #[test]
 fn a_missed_tick_does_not_damp_more() {
     let heart = generate::heart(320).expect("a valid size").mesh;
@@ -119,7 +119,7 @@ fn a_missed_tick_does_not_damp_more() {
     world.now += 9; // ten ms in all
     let velocity = world.tick(at + Vec3::X * 1.1).velocity;
     assert!((100.0..=112.0).contains(&velocity.x), "{velocity}");
-    // Without a pose nothing is known, and the next tick starts anew.
+    // Without a pose nothing is known, and the velocity is measured anew at the next tick.
     world.frame();
     let blind = world.ends.1.without_pose(Millis(world.now));
     assert!(blind.velocity.is_nan() && blind.closest == Err(Unavailable::NoPose));
@@ -163,7 +163,7 @@ fn the_state_is_safe_until_acknowledged_and_after_the_age() {
     assert!(world.ends.0.status(Millis(world.now), &mut status).is_none(), "and then none");
 }
 
-/// A frame without an echo may have been on its way for any time.
+/// The transit time of a frame without an echo is unbounded.
 #[test]
 fn a_line_without_statuses_is_a_written_choice() {
     let heart = generate::heart(320).expect("a valid size").mesh;
@@ -219,7 +219,7 @@ fn a_start_names_what_is_wrong() {
     assert!(matches!(twice(), Some(Error::Split(_))));
 }
 
-/// A command and a stand-off are all that is stated: speed, age and transit of the tissue are the guard's.
+/// Only a command and a stand-off are given: speed, age and transit time of the tissue are the guard's.
 #[test]
 fn an_admitted_motion_keeps_off_the_tissue_as_it_is() {
     let heart = generate::heart(320).expect("a valid size").mesh;
@@ -233,7 +233,7 @@ fn an_admitted_motion_keeps_off_the_tissue_as_it_is() {
     let (mut at, mut end) = (Vec3::new(95.0, 3.0, 20.0), Vec3::new(125.0, 7.0, 30.0));
     let (mut reasons, mut refused, mut least) = ([0; 3], 0, f32::INFINITY);
     for tick in 0..3_000 {
-        // The frames stop at last.
+        // At the end the frames stop.
         if tick % PERIOD == 0 && tick < 2_500 {
             world.frame();
         }
@@ -242,7 +242,7 @@ fn an_admitted_motion_keeps_off_the_tissue_as_it_is() {
         let push = Motion::new(at, towards, Vec3::new(0.0, 2e-4, 0.0));
         let tool = Capsule::new(at, end, 2.0).expect("valid");
         if tick == 2_000 {
-            // A command that is none is an error, and no motion.
+            // An invalid command is an error without a motion.
             let none = Motion::translation(Vec3::NAN);
             let (_, admitted) = world.ends.1.admit(&filter, &tool, &none, Millis(world.now));
             assert_eq!(admitted, Err(FilterError::Command));
@@ -276,17 +276,17 @@ fn an_admitted_motion_keeps_off_the_tissue_as_it_is() {
             Err(error) => panic!("{error}"),
         }
     }
-    // Commanded, without a safe motion, and shortened or turned aside.
+    // Reasons that occurred: commanded, no safe motion, and shortened or nearest.
     assert!(reasons[0] > 100 && reasons[2] > 500 && least < 4.0, "{reasons:?} {least}");
     assert!(refused > 200, "{refused}");
-    // Without a frame there is nothing to trust.
+    // Without a frame no surface is trusted.
     let mut world = World::new(&built, &heart.positions, limits);
     world.now += 1;
     let tool = Capsule::new(at, end, 2.0).expect("valid");
     let push = Motion::translation(Vec3::X);
     let (_, admitted) = world.ends.1.admit(&filter, &tool, &push, Millis(1_001));
     assert_eq!(admitted, Err(FilterError::Untrusted(Unavailable::NoSurface)));
-    // Nor at the first tick of all, whose frame came before it.
+    // Nor at the very first tick, although a frame arrived before it.
     let mut world = World::new(&built, &heart.positions, limits);
     world.frame();
     world.now += 1;

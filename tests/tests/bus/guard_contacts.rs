@@ -1,4 +1,4 @@
-//! A guard's contacts: those of a tracker on the same surface, in the guard's one budget.
+//! A guard's contacts: those of a tracker on the same surface, within the guard's one budget.
 
 // Requirement: C-08
 
@@ -18,10 +18,10 @@ const ROWS: usize = 642;
 /// Ticks between two frames.
 const PERIOD: u32 = 33;
 
-/// How far contacts are looked for, in mm.
+/// Margin of the contacts, in mm.
 const MARGIN: f32 = 6.0;
 
-/// Places for opened nodes of the pair's search, and of the contacts'.
+/// Room for opened nodes in the search for the pair, and in that for the contacts.
 const OPENED: usize = 128;
 const RANGE: usize = 128;
 
@@ -31,10 +31,9 @@ const BESIDES: u32 = 1 + Budget::TRIANGLE;
 type List = Contacts<32, 512>;
 type Ends = (Bus<'static, 'static, u16>, Guard<'static, 'static, u16, 64, OPENED, Vertices, RANGE>);
 
-/// Of a query's answer (mm), at most.
+/// Largest rounding (mm) of a query's answer.
 const ROUNDING: f32 = 1e-3;
 
-/// A sum, rounded up.
 fn sum_up(a: f32, b: f32) -> f32 {
     let sum = f64::from(a) + f64::from(b);
     let nearest = sum as f32;
@@ -44,7 +43,7 @@ fn sum_up(a: f32, b: f32) -> f32 {
 /// A point inside the generated heart.
 const MIDDLE: Vec3 = Vec3::new(12.0, -4.0, 38.0);
 
-/// What the instrument does at a tick: it dips into the surface, and turns on the way.
+/// The instrument at a tick: it dips into the surface, and rotates.
 fn tool(tick: u32) -> Capsule {
     let time = tick as f32 * 1e-3;
     let out = Vec3::new((0.7 * time).cos(), (0.7 * time).sin(), 0.2 * (1.3 * time).sin());
@@ -53,7 +52,7 @@ fn tool(tick: u32) -> Capsule {
     Capsule::new(at, at + along * 60.0, 2.5).expect("finite")
 }
 
-/// The numbers of a contact but for its velocity, to the bit.
+/// The numbers of a contact except its velocity, to the bit.
 fn bits(contact: &Contact) -> (u32, [[f32; 3]; 4], f32, u32) {
     let points = [
         contact.normal.to_array(),
@@ -83,7 +82,7 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
         let ends: Ends =
             surface.start_with_contacts(TreeBytes::new(bytes), limits, NoMac).expect("valid");
         let (mut bus, mut guard) = ends;
-        // The same packets reach a tracker by the layers below.
+        // A tracker gets the same packets through the layers below the guard.
         let buffers: &'static Frames<ROWS, 3> = Box::leak(Box::new(Frames::new()));
         let (writer, mut reader) = buffers.split().expect("once");
         let reach = SurfaceLimits::reach_mm(1_000.0);
@@ -110,14 +109,14 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
             let latest = reader.latest(Millis(now));
             let frame = latest.of_any_age().expect("published");
             let blend = frame.extrapolated();
-            // As far as a wall with this margin acts.
+            // The distance at which a wall with this margin acts.
             let margin = answer.trust.margin;
             let off = sum_up(blend.position_error(), margin);
             let wider = sum_up(MARGIN, off);
             let found = tracker.contacts(&blend, &tool, wider, &options, &mut expected);
             let found = found.expect("an answer");
             assert_eq!(answer.tracked, Ok(found), "{budget} {tick}");
-            // Of the true surface: less by all that the searched one may be off.
+            // The bound for the true surface: lower by all errors of the searched one.
             let below = f64::from(expected.bound()) - f64::from(off);
             let [bound, next] = [own.bound(), own.bound().next_up()].map(f64::from);
             let is_next = bound <= below && (next > below || below == f64::NEG_INFINITY);
@@ -130,7 +129,7 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
                 moving += usize::from(flow.length() > 1.0);
             }
             assert!(own.accuracy() >= expected.accuracy() + margin * 0.999_999, "{margin}");
-            // A depth has a tolerance besides, far from where a wall begins to act.
+            // A depth has an additional tolerance, far from where a wall begins.
             let is_outside = found.closest.side == Side::Outside;
             let reach = MARGIN + own.accuracy() - ROUNDING;
             assert!(!is_outside || own.is_empty() || wider > reach, "{wider} {reach}");
@@ -156,7 +155,7 @@ fn a_guard_s_contacts_are_a_tracker_s_within_the_one_budget() {
     assert!(most > 1_200 && acted > 3_000 && opened > 50, "{most} {acted} {opened}");
 }
 
-/// Whether a proxy pushes, by a guard's contacts.
+/// Whether a proxy pushes, with a guard's contacts.
 fn acts(proxy: &Proxy, answer: &Answer, list: &List, tool: &Capsule) -> bool {
     let contacts = answer.contacts(list, MARGIN);
     let wrench = proxy.wrench(contacts, list.accuracy(), tool.axis_start(), Vec3::ZERO, Vec3::ZERO);
@@ -171,8 +170,8 @@ type PosedEnds = (
     Guard<'static, 'static, u16, 64, OPENED, Posed, RANGE>,
 );
 
-/// The contacts of frames with poses are those of frames whose vertices were moved: the mesh lies turned somewhere, and
-/// travels, so that both go on straight between frames.
+/// Contacts of frames with poses equal those of frames whose vertices were moved: the mesh is rotated and travels in a
+/// straight line, so that both are extrapolated alike.
 #[test]
 fn contacts_on_a_mesh_with_a_pose_are_those_of_the_moved_mesh() {
     let generate::MovingMesh { mesh, .. } = generate::heart(1_280).expect("a valid size");
@@ -215,7 +214,7 @@ fn contacts_on_a_mesh_with_a_pose_are_those_of_the_moved_mesh() {
             let near =
                 |other: &&Contact| other.point_on_surface.distance(one.point_on_surface) < 0.5;
             let Some(same) = expected.iter().find(near) else { continue };
-            // A depth has a tolerance besides.
+            // A depth has an additional tolerance.
             let tolerance = if one.separation < -2.4 { 0.25 } else { 0.0 };
             let slack = own.accuracy() + expected.accuracy() + tolerance;
             assert!((one.separation - same.separation).abs() <= slack, "{now} {one:?} {same:?}");
@@ -227,7 +226,7 @@ fn contacts_on_a_mesh_with_a_pose_are_those_of_the_moved_mesh() {
             listed += 1;
             assert!(one.velocity.distance(same.velocity) < 0.5, "{now} {one:?} {same:?}");
             assert!(one.velocity.length() > 10.0, "{now} {one:?}");
-            // And what bounds a depth.
+            // The same for the bound of a depth.
             if one.separation < -2.5 {
                 let row = |of: &Contact| VelocityRow::new(of, 0.0, tool.axis_start());
                 let (row, same) = (row(one), row(same));
@@ -268,12 +267,12 @@ fn no_contacts_are_acted_on_without_a_surface_or_trust() {
     // Nobody has acknowledged.
     let cause = untrusted.closest.err();
     assert!(cause.is_some() && untrusted.contacts(&list, 60.0).err() == cause);
-    // A margin that is none is an error of the query, and its list is empty.
+    // An invalid margin is an error of the query, and its list is empty.
     let refused = guard.contacts(&tool, f32::NAN, Millis(4), &mut list);
     let expected = Unavailable::Query(QueryError::Margin { bits: f32::NAN.to_bits() });
     assert_eq!((refused.tracked.err(), refused.closest.err()), (Some(expected), Some(expected)));
     assert!(list.is_empty() && list.within(1.0).is_err());
-    // Nor is what an earlier tick found left without a pose or a surface.
+    // Contacts of an earlier tick do not remain without a pose or a surface.
     let other: &'static Surface<ROWS> = Box::leak(Box::new(Surface::new()));
     let (_, mut blind): Ends =
         other.start_with_contacts(TreeBytes::new(bytes), limits, NoMac).expect("valid");

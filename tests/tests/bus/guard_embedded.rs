@@ -1,4 +1,4 @@
-//! The guard of a surface that a volume's nodes carry: the same loop, with frames of nodes.
+//! The guard of a surface that a volume's nodes move: the same loop, with frames of nodes.
 
 // Requirements: C-07, F-07
 
@@ -34,8 +34,8 @@ fn packets(mesh_id: u32, now: u32, table: &[Vec3]) -> Vec<Vec<u8>> {
     collect(sender.with_freshness(fresh))
 }
 
-/// The loop of a controller, by the generated module: answers are right on the true surface at each tick, velocities are
-/// those of its vertices, admitted motions keep off, and a frame that the check refuses leaves the last good one.
+/// The loop of a controller, with the generated module: answers are correct for the true surface at each tick,
+/// velocities are its vertices', admitted motions keep the stand-off, and after a refused frame the last one stays.
 #[test]
 fn a_controller_runs_on_nodes() {
     static HEART: embedded_heart::Surface = embedded_heart::Surface::new();
@@ -47,7 +47,7 @@ fn a_controller_runs_on_nodes() {
     let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
     assert_eq!(rest.len(), embedded_heart::NODES);
     let at = |now: u32| -> Vec<Vec3> {
-        // It grows, so that vertices move apart.
+        // The surface grows, so that vertices move apart.
         let time = (now - 1_000) as f32 * 1e-3;
         rest.iter().map(|&node| node * (1.0 + 0.03 * time) + FLOW * time).collect()
     };
@@ -117,8 +117,8 @@ fn a_controller_runs_on_nodes() {
     assert!(checked > 1_900 && refused > 10 && admitted > 1_000);
 }
 
-/// A start names a tree without nodes, a tree with nodes where vertices are meant, and a number of rows that is not that of
-/// the nodes.
+/// The start reports a tree without nodes, a tree with nodes where vertices are expected, and a number of rows that
+/// differs from the number of nodes.
 #[test]
 fn a_start_names_the_wrong_kind_of_rows() {
     let heart = generate::heart(320).expect("a valid size").mesh;
@@ -140,8 +140,8 @@ fn a_start_names_the_wrong_kind_of_rows() {
     assert_eq!(start(embedded.blob()), None);
 }
 
-/// Frames of vertices are no frames of nodes, nor the reverse: they have another number of rows; and where it is the same,
-/// elements and triangles are not what they were. Each is counted by its cause, and the next good frame is published.
+/// Frames of vertices are not accepted as frames of nodes, nor the reverse: the number of rows differs, or, if it is
+/// equal, the shapes of elements and triangles do. Each is counted by its cause, and the next good frame is published.
 #[test]
 fn frames_of_the_other_kind_are_refused_and_counted() {
     let mut rng = Rng::with_seed(3);

@@ -1,4 +1,4 @@
-//! Frames with a rigid pose each: answers on the moved mesh, climbed against exhaustive search in f64.
+//! Frames with rigid poses: answers on the moved mesh, compared with exhaustive search in f64 by hill climbing.
 
 // Requirement: F-08
 
@@ -34,7 +34,7 @@ pub fn send(
     work(bus)
 }
 
-/// The checks of a frame.
+/// Does all checks of a frame.
 pub fn work(bus: &mut TheBus<'_, '_>) -> Result<Advance, ReceiveError> {
     loop {
         match bus.work(50) {
@@ -52,7 +52,7 @@ struct Case {
     ends: [Vec3; 2],
     radius: f32,
     age: u32,
-    /// The third frame goes on as the two before.
+    /// Whether the third frame continues the motion of the first two.
     is_steady: bool,
 }
 
@@ -79,7 +79,7 @@ impl Case {
         }
     }
 
-    /// One of its numbers is a little different.
+    /// The same with a small random change of one number.
     fn changed(&self, rng: &mut Rng) -> Self {
         let size = 10.0_f32.powf(-4.0 * rng.f32());
         let mut number = |size: f32| (rng.f32() - 0.5) * 2.0 * size;
@@ -104,7 +104,7 @@ impl Case {
         next
     }
 
-    /// How far the answer is off, as a part of its accuracy, and that.
+    /// The error of the answer relative to its accuracy, and the accuracy.
     fn off(&self, heart: &Heart) -> Option<(f64, f32)> {
         let mut poses = self.poses;
         if self.is_steady {
@@ -143,7 +143,7 @@ impl Case {
     }
 }
 
-/// Cold ticks on frames and between them: no answer is off by more than its accuracy, wherever a search for one climbs.
+/// Cold ticks on frames and between them: no error exceeds the accuracy, even after hill climbing towards large errors.
 #[test]
 fn answers_are_those_of_the_moved_mesh() {
     let starts = if cfg!(debug_assertions) { 4 } else { 60 };

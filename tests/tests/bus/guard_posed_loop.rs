@@ -1,4 +1,4 @@
-//! A controller's loop on frames with a rigid pose each; what is refused, and what is held.
+//! A controller's loop on frames with rigid poses: refused frames, and surfaces that are held.
 
 // Requirement: F-08
 
@@ -19,11 +19,11 @@ use crate::guard_posed::{PERIOD, ROWS, TheBus, TheGuard, limits, send, work};
 
 dibs_nostd::include_tree!("embedded_heart");
 
-/// A heart that beats, turns and travels.
+/// A heart that beats, rotates and travels.
 struct World<'h> {
     heart: &'h Heart,
     start: Sent,
-    /// A period's rotation vector and way.
+    /// Rotation vector and displacement in a period.
     spin: Vec3,
     flow: Vec3,
 }
@@ -34,7 +34,7 @@ impl World<'_> {
         steady(self.heart, &self.start, self.spin, self.flow, time)
     }
 
-    /// The positions of its file, and the exact rows where it is.
+    /// The positions in its file, and the exact rows in world coordinates.
     fn frame(&self, now: u32) -> Vec<Vec3> {
         self.heart.grown(0.02 * now as f32 * 1e-3)
     }
@@ -50,8 +50,8 @@ impl World<'_> {
     }
 }
 
-/// The loop of a controller on a heart that beats, turns and travels: right at every tick, with few whole queries, the
-/// velocity is that of its points, and admitted motions keep off.
+/// The loop of a controller on a heart that beats, rotates and travels: its answers are correct at every tick, with few
+/// whole queries, the velocity is that of its points, and admitted motions keep the stand-off.
 #[test]
 fn a_controller_runs_on_a_mesh_that_turns_and_travels() {
     let heart = Heart::new(Vec3::new(20.0, 30.0, -10.0));
@@ -70,7 +70,7 @@ fn a_controller_runs_on_a_mesh_that_turns_and_travels() {
     assert!(checked > 3_800, "{checked}");
 }
 
-/// Whether an answer says where the tool is; it must be right.
+/// Whether an answer has a side; its separation must be correct.
 fn is_right(truth: &Truth, found: &Proximity, now: u32) -> bool {
     let Some(part) = off(truth, found) else { return false };
     assert!(part <= 1.0 && found.accuracy < 0.1, "{now}: {} {found:?}", truth.separation);
@@ -123,7 +123,7 @@ fn walk(world: &World<'_>) -> u32 {
             let error = (searched.velocity.as_dvec3() - velocity).length();
             assert!(error < 0.3, "{now}: {} {velocity}", searched.velocity);
             assert_eq!(searched.lag, Some(Millis(0)));
-            // The pair is one.
+            // The two points of the pair agree with its direction and separation.
             let between = closest.point_on_tool - closest.point_on_surface;
             let along = between - closest.direction * closest.separation;
             assert!(along.length() < 1e-3 + closest.accuracy, "{now}: {closest:?}");
@@ -145,7 +145,7 @@ fn walk(world: &World<'_>) -> u32 {
     checked
 }
 
-/// Nodes that grow, turn and travel: the surface that they carry is right between frames, whatever its vertices' weights.
+/// Nodes that grow, rotate and travel: their surface is correct between frames, whatever its vertices' weights.
 #[test]
 fn nodes_may_have_a_pose() {
     const STACK: usize = embedded_heart::STACK;
@@ -192,8 +192,8 @@ fn nodes_may_have_a_pose() {
     assert!(checked > 150, "{checked}");
 }
 
-/// A steady acceleration is what the last frames' residual says of it: each answer between frames is off by no more than its
-/// accuracy, and by most of that.
+/// The last frames' residual covers a steady acceleration: the error of each answer between frames is within its
+/// accuracy, and uses most of it.
 #[test]
 fn a_change_of_the_meshs_speed_is_in_the_accuracy() {
     let heart = Heart::new(Vec3::ZERO);
@@ -230,8 +230,8 @@ fn a_change_of_the_meshs_speed_is_in_the_accuracy() {
     assert!(worst > 0.5, "{worst}");
 }
 
-/// Where a capture goes back by a clock's jitter, rows and pose are held; then both go on by the same time, so that a steady
-/// motion shows no error.
+/// If a time of capture goes back because of a clock's jitter, rows and pose are held; then both continue by the same
+/// time, so that a steady motion has no residual.
 #[test]
 fn a_capture_that_goes_back_leaves_no_residual_of_the_pose() {
     let heart = Heart::new(Vec3::ZERO);
@@ -257,8 +257,8 @@ fn a_capture_that_goes_back_leaves_no_residual_of_the_pose() {
     }
 }
 
-/// What is no pose is refused and counted, and so is one that is too fast with its rows, though neither is alone; the last
-/// good frame stays. An operator's registration takes it.
+/// An invalid pose is refused and counted, and so is one that is too fast together with its rows, although neither is
+/// too fast alone; the last good frame stays. After an operator's registration the frame is accepted.
 #[test]
 fn a_wrong_pose_is_refused_and_the_last_good_frame_stays() {
     let heart = Heart::new(Vec3::ZERO);
@@ -337,7 +337,7 @@ fn a_wrong_pose_is_refused_and_the_last_good_frame_stays() {
             };
             assert!(step > limit && step < 2.0 * limit, "{error:?}");
             assert_eq!(bus.counters().of(Event::TooFast), counted + 1);
-            // It ages meanwhile.
+            // The surface ages meanwhile.
             send(&mut bus, &heart.grown(0.0), &here, now + 1).expect("admitted");
             now += 1;
         }
@@ -351,8 +351,8 @@ fn a_wrong_pose_is_refused_and_the_last_good_frame_stays() {
     assert!(ask(now + PERIOD).1.z > 400.0);
 }
 
-/// A frame in packets has no pose, so it is where the mesh's frame is; one of a part keeps the pose. Where a step turns by
-/// more than half a radian, and before the third frame, the surface is held.
+/// A frame in packets without a pose is at the mesh's own coordinates; a partial frame keeps the pose. If a step
+/// rotates by more than half a radian, and before the third frame, the surface is held.
 #[test]
 fn packets_have_no_pose_and_a_fast_turn_is_held() {
     let heart = Heart::new(Vec3::ZERO);

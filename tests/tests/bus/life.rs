@@ -1,4 +1,5 @@
-//! Signs of life and statuses: held back, forged, from far ahead. The watch sees a death, and genuine packets heal.
+//! Heartbeats and statuses that are delayed, forged, or from far ahead. The fail-safe machine detects a dead sender,
+//! and authentic packets recover.
 
 // Requirements: B-04, B-05
 
@@ -22,7 +23,7 @@ fn beat(session: u32, beat: u32) -> Vec<u8> {
     encode_heartbeat(&id, beat, None, &NoMac, &mut [0; 64]).to_vec()
 }
 
-/// Somebody holds the heartbeats back, and lets one through each 990 ms when the sender has died.
+/// Somebody delays the heartbeats, and forwards one each 990 ms after the sender has stopped.
 fn silence_after_death<M: Mac + 'static>(mac: fn(u64) -> M) -> u32 {
     let (mut assembler, _reader) = guarded(mac(77));
     let order = SurfaceOrder::new(MESH, (0..N as u32).collect());
@@ -66,7 +67,7 @@ fn heartbeats_held_back_hide_no_death() {
     }
 }
 
-/// Without faults the watch sees at most the time of one status and one heartbeat.
+/// Without faults the heartbeat's age is at most the interval of a status plus that of a heartbeat.
 #[test]
 fn heartbeats_are_as_old_as_the_status_that_they_echo() {
     let (mut assembler, _reader) = guarded(keyed(77));
@@ -106,7 +107,7 @@ fn heartbeats_are_as_old_as_the_status_that_they_echo() {
         open.accept(&beat, Millis(100 + n)).unwrap();
         assert_eq!(open.health().heartbeat, Some(Millis(echo.max(90))));
     }
-    // An echo ahead of the clock is of another run of the receiver: no sign of life in this one.
+    // An echo ahead of the clock is from another run of the receiver: it does not count as a heartbeat.
     let (mut anew, _reader) = guarded(NoMac);
     for (n, echo) in [(1, 40), (2, 1 << 30), (3, i32::MAX as u32 - 10)] {
         let ahead = encode_heartbeat(&id(1), n, Some(30 + echo), &NoMac, &mut [0; 64]).to_vec();
@@ -115,7 +116,7 @@ fn heartbeats_are_as_old_as_the_status_that_they_echo() {
     }
 }
 
-/// Without a key: stray heartbeats far ahead, in beat or session, cost at most a few genuine ones.
+/// Without a key, stray heartbeats far ahead in number or session only suppress a few authentic ones.
 #[test]
 fn heartbeats_far_ahead_lock_nobody_out() {
     let far_beat = |k: u32| beat(9, 5 + i32::MAX as u32 - 10 - k);
@@ -136,7 +137,7 @@ fn heartbeats_far_ahead_lock_nobody_out() {
             assert_eq!(assembler.health().heartbeat, Some(Millis(199_900)));
         }
     }
-    // The last two, repeated in turn, are no sign of life.
+    // The last two, repeated alternately, do not count as heartbeats.
     let (mut assembler, _reader) = guarded(NoMac);
     assembler.accept(&beat(9, 7), Millis(100)).unwrap();
     for now in 101..200 {
@@ -145,7 +146,7 @@ fn heartbeats_far_ahead_lock_nobody_out() {
     }
 }
 
-/// A status that somebody made up shows a later session: the sender asks, and goes on.
+/// A forged status claims a later session: the sender asks, and continues.
 #[test]
 fn a_forged_status_stops_no_sender() {
     for (session, number) in [(500, 1_000_000), (10, 20), (9 + i32::MAX as u32, i32::MAX as u32)] {
@@ -179,7 +180,7 @@ fn a_forged_status_stops_no_sender() {
     }
 }
 
-/// The answer to a hello of a run of the receiver that is over, played back when no hello waits, changes nothing.
+/// The answer to a hello from an earlier run of the receiver has no effect if it is replayed while no hello is pending.
 #[test]
 fn an_answer_to_no_hello_is_not_taken() {
     let (mut before, _before_reader) = guarded(keyed(5));
@@ -205,7 +206,7 @@ fn an_answer_to_no_hello_is_not_taken() {
     assert!(source.frame(&mut assembler, 2, 330).is_some(), "under the challenge of this run");
 }
 
-/// Somebody who sees the hello forges its answer, too: the sender stops, asks again, and goes on.
+/// Somebody who sees the hello forges its answer as well: the sender stops, asks again, and continues.
 #[test]
 fn a_sender_that_was_stopped_goes_on() {
     let (mut assembler, _reader) = guarded(NoMac);
@@ -215,7 +216,7 @@ fn a_sender_that_was_stopped_goes_on() {
         assert!(source.frame(&mut assembler, n, 60 * n).is_some());
         source.hear(&mut assembler, 60 * n, 1).unwrap();
     }
-    // A receiver of the stranger's own, in which session 500 has published, hears the sender's hello.
+    // A stranger's own receiver, in which session 500 has published, receives the sender's hello.
     let (mut strangers, _strangers_reader) = guarded(NoMac);
     let mut stranger = Source::new(500, |_| NoMac);
     stranger.meet(&mut strangers, 0);
@@ -232,7 +233,7 @@ fn a_sender_that_was_stopped_goes_on() {
     }
 }
 
-/// A stranger's hello after each of the sender's keeps no sender from its answer, and brings the stranger none.
+/// A stranger's hello after each of the sender's does not suppress the sender's answer, and gets none.
 #[test]
 fn strangers_collect_no_answers_and_jam_none() {
     let (mut assembler, _reader) = guarded(keyed(5));
@@ -263,8 +264,8 @@ fn strangers_collect_no_answers_and_jam_none() {
     panic!("the sender never heard an answer");
 }
 
-/// Without a key anybody may ask, and is answered at most each 20 ms, and by statuses; a stranger's hellos keep no sender
-/// from its answer for long.
+/// Without a key anybody may send hellos, which are answered at most each 20 ms, and by statuses; a stranger's hellos
+/// do not suppress a sender's answer for long.
 #[test]
 fn hellos_without_a_tag_are_answered_at_a_bounded_rate() {
     let mut rng = fastrand::Rng::with_seed(19);
@@ -319,7 +320,7 @@ fn hellos_without_a_tag_are_answered_at_a_bounded_rate() {
     }
 }
 
-/// Sender and receiver of surfaces that differ in unit or size, though not in the mesh id, and of other meshes.
+/// Sender and receiver whose surfaces differ in unit or size although the mesh id is equal, and of different meshes.
 #[test]
 fn both_ends_say_that_their_surfaces_differ() {
     let millimetres = Some(Unit::Millimetre);

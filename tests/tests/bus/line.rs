@@ -1,4 +1,4 @@
-//! A line without loss between a sender and a receiver with a key, for attacks on both.
+//! A lossless line between a sender and a receiver with a key, for attacks on both.
 
 // Requirement: B-04
 
@@ -45,7 +45,7 @@ pub fn status<M: Mac>(assembler: &mut Guarded<M>, now: u32, safety: u8) -> Vec<u
     encode_status(MESH, &status, assembler.counters(), assembler.mac(), &mut [0; 256]).to_vec()
 }
 
-/// A line without loss: packets to the receiver, and packets to the sender.
+/// A lossless line: packets to the receiver, and packets to the sender.
 #[derive(Clone, Default)]
 pub struct Pipe(Arc<Mutex<[Vec<Vec<u8>>; 2]>>);
 
@@ -71,7 +71,7 @@ impl Transport for Pipe {
     }
 }
 
-/// A sender with a clock of its own.
+/// A sender with its own clock.
 pub struct Source<M> {
     pub sender: Sender<Pipe, 256, M>,
     pub pipe: Pipe,
@@ -103,8 +103,7 @@ impl<M: Mac + 'static> Source<M> {
         self.clock.store(u64::from(now), Ordering::Relaxed);
     }
 
-    /// Gives the receiver's status to the sender, and the sender's packets to the receiver. Returns the outcome of the
-    /// sender's poll.
+    /// Passes the status to the sender, and its packets to the receiver. Returns the result of the sender's poll.
     pub fn hear(
         &mut self,
         assembler: &mut Guarded<M>,
@@ -120,7 +119,7 @@ impl<M: Mac + 'static> Source<M> {
         heard
     }
 
-    /// Gives statuses to the sender until it knows the receiver.
+    /// Passes statuses to the sender until it knows the receiver.
     pub fn meet(&mut self, assembler: &mut Guarded<M>, now: u32) {
         for _ in 0..4 {
             self.hear(assembler, now, 1).unwrap();
@@ -136,7 +135,7 @@ impl<M: Mac + 'static> Source<M> {
     }
 }
 
-/// Gives packets to the receiver, with checking in between. Returns the published epoch.
+/// Passes packets to the receiver, with checking in between. Returns the published epoch.
 pub fn deliver<M: Mac>(assembler: &mut Guarded<M>, packets: &[Vec<u8>], now: u32) -> Option<u32> {
     let mut published = None;
     for packet in packets {

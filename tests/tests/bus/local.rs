@@ -1,4 +1,4 @@
-//! Frames of the same process: what packets give, from positions in the order of the mesh's file.
+//! Frames from the same process: the same results as with packets, from positions in the order of the mesh's file.
 
 // Requirement: B-08
 
@@ -24,7 +24,7 @@ const ROWS: usize = 162;
 
 type Ends<'t> = (Bus<'static, 't, u16>, Guard<'static, 't, u16, 64, 96>);
 
-/// A heart whose file has its vertices shuffled, and one that no triangle uses.
+/// A heart whose file has its vertices shuffled, and one vertex that no triangle uses.
 fn shuffled() -> (Mesh, BuiltTree) {
     let heart = generate::heart(320).expect("a valid size").mesh;
     let mut order: Vec<u32> = (0..heart.positions.len() as u32).collect();
@@ -64,17 +64,17 @@ fn published(bus: &mut Bus<'_, '_, u16>) -> bool {
     }
 }
 
-/// The same surface by packets and by a call: the same answers to the bit, ages, stretch and states.
+/// The same surface by packets and by a call gives the same answers to the bit, ages, stretch and states.
 #[test]
 fn a_call_gives_what_packets_give() {
     let (mesh, built) = shuffled();
     let (mut near, mut far) = (start(&built, 300.0), start(&built, 300.0));
     let mesh_id = built.summary().mesh_id;
     let mut compared = 0;
-    // The first second is safe until proven good.
+    // The first second is safe until the surface is trusted.
     for now in 1_000..4_000 {
         if now % 20 == 0 {
-            // 7 ms old when it comes.
+            // The frame is 7 ms old when it arrives.
             let positions = beat(&mesh, now - 7);
             assert!(matches!(
                 near.0.frame(&positions, Millis(now - 7), Millis(now)),
@@ -104,7 +104,7 @@ fn a_call_gives_what_packets_give() {
         compared += 1;
     }
     assert!(compared > 1_900, "{compared}");
-    // Nothing keeps a silent source alive.
+    // A silent source is not kept alive.
     let tool = Sphere::new(Vec3::new(78.0, 0.0, 10.0), 2.0).expect("valid");
     for mut ends in [near, far] {
         let silent = ends.1.closest(&tool, Millis(4_200));
@@ -112,7 +112,7 @@ fn a_call_gives_what_packets_give() {
     }
 }
 
-/// What is wrong is named and counted, and the last good surface stays.
+/// Errors are reported and counted, and the last good surface stays.
 #[test]
 fn a_wrong_frame_is_refused_and_the_last_good_one_stays() {
     let (mesh, built) = shuffled();
@@ -130,13 +130,13 @@ fn a_wrong_frame_is_refused_and_the_last_good_one_stays() {
     };
     let count = ReceiveError::RowCount { rows: ROWS as u32 };
     let wrong = [
-        // As many as rows, but the file has one more.
+        // As many positions as rows, but the file has one more.
         (good[..ROWS].to_vec(), 1_010, count, Event::RowCount),
         (Vec::new(), 1_010, ReceiveError::RowCount { rows: 0 }, Event::RowCount),
         (with(Vec3::NAN), 1_010, ReceiveError::NotFinite { row }, Event::NotFinite),
         (with(Vec3::X * 1e6), 1_010, ReceiveError::TooFar { row }, Event::TooFar),
         (good.clone(), 900, ReceiveError::Earlier { by: Millis(100) }, Event::Stale),
-        // The future, and longer ago than a packet can say.
+        // A capture in the future, and one longer ago than a packet can state.
         (good.clone(), 1_100, ReceiveError::TooOld, Event::Stale),
         (good.clone(), 1_011_u32.wrapping_sub(66_000), ReceiveError::TooOld, Event::Stale),
     ];
@@ -146,7 +146,7 @@ fn a_wrong_frame_is_refused_and_the_last_good_one_stays() {
         assert_eq!(bus.counters().of(event), before + 1, "{event:?}");
         assert_eq!(bus.work(u32::MAX), Ok(Advance::Idle), "{error:?}");
     }
-    // A vertex that no triangle uses may be anything: it is no row.
+    // A vertex that no triangle uses may have any position: it is not a row.
     let mut unused = good.clone();
     let loose = (0..unused.len()).find(|&at| !built.vertex_order().contains(&(at as u32)));
     unused[loose.expect("one")] = Vec3::NAN;
@@ -156,7 +156,7 @@ fn a_wrong_frame_is_refused_and_the_last_good_one_stays() {
         Err(Event::Busy)
     );
     assert!(published(&mut bus));
-    // Torn away in 10 ms, and turned inside out.
+    // A vertex that moves too far in 10 ms, and a surface turned inside out.
     let torn = bus.frame(&with(good[used] + Vec3::X * 40.0), Millis(1_022), Millis(1_022));
     assert!(torn.is_ok(), "{torn:?}");
     let refused = loop {
@@ -175,7 +175,7 @@ fn a_wrong_frame_is_refused_and_the_last_good_one_stays() {
     assert!(answer.tracked.is_ok(), "{answer:?}");
 }
 
-/// One process for both: packets may follow a call, and a call packets, which it abandons half way.
+/// Both sources in one process: packets may follow a call; a call may follow packets, and abandons their frame.
 #[test]
 fn a_call_and_packets_take_turns() {
     let (mesh, built) = shuffled();
@@ -206,7 +206,7 @@ fn a_call_and_packets_take_turns() {
     assert_eq!(bus.counters().of(Event::Abandoned), 10);
 }
 
-/// A solver in its own thread, a control loop in another: no answer waits or is of no surface.
+/// A solver and a control loop in two threads: neither waits for the other, and every answer is of a complete surface.
 #[test]
 fn a_solver_s_thread_feeds_the_control_loop() {
     let (mesh, built) = shuffled();
@@ -225,7 +225,7 @@ fn a_solver_s_thread_feeds_the_control_loop() {
                     thread::yield_now();
                 }
                 frames.fetch_add(1, Ordering::AcqRel);
-                // On a busy computer the solver would else be done before the control loop has begun.
+                // On a busy computer the solver would otherwise end before the control loop has begun.
                 let (seen, start) = (clock.load(Ordering::Acquire) + 2, Instant::now());
                 while clock.load(Ordering::Acquire) < seen && start.elapsed().as_secs() < 5 {
                     thread::yield_now();
@@ -248,7 +248,7 @@ fn a_solver_s_thread_feeds_the_control_loop() {
     });
 }
 
-/// Nodes come in their file's order.
+/// Nodes are given in their file's order.
 #[test]
 fn nodes_come_by_a_call() {
     static HEART: embedded_heart::Surface = embedded_heart::Surface::new();

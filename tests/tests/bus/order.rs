@@ -38,7 +38,7 @@ fn epochs_wrap() {
     let mut bus = bus();
     for epoch in [u32::MAX - 1, u32::MAX, 0, 1, 0x7FFF_FFFF, 0xFFFF_FFFE_u32, 5] {
         assert_eq!(send(&mut bus, 1, epoch), Ok(Some(epoch)));
-        // The same epoch, older ones, and the nearest one that is too far ahead.
+        // The same epoch, older ones, and the smallest one that is too far ahead.
         for stale in
             [epoch, epoch.wrapping_sub(1), epoch.wrapping_sub(0x7FFF_FFFF), epoch ^ (1 << 31)]
         {
@@ -50,7 +50,7 @@ fn epochs_wrap() {
     }
 }
 
-/// A frame of a later session is taken whatever its epoch; a frame of an earlier session is refused whatever its epoch.
+/// Whatever their epochs, a frame of a later session is accepted, and one of an earlier session refused.
 #[test]
 fn sessions_supersede_and_wrap() {
     let mut bus = bus();
@@ -70,7 +70,7 @@ fn sessions_supersede_and_wrap() {
     }
 }
 
-/// Sessions whose upper halves differ: a packet of rows carries only the lower half.
+/// Sessions that differ only in their upper halves: a packet of rows only contains the lower half.
 #[test]
 fn sessions_are_told_apart_by_both_halves() {
     let mut bus = bus();
@@ -79,7 +79,7 @@ fn sessions_are_told_apart_by_both_halves() {
     let new = frame_of(0x0002_0005, 9);
     give(&mut bus.0, &new[0]).unwrap();
     give(&mut bus.0, &new[1]).unwrap();
-    // A late packet of the old session is stored; the digest shows it.
+    // A late packet of the old session is stored; the digest reveals it.
     give(&mut bus.0, &old[2]).unwrap();
     for packet in &new[3..new.len() - 1] {
         give(&mut bus.0, packet).unwrap();
@@ -99,7 +99,7 @@ fn a_newer_frame_supersedes_an_unfinished_one() {
         }
         assert_eq!(bus.0.accept(&second[0], Millis(0)), Ok(Progress::Begun { epoch }));
         assert_eq!(bus.0.counters().of(Event::Abandoned), 1);
-        // The rest of the first frame is refused, also its begin.
+        // The rest of the first frame is refused, including its begin.
         assert_eq!(give(&mut bus.0, &first[0]), Err(ReceiveError::Stale { epoch: 1 }));
         if epoch != 1 {
             let refused = ReceiveError::Refused { epoch: 1, cause: Event::Stale };
@@ -112,7 +112,7 @@ fn a_newer_frame_supersedes_an_unfinished_one() {
     }
 }
 
-/// A begin from the far future without further packets holds the line up for a tenth of a second.
+/// A begin from the far future without further packets blocks the line for a tenth of a second.
 #[test]
 fn a_stray_begin_does_not_block_the_line() {
     for (session, epoch) in [(1, 0x3000_0000), (0x4000_0000, 7)] {
@@ -134,7 +134,7 @@ fn a_stray_begin_does_not_block_the_line() {
             assert!(send_at(&mut bus, epoch, after).is_err());
         }
         assert_eq!(send_at(&mut bus, 7, 100), Ok(Some(7)));
-        // While its packets come, a frame is not displaced.
+        // While its packets arrive, a frame is not displaced.
         let ahead = frame_of(session, epoch);
         for (place, packet) in (3..).zip(&ahead[..ahead.len() - 1]) {
             let now = start.wrapping_add(90 * place);
@@ -193,7 +193,7 @@ fn heartbeats_are_in_order_and_wrap() {
         }
         assert_eq!(assembler.last_heartbeat(), Some(last));
     }
-    // A later session counts from its own start; an earlier one is refused.
+    // A later session has its own count; an earlier one is refused.
     assert_eq!(assembler.accept(&heartbeat(4, 1, 0), Millis(1)), Ok(Progress::Heartbeat));
     assert_eq!(
         assembler.accept(&heartbeat(3, 99, 10), Millis(1)),
@@ -202,7 +202,7 @@ fn heartbeats_are_in_order_and_wrap() {
     assert_eq!(assembler.counters().of(Event::Heartbeat), 5);
 }
 
-/// Heartbeats of an unknown session are believed until the sender's next frame is published.
+/// Heartbeats of an unknown session are accepted until the sender's next frame is published.
 #[test]
 fn a_published_frame_decides_whose_heartbeats_count() {
     let mut bus = bus();

@@ -1,4 +1,4 @@
-//! Partial frames: only the moved rows, on top of the published frame.
+//! Partial frames: only the moved rows, based on the published frame.
 
 // Requirement: B-01
 
@@ -85,7 +85,7 @@ fn a_partial_frame_takes_no_more_packets_than_it_must() {
     assert_eq!(runs, [(0, 3), (9, 2), (39, 1)]);
 }
 
-/// The base must be the published frame, of the same session. Otherwise the sender is asked for a whole frame until one
+/// The base must be the published frame, of the same session. Otherwise the sender is asked for whole frames until one
 /// is published.
 #[test]
 fn another_base_is_refused_and_a_whole_frame_asked_for() {
@@ -111,7 +111,7 @@ fn another_base_is_refused_and_a_whole_frame_asked_for() {
     }
     assert_eq!(assembler.counters().of(Event::Base), 5);
     assert_eq!(give(&mut assembler, &onto(1, 6, 5)), Ok(None));
-    // A base that the wire cannot name.
+    // A base that the protocol cannot express.
     for (epoch, base) in [(6, 6), (6, 7), (65_542, 6)] {
         let encoding = Encoding::Float;
         let frame =
@@ -121,7 +121,7 @@ fn another_base_is_refused_and_a_whole_frame_asked_for() {
     assert_eq!(published(&mut reader).unwrap().0, 5);
 }
 
-/// A frame that was abandoned, or refused at its end, leaves nothing behind in the next.
+/// A frame that was abandoned, or refused at its end, does not affect the next one.
 #[test]
 fn nothing_of_an_unpublished_frame_shows_up_later() {
     let mut rng = Rng::with_seed(8);
@@ -156,7 +156,7 @@ fn nothing_of_an_unpublished_frame_shows_up_later() {
             }
             let mut is_published = false;
             for packet in &packets {
-                // Slices of different lengths come between the packets, or none.
+                // Between the packets there are slices of different lengths, or none.
                 if rng.bool() {
                     assembler.advance(rng.u32(0..20)).unwrap();
                 }
@@ -187,7 +187,7 @@ fn copying_is_bounded_and_rows_wait_for_it() {
     positions[10].x = -1.0;
     positions[250].x = -2.0;
     let packets = partial(2, Encoding::Float, &positions, 1, &held);
-    // Before the first partial frame nothing was copied.
+    // Nothing was copied before the first partial frame.
     assembler.accept(&packets[0], Millis(0)).unwrap();
     assert_eq!(assembler.accept(&packets[1], Millis(0)), Err(ReceiveError::NotReady { first: 10 }));
     assert!(assembler.status(Millis(0), 0).wants_whole);

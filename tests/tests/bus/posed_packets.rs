@@ -1,4 +1,4 @@
-//! Frames with a rigid pose each, in packets: published with their own pose, or not at all.
+//! Frames with rigid poses, in packets: published with their own pose, or not at all.
 
 // Requirements: F-08, B-01
 
@@ -15,11 +15,11 @@ use fastrand::Rng;
 
 use crate::guard_posed::{PERIOD, ROWS, TheBus, TheGuard, limits, work};
 
-/// Places of a packet's fields.
+/// Offsets of a packet's fields.
 const SEQUENCE: usize = 12;
 const BODY: usize = 18;
 
-/// A quarter of a turn, and a shift.
+/// A quarter turn, and a shift.
 fn pose(x: f32) -> RigidPose {
     let quarter = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
     RigidPose::new(quarter, Vec3::X * x).expect("a rotation")
@@ -54,7 +54,7 @@ impl<'h, 's> Line<'h, 's> {
         FrameId { mesh_id: self.heart.built.summary().mesh_id, session: 1, epoch }
     }
 
-    /// Gives packets, and all work that is due. Returns the first refusal, and whether a frame was published.
+    /// Gives packets, and does all pending work. Returns the first refusal, and whether a frame was published.
     fn give(&mut self, packets: &[Vec<u8>], now: u32) -> (Option<ReceiveError>, bool) {
         let (mut refused, mut is_published) = (None, false);
         for packet in packets {
@@ -69,7 +69,7 @@ impl<'h, 's> Line<'h, 's> {
         (refused, is_published)
     }
 
-    /// The surface's point nearest to one far away.
+    /// The surface's point nearest to a point far away.
     fn nearest(&mut self, now: u32) -> Option<Vec3> {
         let tool = Sphere::new(Vec3::new(30.0, 2_000.0, 10.0), 1.0).expect("valid");
         let tracked = self.guard.closest(&tool, Millis(now)).tracked.ok()?;
@@ -81,7 +81,7 @@ impl<'h, 's> Line<'h, 's> {
     }
 }
 
-/// The frame with another pose packet, whose commit agrees.
+/// The frame with another pose packet, and a commit that agrees with it.
 fn with_pose_packet(packets: &[Vec<u8>], changed: Vec<u8>) -> Vec<Vec<u8>> {
     let mut packets = packets.to_vec();
     let more = contribution(&changed).wrapping_sub(contribution(&packets[1]));
@@ -99,7 +99,7 @@ fn edited(packet: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
     reseal(packet)
 }
 
-/// A frame in packets is the same as one of this process with its pose, whole and in part; the pose may come late, in any
+/// A frame in packets equals one of this process with its pose, whole or partial; the pose may arrive late, in any
 /// order, and twice.
 #[test]
 fn a_pose_comes_with_its_frame() {
@@ -117,14 +117,14 @@ fn a_pose_comes_with_its_frame() {
         let sent = [&pose.rotation().to_array()[..], &pose.shift().to_array()].concat();
         assert_eq!((packets[1][1], packets[1].len(), numbers), (10, 64, sent));
         match epoch % 4 {
-            // Last of all.
+            // After all other packets.
             0 => {
                 let late = packets.remove(1);
                 packets.push(late);
             }
             // Twice.
             1 => packets.insert(4, packets[1].clone()),
-            // Anywhere behind the begin, as far as there are gaps to note.
+            // Anywhere after the begin, as far as gaps can be recorded.
             2 => {
                 let late = packets.remove(1);
                 packets.insert(rng.usize(1..=packets.len()), late);
@@ -144,7 +144,7 @@ fn a_pose_comes_with_its_frame() {
     }
 }
 
-/// A frame that is announced with a pose is not published without: its loss, damage, another frame's, or what is in its place.
+/// A frame that announces a pose is not published without it: if it is lost, damaged, from another frame, or replaced.
 #[test]
 fn no_frame_is_published_without_its_pose() {
     let heart = Heart::new(Vec3::ZERO);
@@ -163,9 +163,9 @@ fn no_frame_is_published_without_its_pose() {
         packet[BODY + 17] ^= 4;
         packet
     };
-    // Rows in its place, as in the frame without.
+    // Rows in its place, as in the frame without a pose.
     let rows_first = [&sound[..1], &plain[1..]].concat();
-    // Other rows, too, that would go with it.
+    // Both the other rows and its own.
     let both = [&sound[..1], &plain[1..2], &sound[1..]].concat();
     let misplaced = edited(sound_pose, SEQUENCE, &[2, 0]);
     let unannounced = [&plain[..1], &sound[1..2], &plain[1..]].concat();
@@ -176,13 +176,13 @@ fn no_frame_is_published_without_its_pose() {
         (rows_first, Some(Event::Order), false),
         (both, Some(Event::Order), true),
         (with_pose_packet(&sound, misplaced), Some(Event::Malformed), false),
-        // Another pose than the commit's.
+        // A pose that differs from the one in the commit's digest.
         (
             with_replaced(&sound, line.packets(2, Some(pose(61.0))).swap_remove(1)),
             Some(Event::Digest),
             false,
         ),
-        // The frame has none: its rows are sound.
+        // The frame has no pose, but its rows are valid.
         (unannounced, Some(Event::Encoding), true),
     ];
     for (number, (packets, event, is_published)) in cases.into_iter().enumerate() {
@@ -196,7 +196,7 @@ fn no_frame_is_published_without_its_pose() {
         assert_eq!(event.map(|event| line.count(event)), counted.map(|count| count + 1));
         if !found {
             assert_eq!(line.nearest(PERIOD), Some(before), "{number}");
-            // The next one is taken.
+            // The next frame is accepted.
             let next = line.packets(7, Some(pose(70.0)));
             assert_eq!(line.give(&next, 3 * PERIOD), (None, true), "{number}");
         }
@@ -209,7 +209,7 @@ fn with_replaced(packets: &[Vec<u8>], pose: Vec<u8>) -> Vec<Vec<u8>> {
     packets
 }
 
-/// Numbers that are no pose are refused by their cause, whatever the checksum and digest say, and the frame with them.
+/// Invalid poses are refused by their cause, even if checksum and digest match, and their frame with them.
 #[test]
 fn what_is_no_pose_is_refused() {
     let heart = Heart::new(Vec3::ZERO);
@@ -237,8 +237,8 @@ fn what_is_no_pose_is_refused() {
     }
 }
 
-/// A pose beyond the limit on speed is refused as one of this process. A partial frame without a pose keeps that of its base,
-/// and one with a pose may change no row.
+/// A pose beyond the speed limit is refused, as in a frame of this process. A partial frame without a pose keeps that
+/// of its base, and one with a pose may change no row.
 #[test]
 fn partial_frames_and_fast_ones() {
     let heart = Heart::new(Vec3::ZERO);
@@ -276,11 +276,11 @@ fn partial_frames_and_fast_ones() {
     assert_eq!(line.give(&moved, 6 * PERIOD), (None, true));
     let there = line.nearest(6 * PERIOD).expect("a surface");
     assert!((there - first - Vec3::X * 3.0).length() < 1.0, "{there} {first}");
-    // Its pose lost.
+    // Its pose is lost.
     let mut without = partial(&line, 7, 6, Some(pose(54.0)));
     without.remove(1);
     assert_eq!(line.give(&without, 7 * PERIOD), (None, false));
-    // A commit in the pose's place, whose digest is the begin's alone.
+    // A commit in the pose's place, whose digest covers only the begin.
     let [begin, _, commit] = &partial(&line, 8, 6, Some(pose(54.0)))[..] else { panic!("three") };
     let early = edited(commit, SEQUENCE, &[1, 0]);
     let early = edited(&early, BODY, &contribution(begin).to_le_bytes());
@@ -288,7 +288,8 @@ fn partial_frames_and_fast_ones() {
     assert_eq!(refused, (Some(ReceiveError::Order { sequence: 1 }), false));
 }
 
-/// A receiver whose surface has no poses refuses such a frame at its begin. One with a key takes no pose without its tag.
+/// A receiver whose surface has no poses refuses such a frame at its begin. A receiver with a key accepts no pose
+/// without its tag.
 #[test]
 fn a_pose_is_refused_where_none_is_taken_and_without_its_tag() {
     let heart = Heart::new(Vec3::ZERO);
@@ -317,7 +318,7 @@ fn a_pose_is_refused_where_none_is_taken_and_without_its_tag() {
     let frame = tagged(1, pose(50.0));
     assert_eq!(frame[1].len(), 64);
     assert_eq!(bus.packet(&frame[0], Millis(1)), Ok(Progress::Begun { epoch: 1 }));
-    // Without a tag, with a shift that is not under it, and with that of another frame.
+    // Without a tag, with a shift that the tag does not cover, and with another frame's tag.
     let forged = Err(ReceiveError::Forged { epoch: 1 });
     assert_eq!(bus.packet(&packets[1], Millis(1)), forged);
     assert_eq!(bus.packet(&edited(&frame[1], BODY + 18, &[3]), Millis(1)), forged);
@@ -371,7 +372,7 @@ fn a_sender_sends_poses() {
         }
     }
     assert!(partial > 5, "{partial}");
-    // A frame without one is where the mesh's file has it, and not where the last one was.
+    // A frame without a pose is at the mesh's own coordinates, not at the pose of the previous frame.
     let sent = sender.send(&heart.mesh.positions).expect("sent");
     assert_eq!(sent.content, Content::Whole);
     let sent = sender.send(&heart.mesh.positions).expect("sent");

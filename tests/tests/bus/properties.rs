@@ -37,8 +37,7 @@ proptest! {
         prop_assert_eq!(published(&mut reader), published(&mut expected));
     }
 
-    /// Sends frames over a line that loses, repeats, reorders and damages packets: every published frame is one that
-    /// was sent.
+    /// Over a line that loses, repeats, reorders and damages packets, every published frame is one that was sent.
     #[test]
     fn only_what_was_sent_is_published(
         faults in prop::collection::vec((0..6_u8, any::<prop::sample::Index>(), 0..512_usize), 0..30),
@@ -108,7 +107,7 @@ proptest! {
         }
     }
 
-    /// The same with right checksums and plausible fields, which reach the checks behind the checksum. A frame was
+    /// The same with correct checksums and plausible fields, which reach the checks after the checksum. A frame was
     /// begun before; without its other packets nothing is published.
     #[test]
     fn arbitrary_fields_are_survived(
@@ -163,7 +162,7 @@ proptest! {
         }
     }
 
-    /// Of boxes that are hardly inside f32's range, too, whose squares are not.
+    /// This includes boxes close to the limits of f32, whose squares overflow it.
     #[test]
     fn boxes_of_any_size_keep_their_bound(
         exponents in prop::array::uniform3(-37.0_f32..37.0),
@@ -201,7 +200,7 @@ proptest! {
             prop_assert!(!framed[..framed.len() - 1].contains(&0));
             stream.extend_from_slice(framed);
         }
-        // A damaged byte spoils only its own packet, or that one and its neighbour.
+        // A damaged byte only destroys its own packet, or that one and its neighbour.
         let mut spoiled = None;
         if let Some((at, flip)) = damage && flip != 0 {
             let at = at.index(stream.len());

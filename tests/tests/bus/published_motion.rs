@@ -1,4 +1,4 @@
-//! The motion of published frames, by which a tracker's bounds run out.
+//! The motion of published frames, which uses up a tracker's bounds.
 
 // Requirement: T-04
 
@@ -17,8 +17,8 @@ use fastrand::Rng;
 /// Vertices of the heart of 320 triangles.
 const ROWS: usize = 162;
 
-/// The tracker's answers on published frames are those of whole queries, whatever frames it never saw, and whether the
-/// frames are whole, partial, refused or given up.
+/// The tracker's answers on published frames equal those of whole queries, whatever frames it never saw, and whether
+/// frames are whole, partial, refused or abandoned.
 #[test]
 fn a_tracker_knows_the_motion_of_published_frames() {
     let mut rng = Rng::with_seed(1);
@@ -58,7 +58,7 @@ fn a_tracker_knows_the_motion_of_published_frames() {
             FrameEncoder::<_, 256>::new(id, Encoding::Float, &rows[..]).expect("valid")
         });
         if rng.u32(..8) == 0 {
-            // The frame is given up for the next.
+            // The frame is abandoned for the next one.
             packets.truncate(packets.len() / 2);
         }
         if packets.len() > 4 && rng.bool() {
@@ -110,8 +110,8 @@ fn a_tracker_knows_the_motion_of_published_frames() {
     assert_eq!(unknown, 0, "{counts:?}");
 }
 
-/// After a small step a large one is measured anew, and to its last row, whatever the gate does with its work: the frames'
-/// readings advance as those of an odometer that measures whole frames.
+/// After a small step a large one is measured again, to its last row, whatever work the gate does: the frames' readings
+/// advance as those of an odometer that measures whole frames.
 #[test]
 fn a_large_step_after_a_small_one_is_not_understated() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -123,7 +123,7 @@ fn a_large_step_after_a_small_one_is_not_understated() {
     follow(&tree, &rest, &tree);
 }
 
-/// The reading of a surface's odometer, which only its text tells.
+/// The reading of a surface's odometer, which is only in its debug text.
 fn reading(surface: &impl MovingSurface) -> u64 {
     let text = format!("{:?}", surface.motion().expect("measured"));
     let number = text.split("reading: ").nth(1).and_then(|rest| rest.split(',').next());
@@ -140,7 +140,7 @@ fn follow<G: Gate>(tree: &Tree<'_, u16>, rest: &[Vec3], gate: G) {
     let mut odometer = Odometer::new(tree);
     let (mut before, mut last) = (rest.to_vec(), 0);
     odometer.start(rest);
-    // To the side, so that another part of the surface is the nearest. The first row stays.
+    // Shifts to the side, so that another part of the surface becomes the nearest. The first row stays.
     let shifts = [0.0, 0.001, 45.0, 45.001, -30.0, -30.001];
     for (epoch, shift) in (1..).zip(shifts) {
         let far = |row: &Vec3| (row.distance(rest[0]) / 110.0).min(1.0);
@@ -165,7 +165,7 @@ fn follow<G: Gate>(tree: &Tree<'_, u16>, rest: &[Vec3], gate: G) {
     }
 }
 
-/// A frame that was published by hand has no measured motion, and neither has the next.
+/// A frame that was written directly has no measured motion, and neither has the next one.
 #[test]
 fn a_frame_published_by_hand_has_no_known_motion() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -193,6 +193,6 @@ fn a_frame_published_by_hand_has_no_known_motion() {
         assert_eq!(frame.epoch(), Some(epoch));
         readings.push(frame.motion().expect("measured"));
     }
-    // At rest a step is counted as the least possible one.
+    // At rest a step counts as the least possible one.
     assert!(readings[0] != readings[1] && readings[1] != readings[2], "{readings:?}");
 }

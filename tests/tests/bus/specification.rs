@@ -1,4 +1,4 @@
-//! `docs/wire.md` against the code: the encoders write its test vectors, and the decoder reads them.
+//! `docs/wire.md` compared with the code: the encoders write its test vectors, and the decoder reads them.
 
 // Requirement: B-07
 
@@ -23,7 +23,7 @@ const CHALLENGE: u64 = 0x89AB_CDEF_00C0_FFEE;
 /// The key of the tagged packets: bytes 0 to 15.
 const KEY: [u8; 16] = 0x0001_0203_0405_0607_0809_0A0B_0C0D_0E0F_u128.to_be_bytes();
 
-/// The vectors, in the page's order: name and bytes.
+/// The test vectors, in the page's order: name and bytes.
 fn vectors() -> Vec<(&'static str, Vec<u8>)> {
     let mut buffer = [0; 64];
     let mut all = Vec::new();
@@ -100,7 +100,7 @@ fn vectors() -> Vec<(&'static str, Vec<u8>)> {
     all
 }
 
-/// That of the last frames.
+/// The pose of the last frames.
 fn pose() -> RigidPose {
     let turn = Quat::from_xyzw(0.0, 0.0, 0.6, 0.8);
     RigidPose::new(turn, Vec3::new(1.0, -2.0, 3.0)).unwrap()

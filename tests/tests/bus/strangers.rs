@@ -1,4 +1,4 @@
-//! Strangers without the key change neither the count of rejections nor the state, and their guesses have a rate.
+//! Strangers without the key change neither the rejections' count nor the state, and the rate of guesses is measured.
 
 // Requirement: B-04
 
@@ -27,7 +27,7 @@ fn sent<M: Mac>(epoch: u32, mac: M) -> Vec<Vec<u8>> {
     collect(encoder.with_mac(mac).unwrap())
 }
 
-/// Packets that anybody can make who sees frame `epoch` and has no key, of every kind.
+/// Packets of every kind that somebody without the key can make from frame `epoch`.
 fn strays(epoch: u32, salt: u32) -> Vec<Vec<u8>> {
     let other = AesCmac::new(b"another key.....", 7, 77);
     let mut damaged = sent(epoch, &other).swap_remove(1);
@@ -51,8 +51,8 @@ fn strays(epoch: u32, salt: u32) -> Vec<Vec<u8>> {
     all
 }
 
-/// The count of rejections is the same with strangers and without: where frames are published, where they are refused,
-/// and where their begins are lost.
+/// The count of rejections is the same with and without strangers: if frames are published, if they are refused, and if
+/// their begins are lost.
 #[test]
 fn strangers_change_no_count_of_rejections() {
     for loss in ["none", "begin", "row", "all after the begin"] {
@@ -87,7 +87,7 @@ fn strangers_change_no_count_of_rejections() {
     }
 }
 
-/// Genuine begins that were refused are recorded, and replayed in turn: each frame counts once.
+/// Refused authentic begins are recorded and replayed alternately: each frame counts once.
 #[test]
 fn recorded_begins_count_once() {
     let (mut assembler, _reader) = line(mac());
@@ -117,7 +117,7 @@ fn recorded_begins_count_once() {
     assert_eq!(assembler.counters().of(Event::Base), 50 * begins.len() as u32);
 }
 
-/// Without a key, too, a stray packet of a frame far ahead hides no frame that fails later.
+/// Even without a key a stray packet of a frame far ahead does not hide a later frame that fails.
 #[test]
 fn without_a_key_nothing_mutes() {
     for ahead in [1 << 20, i32::MAX as u32 - 5] {
@@ -127,7 +127,7 @@ fn without_a_key_nothing_mutes() {
         }
         let mut before = 0;
         for epoch in 2..100 {
-            // A row of a frame far ahead; the genuine frame's begin is lost.
+            // A row of a frame far ahead; the authentic frame's begin is lost.
             let _ = give(&mut assembler, &raw(2, 1, epoch + ahead, [1, 1], 0, &[0; 12]));
             for packet in &sent(epoch, NoMac)[1..] {
                 give(&mut assembler, packet).unwrap_err();
@@ -138,8 +138,8 @@ fn without_a_key_nothing_mutes() {
     }
 }
 
-/// Forgeries at a steady rate, while genuine frames are published: the watch trips where the rate is above what is
-/// forgotten, and only there.
+/// Forgeries at a steady rate, while authentic frames are published: the limit is exceeded only if the rate is above
+/// that at which they are forgotten.
 #[test]
 fn publications_do_not_hide_forgeries() {
     let other = AesCmac::new(b"another key.....", 7, 77);
@@ -194,7 +194,7 @@ fn publications_do_not_hide_forgeries() {
     }
 }
 
-/// A stranger sends stray rows with each frame, for twenty seconds: with a key the state stays nominal.
+/// A stranger sends stray rows with each frame for twenty seconds: with a key the state stays nominal.
 #[test]
 fn strangers_change_no_state() {
     let age = Watch::new(Millis(60), Millis(120)).unwrap();
@@ -238,7 +238,7 @@ fn strangers_change_no_state() {
     }
 }
 
-/// The clock of the forgeries comes around, and nothing is forgotten or kept by that.
+/// The clock of the forgeries wraps, which neither forgets nor keeps any.
 #[test]
 fn forgeries_are_forgotten_across_the_wrap_of_the_clock() {
     let (mut assembler, _reader) = line(mac());
@@ -258,7 +258,7 @@ fn forgeries_are_forgotten_across_the_wrap_of_the_clock() {
     assert_eq!(left, [100, 90, 50, 0]);
 }
 
-/// A clock that goes back, by a packet stamped on another core, forgets no forgery.
+/// A clock that goes back, because a packet was stamped on another core, forgets no forgery.
 #[test]
 fn a_clock_that_goes_back_forgets_no_forgery() {
     let (mut assembler, _reader) = line(mac());

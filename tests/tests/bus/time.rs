@@ -1,5 +1,5 @@
-//! The times of captures: the speed limit is kept whatever ages frames state, and an age that a packet cannot state is
-//! no age at all.
+//! Times of capture: the speed limit holds whatever ages frames state, and an age that a packet cannot state does not
+//! count as known.
 
 // Requirement: B-05
 
@@ -73,8 +73,8 @@ const fn aged(age_ms: u16) -> Freshness {
     Freshness { age_ms, echo: None }
 }
 
-/// A surface captured before the published one has no time to move in, whatever age it states: by so little that a
-/// clock may jitter it is held to the limit of one millisecond, by more it is refused.
+/// A surface captured before the published one has no time to move in, whatever age it states: if the difference is
+/// within a clock's jitter, the limit of one millisecond applies; otherwise it is refused.
 #[test]
 fn no_stated_age_voids_the_speed_limit() {
     for start in [1_000, 10_u32.wrapping_neg(), 30, i32::MAX as u32 - 10] {
@@ -103,7 +103,7 @@ fn no_stated_age_voids_the_speed_limit() {
     }
 }
 
-/// A row of frames, each captured a little before the last, does not creep: no time passes back.
+/// A series of frames, each captured a little before the last, does not creep: time that goes back gives no allowance.
 #[test]
 fn captures_that_go_back_give_no_time() {
     let mut bus = Bus::new();
@@ -127,7 +127,7 @@ fn captures_that_go_back_give_no_time() {
         }
     }
     assert_eq!(way, 0.0);
-    // The jitter of a pipeline: of two sources, 5 and 45 ms old, the later captures pass, and nothing jumps.
+    // Jitter: of two sources, with ages of 5 and 45 ms, the later captures are accepted, and nothing jumps.
     let mut passed = 0;
     for number in 1..20_u32 {
         let (age, shift) = if number % 2 == 0 { (5, 0.0) } else { (45, 0.0) };
@@ -136,7 +136,7 @@ fn captures_that_go_back_give_no_time() {
     assert_eq!(passed, 9);
 }
 
-/// The same without packets: of two frames in the wrong order no velocity follows.
+/// The same without packets: two frames in the wrong order define no velocity.
 #[test]
 fn frames_written_in_the_wrong_order_are_held() {
     let frames = Frames::<1, 3>::new();
@@ -154,8 +154,8 @@ fn frames_written_in_the_wrong_order_are_held() {
     }
 }
 
-/// A source stands still behind a sender that lives, for an hour. The age that a packet cannot state is none: the
-/// surface stays the last one whose age was known, which grows old.
+/// A source stops behind a sender that is alive, for an hour. An age that a packet cannot state is unknown: the surface
+/// stays the last one whose age was known, which ages.
 #[test]
 fn a_surface_frozen_for_an_hour_is_never_nominal_again() {
     for (degraded, safe) in [(30_000, 60_000), (70_000, 90_000), (100_000, 120_000)] {
@@ -182,13 +182,13 @@ fn a_surface_frozen_for_an_hour_is_never_nominal_again() {
             }
         }
         assert_eq!(last_nominal, degraded);
-        // The source lives again.
+        // The source works again.
         assert_eq!(bus.send(0.0, 9_000_000, aged(3)), Ok(()));
         assert_eq!(bus.age(9_000_000), Millis(3));
     }
 }
 
-/// An echo that is a little ahead, because another core read its clock a little later, is no infinite way.
+/// An echo slightly ahead, because another core read its clock a little later, does not give an infinite transit time.
 #[test]
 fn an_echo_a_little_ahead_is_no_infinite_way() {
     for (ahead, transit) in [(0, 0), (1, 0), (16, 0), (17, u32::MAX), (1 << 30, u32::MAX)] {

@@ -65,7 +65,7 @@ impl Bus {
     }
 }
 
-/// A frame of weights becomes their surface, with its label, age and bound on the stretch.
+/// A frame of weights becomes its surface, with label, age and a bound on the stretch.
 #[test]
 fn weights_come_over_the_bus() {
     let mut bus = bus();
@@ -92,8 +92,7 @@ fn weights_come_over_the_bus() {
     }
 }
 
-/// Weights out of range, frames of vertices, and mixtures of two frames are refused and counted, and the last good
-/// surface stays.
+/// Weights out of range, frames of vertices, and mixed frames are refused and counted, and the last good surface stays.
 #[test]
 fn hostile_frames_of_weights_are_rejected_and_counted() {
     let mut bus = bus();
@@ -143,7 +142,7 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
     assert!(bus.send(100, &bus.recorded[8].clone()).is_ok());
 }
 
-/// A receiver of vertices takes no weights.
+/// A receiver of vertices accepts no weights.
 #[test]
 fn a_receiver_of_vertices_refuses_weights() {
     let (mut assembler, _) = dibs_tests::bus::bus();
@@ -155,8 +154,7 @@ fn a_receiver_of_vertices_refuses_weights() {
     assert_eq!(assembler.accept(begin, Millis(0)), Err(ReceiveError::Encoding));
 }
 
-/// A surface whose bound exceeds the limit is measured. Exactly the surfaces within the limit are admitted, whatever
-/// the bound.
+/// A surface whose bound exceeds the limit is measured. Those within the limit are admitted, whatever the bound.
 #[test]
 fn the_gate_is_exact_whatever_the_bound() {
     let (mesh, motion) = trembling(320, 3, 6);
@@ -192,7 +190,7 @@ fn the_gate_is_exact_whatever_the_bound() {
     assert!(bounded > 100 && measured > 20 && refused > 20);
 }
 
-/// Weights of this process: those of packets to the bit, and refused as theirs.
+/// Weights from this process: the same as in packets to the bit, and refused for the same causes.
 #[test]
 fn weights_come_by_a_call() {
     let (mut near, mut far) = (bus(), bus());

@@ -1,4 +1,4 @@
-//! The surface between frames of weights, and beyond the last.
+//! The surface between frames of weights, and its extrapolation beyond the last one.
 
 // Requirements: F-05, F-06
 
@@ -69,7 +69,7 @@ fn off(surface: &impl VertexTable, rows: &[DVec3]) -> f64 {
     found.iter().zip(rows).map(|(a, b)| a.as_dvec3().distance(*b)).fold(0.0, f64::max)
 }
 
-/// Weights part of the way from one frame to another.
+/// Weights at a fraction of the interval from one frame to another.
 fn blend(from: &[f32], to: &[f32], share: f64) -> Vec<f64> {
     let of = |(from, to): (&f32, &f32)| {
         let (from, to) = (f64::from(*from), f64::from(*to));
@@ -78,7 +78,7 @@ fn blend(from: &[f32], to: &[f32], share: f64) -> Vec<f64> {
     from.iter().zip(to).map(of).collect()
 }
 
-/// The end of the extrapolation from the second of two frames: twice as far on, within the modes' ranges.
+/// The end of the extrapolation from the second of two frames: two more intervals, within the modes' ranges.
 fn end(modes: &Modes<'_>, [from, to]: [&[f32]; 2]) -> Vec<f32> {
     let far = blend(from, to, 3.0);
     let within = |(mode, weight)| {
@@ -91,9 +91,9 @@ fn end(modes: &Modes<'_>, [from, to]: [&[f32]; 2]) -> Vec<f32> {
 /// A frame that was read: its time and weights.
 type Known = (u32, Vec<f32>);
 
-/// Frames of a wandering surface, some of them refused, and some overtaken before they are read. At every tick all three
-/// surfaces are where two frames put them, no triangle is stretched more than they state, and the tracker's answer is
-/// that of a whole query.
+/// Frames of a random motion, some of them refused, and some replaced before they are read. At every tick the held, the
+/// interpolated and the extrapolated surface follow from two frames, no triangle is stretched more than they state, and
+/// the tracker's answer equals that of a whole query.
 #[test]
 fn the_surface_between_frames_of_weights_is_where_they_put_it() {
     let mut rng = Rng::with_seed(31);
@@ -162,7 +162,7 @@ fn the_surface_between_frames_of_weights_is_where_they_put_it() {
                     _ => blend(last, last, 0.0),
                 };
                 let away = off(surface, &exact(&modes, &place));
-                // An extrapolation may be held; nothing else.
+                // Only an extrapolation may be held.
                 if away < 1e-4 {
                     moving += 1;
                 } else {
@@ -172,7 +172,7 @@ fn the_surface_between_frames_of_weights_is_where_they_put_it() {
                     );
                     held += 1;
                 }
-                // A query takes a frame's number to mean the frame.
+                // A query identifies a frame by its number.
                 let is_frame = off(surface, &held_at) < 1e-4;
                 assert!(surface.epoch().is_none() || is_frame, "{epoch}, {number}");
                 let truth = measure_stretch(tree, surface).expect("within the limit").sigma();
@@ -208,7 +208,7 @@ fn label(epoch: u32, received: u32) -> FrameLabel {
     FrameLabel { epoch, received, position_error: 0.0, stretch: None }
 }
 
-/// Publishes weights by hand.
+/// Publishes weights without a receiver.
 fn publish(writer: &mut FrameWriter<'static>, weights: &[f32], label: FrameLabel) {
     writer.begin();
     for weight in weights {
@@ -217,7 +217,7 @@ fn publish(writer: &mut FrameWriter<'static>, weights: &[f32], label: FrameLabel
     writer.publish(label).expect("complete");
 }
 
-/// Weights that no receiver publishes, out of their ranges: their motion is unknown, and so is that to the next frame.
+/// Weights out of their ranges, which no receiver publishes: their motion is unknown, and so is that to the next frame.
 #[test]
 fn weights_out_of_range_have_no_motion() {
     let mut rng = Rng::with_seed(32);
@@ -250,7 +250,7 @@ fn weights_out_of_range_have_no_motion() {
     }
 }
 
-/// Frames that a writer labels alike are not one frame: the second has its own place, and its motion is measured.
+/// Two frames with the same label are different frames: the second has its own slot, and its motion is measured.
 #[test]
 fn frames_of_one_label_are_told_apart() {
     let mut rng = Rng::with_seed(35);
@@ -274,7 +274,7 @@ fn frames_of_one_label_are_told_apart() {
     }
 }
 
-/// Two frames of one time have no velocity, and a frame read without the time is as it was received.
+/// Two frames of the same time define no velocity, and a frame read without a time is not extrapolated.
 #[test]
 fn without_a_time_between_frames_nothing_moves() {
     let mut rng = Rng::with_seed(33);
@@ -285,7 +285,7 @@ fn without_a_time_between_frames_nothing_moves() {
     let same = |frame: &ModalFrame<'_, MODES>, moved: ModalFrame<'_, MODES>| {
         positions(frame) == positions(&moved) && moved.residual().is_none()
     };
-    // Extrapolated once a third frame has shown the error.
+    // The surface is extrapolated once a third frame has shown the residual.
     let frames = [(20, [true; 2]), (40, [false, true]), (40, [true; 2]), (60, [false, true])];
     let frames = frames.into_iter().chain([(80, [false; 2])]);
     for (epoch, (now, is_held)) in (1..).zip(frames) {

@@ -1,7 +1,7 @@
-//! Dependencies between the folders of a crate point one way.
+//! Dependencies between the folders of a crate have one direction.
 //!
-//! `docs/evidence/dependencies.md` lists them, and `DIBS_WRITE=1` writes that list anew. `DIBS_CHECKOUT=FOLDER cargo test -p
-//! dibs-tests --test pages layers -- --nocapture` prints the list of another checkout.
+//! `docs/evidence/dependencies.md` lists them, and `DIBS_WRITE=1` writes that list again. `DIBS_CHECKOUT=FOLDER cargo
+//! test -p dibs-tests --test pages layers -- --nocapture` prints the list of another checkout.
 
 // Requirement: E-04
 
@@ -79,7 +79,7 @@ fn a_cycle_is_found() {
 /// Folders on cycles of imports, or that import from them; `None` without a cycle.
 fn cycle(imports: &Imports) -> Option<BTreeSet<&str>> {
     let mut left: BTreeSet<&str> = imports.keys().map(String::as_str).collect();
-    // Remove folders that import from none of the others left, until no such folder is left.
+    // Remove folders that import from none of the remaining ones, until there is no such folder.
     loop {
         let is_free = |from: &&str| !imports[*from].iter().any(|to| left.contains(to.as_str()));
         let free: Vec<&str> = left.iter().copied().filter(is_free).collect();
@@ -96,14 +96,14 @@ fn source(package: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(checkout).join(package).join("src")
 }
 
-/// The imports between the folders inside of a top folder. Its own files are its front: they may import from all, and all
-/// from them.
+/// The imports between the folders inside a top folder. Its own files are its front: they may import from all folders,
+/// and all folders from them.
 fn inner_imports(source: &Path, folder: &str) -> Imports {
     let root = source.join(folder);
     let front = fs::read_to_string(root.join("mod.rs")).expect("a source file");
     let home = homes(&front.replace("#[cfg(test)]", ""));
     let is_folder = |name: &String| {
-        // One with files besides tests.
+        // A folder with files other than tests.
         root.join(name).is_dir() && !files(&root.join(name)).is_empty()
     };
     let mut imports = Imports::new();
@@ -119,7 +119,7 @@ fn inner_imports(source: &Path, folder: &str) -> Imports {
         let code = code(&file);
         let above = "super::".repeat(module.len());
         for prefix in [format!("crate::{folder}::"), above] {
-            // A path that goes up farther, or less far, is another one.
+            // Other numbers of `super` lead to other folders.
             let code = code.replace(&format!("super::{prefix}"), "");
             to.extend(names(&code, &prefix).filter_map(|name| home.get(&name).cloned()));
         }
@@ -144,13 +144,13 @@ fn imports(package: &str) -> Imports {
         to.extend(names(&code(&file), "crate::").filter_map(|name| home.get(&name).cloned()));
         to.remove(&from);
     }
-    // A module without a folder of its own, such as `wire`, has no row.
+    // A module without its own folder, such as `wire`, has no row.
     let rows: BTreeSet<String> = imports.keys().cloned().collect();
     imports.values_mut().for_each(|to| to.retain(|to| rows.contains(to)));
     imports
 }
 
-/// The rows of the page. A name in bold is imported from both sides.
+/// The rows of the page. A name in bold is imported in both directions.
 fn table(package: &str, imports: &Imports) -> String {
     let mut rows = format!("| {package} | imports from |\n|---|---|\n");
     for (from, to) in imports {
@@ -208,7 +208,7 @@ fn words(text: &str) -> impl Iterator<Item = String> {
     text.split(is_other).filter(|word| !word.is_empty()).map(str::to_owned)
 }
 
-/// A file without its comments and its unit tests.
+/// A file without comments and unit tests.
 fn code(file: &Path) -> String {
     let text = fs::read_to_string(file).expect("a source file");
     let ends = |(at, _): &(usize, &str)| {

@@ -1,4 +1,4 @@
-//! The documents are true: figures, public items, packages, dependencies, the guide, the evidence for a device's file.
+//! Checks the documents: figures, public items, packages, dependencies, the guide, the evidence for a device's file.
 
 mod device;
 mod failures;

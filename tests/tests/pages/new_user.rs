@@ -60,7 +60,7 @@ fn the_guide_leads_to_an_answer_on_a_host_and_on_the_board() {
     guard.cargo("build --release", true);
 }
 
-/// The items that the guide's RTIC application takes from its board.
+/// The items that the guide's RTIC application needs from its board.
 const DEVICE: &str = r#"
 #![no_std]
 #![no_main]
@@ -131,7 +131,7 @@ fn block(section: &str, after: &str) -> String {
     code.split_once('\n').expect("the block's language").1.to_owned() + "\n"
 }
 
-/// The manifest with the crates of this checkout in place of the published ones.
+/// The manifest with this checkout's crates instead of the published ones.
 fn with_paths(manifest: &str) -> String {
     let path = |name: &str| Path::new(REPOSITORY).join(name).canonicalize().expect("a crate");
     let [core, build] = ["dibs-nostd", "dibs-build"].map(path);

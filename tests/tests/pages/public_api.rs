@@ -43,7 +43,7 @@ fn the_public_items_are_those_that_are_listed() {
     }
 }
 
-/// Where an item of the core's root is used: examples, products, and the code of documents.
+/// Where an item of the core's root may be used: examples, products, and the code in documents.
 const USES: [&str; 11] = [
     "examples",
     "dibs-nostd/examples",
@@ -68,7 +68,7 @@ fn every_item_of_the_root_is_in_an_example_or_a_product() {
     for place in USES {
         read_words(&Path::new(REPOSITORY).join(place), str::to_owned, &mut words);
     }
-    // The core itself counts by the examples in its documentation.
+    // In the core only the examples in its documentation count.
     read_words(&Path::new(REPOSITORY).join("dibs-nostd/src"), documented_code, &mut words);
     let unused: Vec<_> =
         items.iter().filter(|item| !words.contains(item.trim_end_matches('!'))).collect();
@@ -216,7 +216,6 @@ impl Listing {
     }
 }
 
-/// The file of a module, and the folder of its submodules.
 fn module_file(folder: &Path, name: &str) -> Option<(PathBuf, PathBuf)> {
     let inner = folder.join(name);
     let files = [folder.join(format!("{name}.rs")), inner.join("mod.rs")];

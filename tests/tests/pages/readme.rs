@@ -1,4 +1,4 @@
-//! The README's figures come from the records. `DIBS_WRITE=1` writes them anew.
+//! Checks that the README's figures are those of the records. `DIBS_WRITE=1` writes them again.
 
 // Requirements: E-02, P-11
 
@@ -86,7 +86,7 @@ refitted trees win, and [docs/evidence/guarantees.md](docs/evidence/guarantees.m
     block
 }
 
-/// One decimal below 10, none from there on.
+/// One decimal below 10, otherwise none.
 fn short(value: f64) -> String {
     match value {
         _ if value < 10.0 => format!("{value:.1}"),

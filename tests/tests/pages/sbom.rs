@@ -1,9 +1,9 @@
 //! The software bills of materials, `CycloneDX` 1.5: `docs/evidence/sbom/`, which `DIBS_WRITE=1` writes anew.
 //!
-//! Components and their dependencies are cargo's own answer for the target; hashes are those of `Cargo.lock`, and a component
-//! that it does not have fails. Neither a time nor a random number is in them, so that the same commit gives the same bytes.
-//! (`cargo cyclonedx` 0.5.9 unites the features of the workspace, so that its list of the core has a cipher that is not
-//! linked, and has the checkout's folder in every reference.)
+//! Components and their dependencies are cargo's own for the target; hashes are those of `Cargo.lock`, and a missing
+//! component fails. They contain neither a time nor a random number, so that the same commit gives the same bytes.
+//! (`cargo cyclonedx` 0.5.9 unites the features of the workspace, so that its list for the core contains a cipher that
+//! is not linked, and every reference contains the checkout's folder.)
 
 // Requirement: E-03
 
@@ -16,14 +16,14 @@ use serde_json::{Value, json};
 
 use crate::page::{self, REPOSITORY};
 
-/// Files, each with the package and its features, and the target.
+/// Output files, each with the package and its features, and the target.
 const BILLS: [(&str, &[&str], &str); 3] = [
     ("core", &["-p", "dibs-nostd"], "thumbv7em-none-eabihf"),
     ("firmware", &["-p", "firmware-example", "--features", "board"], "thumbv7em-none-eabihf"),
     ("program", &["-p", "dibs-cli"], "x86_64-unknown-linux-gnu"),
 ];
 
-/// What is linked, and what runs at compile time besides.
+/// Edges of linked packages; and of those that also run at compile time.
 const LINKED: &str = "normal,no-proc-macro";
 const ALL: &str = "normal,build";
 
@@ -55,7 +55,7 @@ fn cargo_tree(package: &[&str], target: &str, edges: &str) -> String {
 /// Name and version.
 type Package = (String, String);
 
-/// Packages with their licences, and what each depends on.
+/// Packages with their licences and dependencies.
 #[derive(Default)]
 struct Tree {
     root: Option<Package>,
@@ -88,7 +88,7 @@ impl Tree {
     }
 }
 
-/// The packages of a lock with their checksums; those of the workspace have none.
+/// The packages of a lock file with their checksums; those of the workspace have none.
 fn locked(lock: &str) -> BTreeMap<Package, Option<String>> {
     let value = |block: &str, key: &str| {
         let line = block.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = \""));
@@ -101,7 +101,7 @@ fn locked(lock: &str) -> BTreeMap<Package, Option<String>> {
     blocks.filter_map(package).collect()
 }
 
-/// The bill, or the package that the lock lacks.
+/// The bill of materials, or the package that the lock file lacks.
 fn bill(
     linked: &Tree,
     all: &Tree,

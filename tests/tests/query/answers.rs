@@ -1,7 +1,7 @@
 //! The answers of every kind of query, to the bit: a restructuring may not change them.
 //!
-//! `answers.txt` has a line a kind: a hash of all answers, and the sums of node and triangle tests. A change of the
-//! answers on purpose is recorded with `DIBS_WRITE=1`, and its commit says why.
+//! `answers.txt` has one line for each kind: a hash of all answers, and the sums of node and triangle tests. An
+//! intended change of the answers is recorded with `DIBS_WRITE=1`, and its commit states the reason.
 
 // Requirements
 
@@ -25,10 +25,10 @@ use glam::Vec3;
 /// Poses of each surface, and ticks of each walk.
 const POSES: usize = 200;
 const TICKS: usize = 240;
-/// How far contacts are looked for, in mm.
+/// Margin of the contacts, in mm.
 const MARGIN: f32 = 6.0;
 
-/// A kind's answers so far.
+/// The answers of one kind so far.
 struct Answers {
     hash: u64,
     answers: u64,
@@ -70,7 +70,7 @@ impl Answers {
         self.triangle_tests += u64::from(found.triangle_tests);
     }
 
-    /// The list, its bound and forces.
+    /// Adds the list, its bound and forces.
     fn list<const N: usize, const NEAR: usize>(&mut self, list: &Contacts<N, NEAR>, at: Vec3) {
         self.floats([list.bound(), list.accuracy()]);
         for contact in list.iter() {
@@ -108,7 +108,7 @@ impl Script {
     }
 }
 
-/// Asks of each surface and pose.
+/// Searches from each pose on each surface.
 fn poses(
     all: &mut Answers,
     mut ask: impl FnMut(&mut Answers, &mut Query<'_, u16, MAX_STACK>, &[Vec3], &Capsule),
@@ -126,7 +126,7 @@ fn poses(
     }
 }
 
-/// Walks a chain of tools past a beating heart, whose surface is between its frames or ahead of them.
+/// Walks a chain of tools past a beating heart whose surface is interpolated between frames or extrapolated.
 fn walk(
     built: &BuiltTree,
     frames: &[Vec<Vec3>],
@@ -167,7 +167,7 @@ fn every_answer_is_the_recorded_one() {
     assert_eq!(recorded.lines().count(), script.0.lines().count());
 }
 
-/// A single query's kinds.
+/// The kinds of a single query.
 fn one_by_one(script: &mut Script) {
     let cold = Options::cold();
     let few = Budget::new(100);
@@ -244,7 +244,7 @@ fn scenes(script: &mut Script) {
     }
 }
 
-/// A tracker's kinds.
+/// The kinds of a tracker.
 fn tracked(script: &mut Script) {
     let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
@@ -307,7 +307,7 @@ fn tracked(script: &mut Script) {
     });
 }
 
-/// A surface of modes, and what is measured of surfaces.
+/// A modal surface, and its measured stretch.
 fn modal(script: &mut Script) {
     let (built, _) = small(6);
     let tree = built.tree::<u16>().expect("16-bit indices");

@@ -1,5 +1,5 @@
-//! An axis at the surface, where the side is below the accuracy: no contact is less deep than it may be, and a part keeps
-//! its margin.
+//! An axis at the surface, where the side is below the accuracy: no contact's stated depth is too small, and a labelled
+//! part keeps its margin.
 
 // Requirement: S-04
 
@@ -21,7 +21,7 @@ const MARGIN: f32 = 5.0;
 const TOLERANCE: f32 = 0.02;
 const PART: u8 = 2;
 
-/// Solids, half of whose triangles are a part.
+/// Solids of whose triangles half are one labelled part.
 fn solids() -> [(Mesh, BuiltTree); 3] {
     let (corners, triangles) = cuboid(Vec3::splat(-20.0), Vec3::new(20.0, 17.0, 9.0));
     let block = Mesh { positions: corners.into(), triangles: triangles.into(), ..Mesh::default() };
@@ -34,14 +34,14 @@ fn solids() -> [(Mesh, BuiltTree); 3] {
     })
 }
 
-/// A list of contacts, its accuracy, and the side that it goes by.
+/// A list of contacts, its accuracy, and the side that it assumes.
 struct Listed {
     contacts: Vec<Contact>,
     accuracy: f32,
     side: Side,
 }
 
-/// Asks for the contacts of tools some accuracies from a triangle, on both sides of it: by a query and by a tracker.
+/// Searches contacts of tools within a few accuracies of a triangle, on both sides: with a query and a tracker.
 fn at_the_surface(
     options: &Options,
     mut check: impl FnMut(&BuiltTree, &[Vec3], [Vec3; 2], &Listed),
@@ -91,13 +91,13 @@ fn no_contact_is_less_deep_than_the_axis_may_be() {
             let is_inside = winding_number(rows, &triangles, at.as_dvec3()) > 0.5;
             (if is_inside { -distance } else { distance }) - f64::from(RADIUS)
         };
-        // Between the samples it may be less.
+        // Between the samples the separation may be smaller.
         let samples = (0..=4).map(|n| separation(from.lerp(to, n as f32 / 4.0)));
         let truth = samples.fold(f64::INFINITY, f64::min);
         let deepest = f64::from(found.contacts.first().expect("the closest").separation);
         let accuracy = f64::from(found.accuracy);
         assert!(deepest <= truth + accuracy, "{truth} {accuracy} {:?}", found.contacts);
-        // Of an axis outside it is too low by its distance from the surface, twice.
+        // For an axis outside, the stated separation is too low by twice its distance from the surface.
         let spare = 6.0 * accuracy + 2.0 * f64::from(TOLERANCE);
         assert!(deepest >= truth - spare, "{truth} {accuracy} {:?}", found.contacts);
         undefined += usize::from(found.side == Side::Undefined(NoSide::BelowAccuracy));
@@ -107,7 +107,7 @@ fn no_contact_is_less_deep_than_the_axis_may_be() {
     assert!(undefined > 1_000 && tight > 100, "{undefined} {tight}");
 }
 
-/// A tool on a part's neighbour is as near to the part as beside the surface.
+/// A tool on a neighbour of the part has the same distance from the part as beside the surface.
 #[test]
 fn a_part_keeps_its_margin_beside_a_tool_at_the_surface() {
     let (mut undefined, mut near) = (0, 0);
@@ -136,8 +136,8 @@ fn a_part_keeps_its_margin_beside_a_tool_at_the_surface() {
     assert!(undefined > 300 && near > 300, "{undefined} {near}");
 }
 
-/// Walls of a plate as thin as coordinates are rounded have no clear normal at their rim: an axis that crosses there is
-/// held, though no contact has a direction.
+/// The walls of a plate as thin as the rounding of coordinates have no clear normal at their rim: a tool whose axis
+/// crosses there gets the hold, although no contact has a direction.
 #[test]
 fn a_tool_without_a_direction_is_held() {
     let plate =

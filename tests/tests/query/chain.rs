@@ -14,7 +14,7 @@ use dibs_tests::deform::{deformed, unit};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// The joints of a chain that begins near the surface and goes anywhere.
+/// A chain's joints: it starts near the surface and continues in random directions.
 fn chain(rows: &[Vec3], rng: &mut Rng) -> Vec<Capsule> {
     let links = rng.usize(1..=8);
     let size = 30.0 * rng.f32();
@@ -105,7 +105,7 @@ fn a_budget_of_a_chain_is_kept_and_its_interval_holds() {
     assert!(cut_short > 200);
 }
 
-/// An interval that a budget left open holds with its sign too, or the answer says that no side is known.
+/// The interval of a search that a budget ended contains the signed separation as well, or the answer has no side.
 #[test]
 fn a_side_that_a_budget_left_open_is_not_stated() {
     let mut rng = Rng::with_seed(8);
@@ -225,7 +225,7 @@ fn thirteen_surfaces_and_four_capsules_cost_three_queries() {
         let best = Query::closest_in_scene(&mut scene, &instrument, &options);
         let best = best.expect("an answer").expect("one");
         whole += cost(&best.proximity);
-        // One query of one capsule on the surface that is closest.
+        // Compared with one query of one capsule on the closest surface.
         let found = single.closest(surfaces[best.surface], &instrument[3], &options);
         one += cost(&found.expect("an answer"));
         if tick % 50 == 0 {
@@ -239,7 +239,7 @@ fn thirteen_surfaces_and_four_capsules_cost_three_queries() {
     assert!(share <= 3.0, "{share}");
 }
 
-/// Instruments in and across organs: a tool deep inside one is far from its surface, and another may be closer.
+/// Instruments in and across organs: a tool deep inside one surface is far from it, and another surface may be closer.
 #[test]
 fn no_tool_inside_a_surface_of_a_scene_is_missed() {
     let (built, organs) = organs(60.0);
@@ -298,7 +298,7 @@ fn listed(contacts: &Contacts<256, 4096>) -> Found {
     in_order(contacts.iter().map(at).collect())
 }
 
-/// One call has the contacts of every pair, also of a tool that is inside a far surface.
+/// One call finds the contacts of every pair, including those of a tool inside a far surface.
 #[test]
 fn the_contacts_of_a_scene_are_those_of_its_pairs() {
     const MARGIN: f32 = 20.0;
@@ -334,7 +334,7 @@ fn the_contacts_of_a_scene_are_those_of_its_pairs() {
         let (found, expected) = (listed(&contacts), in_order(expected));
         assert_eq!(found.len(), expected.len(), "{found:?} {expected:?}");
         for (one, other) in found.iter().zip(&expected) {
-            // Two searches may find the depth of a crossing axis at two points.
+            // Two searches may find the depth of a crossing axis at different points.
             let is_same = (one.0, one.1) == (other.0, other.1) && (one.2 - other.2).abs() < 0.1;
             assert!(is_same, "{one:?} {other:?}");
         }
@@ -425,7 +425,7 @@ fn contacts_of_a_scene_refuse_what_those_of_a_pair_do() {
     let refused = ask(f32::NAN, &mut contacts);
     assert!(matches!(refused, Err(QueryError::Margin { .. })), "{refused:?}");
     assert!(contacts.is_empty() && contacts.within(0.0).is_err());
-    // An error in the middle leaves no contact of the surfaces before.
+    // After an error in the middle no contacts of the earlier surfaces remain.
     let mut broken = organs[0].clone();
     broken.truncate(7);
     let mut other = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
@@ -435,13 +435,13 @@ fn contacts_of_a_scene_refuse_what_those_of_a_pair_do() {
     assert!(contacts.is_empty() && contacts.within(0.0).is_err());
 }
 
-/// Four capsules behind a tip, together this long (mm).
+/// Four capsules behind a tip, with this total length (mm).
 fn instrument(tip: Vec3, heading: Vec3, length: f32) -> [Capsule; 4] {
     let joints = [1.0, 0.37, 0.21, 0.1, 0.0].map(|behind: f32| tip - behind * length * heading);
     [0, 1, 2, 3].map(|link| Capsule::new(joints[link], joints[link + 1], 3.0).expect("finite"))
 }
 
-/// The least separation of all pairs, one by one.
+/// The least separation of all pairs, searched one by one.
 fn least(
     query: &mut Query<'_, u16, MAX_STACK>,
     surfaces: &[&[Vec3]],
@@ -455,7 +455,7 @@ fn least(
     least.expect("answers")
 }
 
-/// Thirteen hearts in a grid of this spacing (mm), each turned differently; they reach into one another below 150.
+/// Thirteen hearts in a grid of this spacing (mm), each rotated differently; below 150 mm they overlap.
 fn organs(spacing: f32) -> (BuiltTree, Vec<Vec<Vec3>>) {
     let mesh = generate::heart(2_000).expect("a valid size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");

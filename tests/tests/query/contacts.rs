@@ -1,4 +1,4 @@
-//! Contacts against an exhaustive list in f64, and their force and inequalities.
+//! Contacts compared with an exhaustive list in f64, and their force and inequalities.
 //!
 //! One file, because all tests compare with the same list.
 
@@ -18,25 +18,25 @@ use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
 const MARGIN: f32 = 6.0;
-/// The library's least height of a ridge beside a contact at this distance, without its accuracy.
+/// The library's least prominence of a contact at this distance, without its accuracy.
 fn least_ridge(distance: f64) -> f64 {
     distance.min(f64::from(MARGIN)) / 128.0
 }
 
-/// Distance of two directions that are certain to be much the same: the library's is 0.125, with its rounding.
+/// Distance between two unit directions that certainly count as alike: the library's is 0.125, with its rounding.
 const LIKE: f32 = 0.11;
 
-/// A valley of the distance over the surface.
+/// A basin of the distance over the surface.
 #[derive(Clone, Copy, Debug)]
 struct Valley {
     distance: f64,
-    /// Height of the lowest ridge to a lower valley, above this one.
+    /// Height of the lowest ridge to a lower basin, relative to this basin's minimum.
     ridge: f64,
     /// Product of the axis' direction with the normal of the lowest triangle.
     up: f64,
 }
 
-/// Every valley in f64, and the valley of every triangle. Ridges up to [`least_ridge`] part no valleys.
+/// Every basin in f64, and the basin of every triangle. Ridges up to [`least_ridge`] do not separate basins.
 fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valley>, Vec<usize>) {
     let mut across = HashMap::new();
     for (row, &[a, b, c]) in triangles.iter().enumerate() {
@@ -49,7 +49,7 @@ fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valle
     let pairs: Vec<_> = (0..triangles.len()).map(|row| closest_pair(start, end, at(row))).collect();
     let mut order: Vec<usize> = (0..triangles.len()).collect();
     order.sort_by(|&a, &b| pairs[a].distance.total_cmp(&pairs[b].distance));
-    // The valley that each triangle drains into: with all ridges, and without the low ones.
+    // The basin that each triangle belongs to: with all ridges, and without the low ones.
     let (mut all, mut one) = (vec![usize::MAX; order.len()], vec![usize::MAX; order.len()]);
     let bottom = |of: &[usize], mut row: usize| {
         while of[row] != row {
@@ -94,7 +94,7 @@ fn valleys(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Valle
     (found.collect(), labels)
 }
 
-/// Triangles with their neighbours, distances and directions to the tool, in f64.
+/// Triangles with their neighbours, their distances, and the directions to the tool, in f64.
 struct Surroundings {
     neighbours: Vec<[Option<usize>; 3]>,
     distances: Vec<f64>,
@@ -128,8 +128,8 @@ impl Surroundings {
         Self { neighbours, distances, edges, directions }
     }
 
-    /// Whether a way leads from one triangle to another over no ridge above the higher one, and over none that sees the tool
-    /// in another direction than either.
+    /// Whether a path connects two triangles without a ridge above the higher one, and without a triangle whose
+    /// direction to the tool differs from both.
     fn connect(&self, [one, other]: [usize; 2]) -> bool {
         let most = self.distances[one].max(self.distances[other]);
         let top = most + least_ridge(most);
@@ -198,16 +198,16 @@ fn no_contact_is_missing_and_none_is_doubled() {
                 open += usize::from(closest.lower < closest.separation);
             }
             let (truth, label) = valleys(&rows, &triangles, [from, to]);
-            // An axis that crosses may be inside in several parts, of which one is a contact.
+            // An axis that crosses may be inside in several parts, but only one of these has a contact.
             let is_bounded = is_crossing && contacts.bound() == closest.lower;
             assert!((contacts.bound() >= MARGIN || is_bounded) && !contacts.is_full());
             let surroundings = Surroundings::of(&rows, &triangles, [from, to]);
             let mut found = vec![Vec::new(); truth.len()];
-            // The first contact of an axis that crosses is its deepest point, and stands for where it crosses.
+            // The first contact of a crossing axis is its deepest point, and represents the whole crossing.
             let accuracy = f64::from(contacts.accuracy());
             for contact in contacts.iter().skip(usize::from(is_crossing)) {
                 let valley = label[contact.triangle.0 as usize];
-                // Walls in other directions are contacts of their own, and part those beside them.
+                // Walls in other directions are separate contacts, and separate those beside them.
                 let is_same = |other: &Contact| {
                     let rows = [contact, other].map(|at| at.triangle.0 as usize);
                     contact.normal.distance(other.normal) < LIKE && surroundings.connect(rows)
@@ -242,7 +242,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
     assert!(open > 0, "no interval that is longer than a point");
 }
 
-/// Most of up to several thousand triangles within the margin lead down to a contact, and are not kept.
+/// Most of the several thousand triangles within the margin lead downhill to a contact, and are not stored.
 #[test]
 fn a_fine_surface_needs_little_room() {
     let waves = |x: f32, y: f32| 2.5 * (0.4 * x).sin() * (0.3 * y).cos();
@@ -259,7 +259,7 @@ fn a_fine_surface_needs_little_room() {
         assert!(contacts.bound() >= MARGIN, "{cells}: only within {}", contacts.bound());
         contacts.len()
     };
-    // Facets move ridges, which part contacts or not; but 40 times the triangles make no more of them.
+    // Facets move ridges, which separate contacts or do not; but 40 times as many triangles do not make more contacts.
     let counts = [20, 40, 80, 126].map(found);
     assert!(counts.iter().all(|count| (4..=12).contains(count)), "{counts:?}");
 }
@@ -283,7 +283,7 @@ fn a_flat_wall_along_a_capsule_is_one_contact() {
     }
 }
 
-/// At the tip of a cone the axis is on the inner side of the triangles behind, which are as close as those before it.
+/// At the tip of a cone the axis is on the inner side of the triangles behind it, which are as close as those in front.
 #[test]
 fn the_tip_of_a_cone_is_a_contact_from_all_around() {
     let around = |at: u32| {
@@ -424,8 +424,7 @@ fn no_budget_hides_a_contact_at_a_vertex() {
     assert!(bounded > 20, "{bounded}");
 }
 
-/// Inside the surface, the nearest triangle found within a short budget may be on the far side: its force would point
-/// inwards.
+/// Inside, the nearest triangle found within a small budget may be on the far side: its force would point inwards.
 #[test]
 fn no_budget_turns_the_force_inwards() {
     let mesh = ball(4);
@@ -503,7 +502,7 @@ fn what_cannot_be_asked_is_named() {
     assert!(contacts.is_empty());
 }
 
-/// Contacts that repeat one wall push like that wall, up to the compliance.
+/// Several contacts with one wall push like that wall, up to the compliance.
 #[test]
 fn one_wall_is_never_two() {
     let mesh = sheet(20, 60.0, |_, _| 0.0);
@@ -524,7 +523,7 @@ fn one_wall_is_never_two() {
         let part = found.force.z / 2.0;
         assert!((0.99..1.07).contains(&part), "{count}: {part}");
     }
-    // A wall that approaches the tool counts like a tool that approaches the wall, for damper and row alike.
+    // A wall that approaches the tool has the same effect as the opposite, on the damper and on the row.
     let damped = Proxy::new(SpringDamper::stiffness(1.0).damping(0.01).max_force(50.0), 3.0);
     let mut moving = contact;
     moving.velocity = Vec3::Z * 40.0;
@@ -534,6 +533,6 @@ fn one_wall_is_never_two() {
     let met = one.wrench(Ok(std::iter::once(&moving)), 0.0, tool.centre(), Vec3::ZERO, Vec3::ZERO);
     assert!(pushed.force.distance(met.force) < 1e-5 && pushed.force.z > 2.3, "{pushed:?} {met:?}");
     let row = VelocityRow::new(&moving, 0.0, tool.centre()).stand_off(0.5).gain(10.0);
-    // The wall's 40 mm/s, less 10 a second of the half mm that is left.
+    // The wall's 40 mm/s, minus 10 a second times the remaining half millimetre.
     assert!(row.allows(Vec3::Z * 35.1, Vec3::ZERO) && !row.allows(Vec3::Z * 34.9, Vec3::ZERO));
 }

@@ -1,4 +1,4 @@
-//! Depths whose search a limit ends: by the budget, or by the most work that a depth may take.
+//! Depths whose search is ended by a limit: by the budget, or by the largest work for a depth.
 
 // Requirements: A-03, S-03
 
@@ -22,8 +22,8 @@ fn two_balls() -> Mesh {
     Mesh { positions, triangles, ..Mesh::default() }
 }
 
-/// An axis that meets the surface in several places: wherever the budget ends, the interval holds what the whole search
-/// finds.
+/// An axis that meets the surface in several places: wherever the budget ends the search, the interval contains the
+/// result of the complete search.
 #[test]
 fn an_axis_through_several_walls_is_as_deep_under_any_budget() {
     let meshes = [two_balls(), ball(2)];
@@ -54,7 +54,7 @@ fn an_axis_through_several_walls_is_as_deep_under_any_budget() {
     assert!(cut > 500 && crossing > 500, "{cut} {crossing}");
 }
 
-/// A row of bodies, each of which has leaves of other sizes.
+/// A row of bodies with leaves of different sizes.
 fn row_of_bodies(count: usize, rng: &mut Rng) -> Mesh {
     let mut row = Mesh::default();
     for place in 0..count {
@@ -77,14 +77,14 @@ fn along_a_row(rng: &mut Rng) -> Capsule {
     Capsule::new(from, to, 0.5).expect("a valid tool")
 }
 
-/// Whether the answer that a budget ended holds the whole one.
+/// Whether the interval of an answer that a budget ended contains the complete search's.
 fn holds(part: &Proximity, whole: &Proximity) -> bool {
     let (all, part) = (whole.interval(), part.interval());
     part.lower <= all.upper && all.lower <= part.upper
 }
 
-/// Where a search ends between two bodies that the axis passes, few tests are left, which are enough for an end of the axis:
-/// what is between that and the first body was not searched.
+/// If a search ends between two bodies that the axis crosses, a few tests are left, enough for one end of the axis:
+/// what is between that end and the first body was not searched.
 #[test]
 fn a_search_that_ended_knows_not_where_the_axis_meets_the_surface() {
     let (mut cut, mut rng) = (0, Rng::with_seed(3));
@@ -111,7 +111,7 @@ fn a_search_that_ended_knows_not_where_the_axis_meets_the_surface() {
     assert!(cut > 1_000, "{cut}");
 }
 
-/// A flat body along x, bent to waves: an axis along it enters and leaves it several times.
+/// A flat, wavy body along x: an axis along it enters and leaves it several times.
 fn waves(splits: u32, rng: &mut Rng) -> Mesh {
     let mut mesh = ball(splits);
     let (thin, high) = (2.0 + 8.0 * rng.f32(), 15.0 + 20.0 * rng.f32());
@@ -125,7 +125,8 @@ fn waves(splits: u32, rng: &mut Rng) -> Mesh {
     mesh
 }
 
-/// The same of a tracker's tick, where its triangles run out: beyond the one place that it knows, the axis would be outside.
+/// The same for a tracker's tick that runs out of stored triangles: beyond the single one that it knows, the axis would
+/// count as outside.
 #[test]
 fn a_tick_that_ended_knows_not_where_the_axis_meets_the_surface() {
     let (mut cut, mut rng) = (0, Rng::with_seed(5));
@@ -165,8 +166,7 @@ fn a_tick_that_ended_knows_not_where_the_axis_meets_the_surface() {
     assert!(cut > 1_000, "{cut}");
 }
 
-/// Around the middle of a ball all vertices are equally far, so that each point of the axis takes a search of the whole
-/// tree.
+/// Near a ball's centre all vertices are equally far, so that each point of the axis needs a search of the whole tree.
 #[test]
 fn a_depth_takes_no_more_work_than_it_states() {
     let mesh = ball(5);
@@ -181,7 +181,7 @@ fn a_depth_takes_no_more_work_than_it_states() {
     let most = (tree.node_count() * 3 / 2).max(4_608);
     println!("{} of {most}, beside {}", found.work(), closest.work());
     assert_eq!(found.side, Side::Inside);
-    // The side's own work comes first.
+    // The work for the side comes first.
     assert!(found.work() <= closest.work() + most + 512, "{found:?} {closest:?} {most}");
     assert!(found.work() > closest.work() + most / 2, "the limit was not met");
 }

@@ -1,5 +1,5 @@
-//! Whole queries against exhaustive search in f64: every construction, both index widths, spheres and capsules,
-//! deformations up to the limit. No separation may be off by more than the stated accuracy.
+//! Complete queries compared with exhaustive search in f64: every construction, both index widths, spheres and
+//! capsules, deformations up to the limit. The error of a separation may not exceed the stated accuracy.
 
 // Requirement: A-01
 
@@ -13,7 +13,7 @@ use dibs_tests::{ask, sample, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// Least queries of a case: it ends after a round of all kinds of deformation.
+/// Least number of queries of a case, which ends after a round of all kinds of deformation.
 const QUERIES: usize = if cfg!(debug_assertions) { 90 } else { 4_500 };
 
 /// Poses tried on each deformation.
@@ -99,7 +99,7 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
     tally
 }
 
-/// The error of an answer's separation in units of its accuracy; asserts that its parts agree.
+/// The error of an answer's separation in units of its accuracy; asserts that the parts of the answer agree.
 fn check(rows: &[Vec3], tool: &Instrument, truth: &OraclePair, found: &Proximity) -> f64 {
     let accuracy = f64::from(found.accuracy);
     let corners = found.corners.map(|v| rows[v as usize]);
@@ -125,7 +125,7 @@ fn check_interval(truth: &OraclePair, cut: &Proximity, budget: Budget) {
     assert!(inside, "{budget:?} {cut:?} {truth:?}");
 }
 
-/// Runs cases on all cores and prints the outcome of each. Returns the number of queries.
+/// Runs cases on all cores and prints the result of each. Returns the number of queries.
 fn run_all(cases: &[Case<'_>]) -> usize {
     let next = std::sync::atomic::AtomicUsize::new(0);
     let total = std::sync::atomic::AtomicUsize::new(0);
@@ -198,7 +198,7 @@ fn real_meshes_agree_with_exhaustive_search() {
     let meshes = names.map(|name| read(name).unwrap_or_else(|e| panic!("{e}")).mesh);
     let (queries, mut cases) = (sample(QUERIES), Vec::new());
     for (name, mesh) in names.iter().zip(&meshes) {
-        // Most of the test's time is in building the largest one's trees: the first two are its sample.
+        // Building the largest mesh's trees takes most of the test's time: the first two are its sample.
         let kinds = if *name == "brain_50k" { sample(KINDS) } else { KINDS };
         let queries = queries * 1_000 / mesh.triangles.len().max(1_000);
         cases.extend(cases_of(name, mesh, kinds, queries));
@@ -208,7 +208,7 @@ fn real_meshes_agree_with_exhaustive_search() {
     assert!(cfg!(debug_assertions) || total >= sample(20_000), "{total}");
 }
 
-/// An open sheet with triangles of very different sizes and shapes, slivers among them.
+/// An open sheet with triangles of very different sizes and shapes, including slivers.
 fn sheet(cells: u32) -> Mesh {
     let mut rng = Rng::with_seed(7);
     let side = cells + 1;

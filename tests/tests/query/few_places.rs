@@ -1,4 +1,4 @@
-//! A list with few places says truly how far it is complete: against the same list with room for every triangle near it.
+//! A short list of contacts states correctly how far it is complete: compared with one with room for every triangle.
 
 // Requirement: S-05
 
@@ -11,13 +11,13 @@ use dibs_tests::surfaces::sheet;
 use fastrand::Rng;
 use glam::Vec3;
 
-/// Two contacts within this angle (radians) may be one, with the rounding of the library's directions.
+/// Directions (radians) of two contacts within this angle may count as one, including the library's rounding.
 const ALIKE: f32 = 0.14;
 
-/// Poses a mesh and a number of places.
+/// Poses for each mesh and size of the list.
 const POSES: usize = 12_000;
 
-/// The vertices next to each, by rows.
+/// The vertices next to each vertex, by rows.
 fn neighbours(corners: impl Iterator<Item = [u32; 3]>, vertices: usize) -> Vec<Vec<u32>> {
     let mut next = vec![Vec::new(); vertices];
     for [a, b, c] in corners {
@@ -28,7 +28,7 @@ fn neighbours(corners: impl Iterator<Item = [u32; 3]>, vertices: usize) -> Vec<V
     next
 }
 
-/// Contacts that the short list's bound promises and that are not in it.
+/// Contacts below the short list's bound that are not in it.
 fn missing<const NEAR: usize>(mesh: &Mesh, seed: u64) -> Vec<String> {
     let built = Builder::new().build(mesh).unwrap();
     let tree = built.tree::<u16>().unwrap();
@@ -57,7 +57,7 @@ fn missing<const NEAR: usize>(mesh: &Mesh, seed: u64) -> Vec<String> {
                 one.separation <= contact.separation + slack
                     && one.normal.dot(contact.normal) > ALIKE.cos()
             };
-            // Over a corner and an edge from there, the surface leads on down.
+            // Across a corner and along an edge, the surface leads further downhill.
             let distance = contact.separation + tool.radius();
             let level = (distance * (1.0 + 1.0 / 512.0)).max(distance + margin / 128.0);
             let height = |row: u32| tool.axis_distance_squared(rows[row as usize]).sqrt();
@@ -91,7 +91,7 @@ fn no_wall_is_missing_below_a_short_lists_bound() {
 
 #[test]
 fn a_valley_whose_ridge_is_an_edge_with_something_lower_beyond_is_a_contact() {
-    // Seen from above, the triangle's corner at the edge is obtuse, and the edge opposite is the nearest to the tool.
+    // Seen from above, the triangle's corner at the edge is obtuse, and the opposite edge is nearest to the tool.
     let [corner, along, third] = [[2.0, 0.0], [1.0, 6.0], [2.02, -2.0]];
     let flat = |[x, y]: [f32; 2]| Vec3::new(x, y, -6.0);
     let positions = vec![flat(corner), flat(along), flat(third), Vec3::new(4.0, 2.0, -2.0)];

@@ -1,5 +1,5 @@
-//! A filter of commands: no tick of adversarial walks comes nearer than the stand-off without saying so, and none brakes along
-//! a wall.
+//! A filter of commands: no tick of adversarial walks comes closer than the stand-off unless its reason says so, and no
+//! tick brakes along a wall.
 
 // Requirements: C-05, C-06
 
@@ -44,7 +44,7 @@ fn no_walk_comes_nearer_than_the_stand_off() {
     println!("{all:?}");
     assert_eq!((all.violations, all.uncertain, all.too_fast, all.cries), (0, 0, 0, 0));
     assert!(all.most_instructions <= 200_000);
-    // The walks do reach the walls, and the filter does admit motions there.
+    // The walks must reach the walls, and motions must be admitted there.
     let admitted: u64 = all.reasons.iter().sum();
     assert!(all.near > all.ticks / 2 && all.reasons[1] > all.ticks / 5);
     assert!(admitted > all.ticks / 2 && all.below > all.ticks / 100);
@@ -63,7 +63,7 @@ fn along_a_wall_it_does_not_brake() {
     }
 }
 
-/// A surface at rest, and a tool that asks.
+/// A surface at rest, and a tool with a filter.
 struct Bench {
     built: BuiltTree,
     rows: Vec<Vec3>,
@@ -143,7 +143,7 @@ fn bad_input_is_named() {
     bench.uncertainty = Uncertainty::NONE;
     bench.own = vec![MotionRow::along(Vec3::X, -9.0); 9];
     assert_eq!(bench.ask(&tool, &step), Err(FilterError::Rows { found: 9, most: 8 }));
-    // A leap is shortened to the robot's speed.
+    // A large command is shortened to the robot's speed.
     bench.own.clear();
     let leap = Motion::new(tool.start(), Vec3::splat(1e30), Vec3::splat(-1e9));
     let admitted = bench.ask(&tool, &leap).expect("an answer");
@@ -151,7 +151,7 @@ fn bad_input_is_named() {
     assert_ne!(admitted.reason, Reason::Commanded);
 }
 
-/// A tool that begins inside, crossing, or nearer than its stand-off leaves, and the reason says so until it is out.
+/// A tool that starts inside, crossing, or closer than its stand-off moves out, and the reason says so until it is out.
 #[test]
 fn a_start_too_near_leads_out_and_is_no_pass() {
     let mesh = ball(2);
@@ -164,7 +164,7 @@ fn a_start_too_near_leads_out_and_is_no_pass() {
         (capsule(Vec3::Z * 36.0, Vec3::new(3.0, 1.0, 60.0)), 1.0),
         (capsule(Vec3::Z * 20.0, Vec3::new(3.0, 1.0, 30.0)), 1.0),
         (capsule(Vec3::Z * 41.5, Vec3::Z * 60.0), 1.0),
-        // A stand-off beyond what the start has.
+        // A stand-off that exceeds the initial separation.
         (capsule(Vec3::Z * 45.0, Vec3::Z * 60.0), 9.0),
     ];
     for (number, (mut tool, stand_off)) in starts.into_iter().enumerate() {
@@ -185,7 +185,7 @@ fn a_start_too_near_leads_out_and_is_no_pass() {
     }
 }
 
-/// Between walls that close, nothing is safe in the end.
+/// Between walls that close, no motion is safe in the end.
 #[test]
 fn a_gap_too_narrow_is_said() {
     let gap = sheet(12, 40.0, |x, _| 30.0 * ((x.abs() - 3.5) / 3.0).clamp(0.0, 1.0));
@@ -199,7 +199,7 @@ fn a_gap_too_narrow_is_said() {
 #[test]
 fn rows_of_the_caller_hold() {
     let mut bench = Bench::new(&ball(2), 1.0);
-    // A remote centre on the shaft: no motion across it there.
+    // A remote centre of motion on the shaft: no motion across the shaft there.
     let (tip, port) = (Vec3::new(0.3, 0.2, 42.02), Vec3::new(5.0, 2.0, 100.0));
     let tool = capsule(tip, port);
     let shaft = (port - tip).normalize();
@@ -244,8 +244,8 @@ fn nothing_unverified_is_admitted() {
     assert!((1..5).contains(&admitted), "{admitted}");
 }
 
-/// Straight against a wall, with a time constant of 20 ms: the speed falls with the distance, and reaches the stand-off;
-/// along the wall and away from it nothing changes.
+/// Straight towards a wall with a time constant of 20 ms the speed decreases with the distance, and the stand-off is
+/// reached; along the wall and away from it nothing changes.
 #[test]
 fn an_approach_takes_its_time() {
     const TIME: f32 = 0.02;
@@ -258,7 +258,7 @@ fn an_approach_takes_its_time() {
     let push = Vec3::Z * -0.2;
     let (mut height, mut eased) = (10.0, 0);
     for _ in 0..400 {
-        // Above the stand-off, by the tool's radius.
+        // Distance from the stand-off, which includes the tool's radius.
         let room = height - 2.0;
         let most = room * bench.period / TIME;
         let admitted = asked(height, push);

@@ -1,4 +1,4 @@
-//! Meshes with some nearly flat triangles: answers stay right, and rounding on the bus does not count as stretch.
+//! Meshes with some nearly flat triangles: answers stay correct, and rounding on the bus does not count as stretch.
 
 // Requirement: A-01
 
@@ -13,8 +13,8 @@ use dibs_tests::{ask, sample, stretch, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A heart some of whose triangles have a corner nearly on the opposite edge, or nearly on another corner. The flattest
-/// has a height of `flattest` of its longest edge.
+/// A heart with some triangles that have a corner nearly on the opposite edge, or nearly on another corner. The
+/// flattest one's height is `flattest` times its longest edge.
 fn with_flat_triangles(flattest: f32, rng: &mut Rng) -> Mesh {
     let mut mesh = generate::heart(320).expect("a valid size").mesh;
     let mut touched = vec![false; mesh.positions.len()];
@@ -34,7 +34,7 @@ fn with_flat_triangles(flattest: f32, rng: &mut Rng) -> Mesh {
     mesh
 }
 
-/// Answers are right in all deformations within the limits, with one limit for all triangles and with one for each.
+/// Answers are correct in all deformations within the limits, with one limit for all triangles and with one for each.
 #[test]
 fn answers_are_right_whatever_is_flat() {
     let mut rng = Rng::with_seed(41);
@@ -76,8 +76,8 @@ fn answers_are_right_whatever_is_flat() {
     println!("largest error: {worst:.2} of the stated accuracy");
 }
 
-/// A band is very low at rest, and now as high as its limit allows. Its distances at rest do not bound its present
-/// ones.
+/// A band has a very small height at rest, and now the largest that its limit allows. Its distances at rest do not
+/// bound the present ones.
 #[test]
 fn what_is_flat_may_unfold() {
     let mut rng = Rng::with_seed(43);
@@ -111,7 +111,7 @@ fn what_is_flat_may_unfold() {
 }
 
 /// Rounding to 16 bits on the bus moves a vertex by more than the height of such a triangle. The measured stretch of a
-/// frame at rest hardly grows.
+/// frame at rest hardly increases.
 #[test]
 fn a_bus_that_rounds_does_not_stretch_what_is_flat() {
     let mut rng = Rng::with_seed(42);

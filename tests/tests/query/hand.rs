@@ -1,5 +1,5 @@
-//! A hand pushes an instrument into surfaces: the force of all contacts holds it everywhere, the force of the closest
-//! pair does not.
+//! A hand pushes an instrument into surfaces: the force of all contacts keeps it out everywhere, but the force of the
+//! closest pair does not.
 
 // Requirement: C-03
 
@@ -24,12 +24,12 @@ fn a_hand_does_not_get_through() {
     assert_eq!(alone_failed, ["corner", "groove"]);
 }
 
-/// Commands that are filtered do not get in.
+/// Filtered commands do not penetrate.
 #[test]
 fn a_hand_s_commands_do_not_get_through() {
     for scene in scenes() {
         let pushed = scene.command(true);
-        // The stand-off is 0; it comes near, and not in.
+        // The stand-off is 0: the instrument comes close, but does not penetrate.
         assert!((-0.011..0.1).contains(&pushed.least), "{}: {pushed:?}", scene.name);
     }
 }

@@ -1,4 +1,4 @@
-//! Frames that are held: whether the odometer measures their motion or starts anew, the answers are the same.
+//! Frames that are held: the answers are the same whether the odometer measures their motion or starts again.
 
 // Requirement: T-01
 

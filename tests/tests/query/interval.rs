@@ -1,8 +1,8 @@
-//! The certified interval at both of its ends, as the budget grows and from tick to tick.
+//! Both bounds of the certified interval, as the budget grows and from tick to tick.
 //!
-//! The interval of every answer holds the truth. A larger budget for the same query widens neither end beyond the
-//! accuracy. From tick to tick, with a warm start, the lower end may fall although nothing has moved, because tests are
-//! spent elsewhere.
+//! The interval of every answer contains the true separation. A larger budget for the same query widens neither bound
+//! beyond the accuracy. From tick to tick, with a warm start, the lower bound may decrease although nothing has moved,
+//! because tests are spent elsewhere.
 
 // Requirements
 
@@ -19,12 +19,13 @@ use fastrand::Rng;
 /// Frames of each kind of deformation, and poses on each.
 const FRAMES: usize = 4;
 const POSES: usize = 30;
-/// Growing budgets of one query, from zero on.
+/// Number of increasing budgets of one query, from zero on.
 const BUDGETS: u32 = 24;
 /// Ticks of one pose, each warm-started from the last.
 const TICKS: usize = 6;
 
-/// The distance of each end beyond the truth, in units of the stated accuracy: at most 1 is right.
+/// The distance of the true separation from each bound, if it is outside the interval, in units of the accuracy: at
+/// most 1 is correct.
 fn beyond(found: &Proximity, truth: &OraclePair) -> [f64; 2] {
     let accuracy = f64::from(found.accuracy);
     let lower = f64::from(found.lower) - truth.separation;
@@ -62,7 +63,7 @@ fn both_ends_hold_the_truth_and_close_in_on_it_as_the_budget_grows() {
             let options =
                 if rng.bool() { Options::cold().stretch(measured) } else { Options::cold() };
 
-            // The same query with growing budgets.
+            // The same query with increasing budgets.
             let mut before: Option<Proximity> = None;
             let mut budget = Budget::new(0);
             for _ in 0..BUDGETS {

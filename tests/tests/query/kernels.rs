@@ -1,5 +1,5 @@
-//! The tool kernels against the f64 oracle, within the core's stated accuracy: every shape of triangle with every kind
-//! of axis, at every scale.
+//! The tool kernels compared with the f64 oracle, within the core's stated accuracy: every shape of triangle with every
+//! kind of axis, at every scale.
 //!
 //! One file, because all tests draw from the same cases.
 
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 /// Half a unit in the last place of 1.
 const U: f64 = 1.0 / 16_777_216.0;
-/// Lengths below 1e-15 count as zero, and a few of them may add up.
+/// Lengths below 1e-15 count as zero, and several of them may add up.
 const FLOOR: f64 = 5e-15;
 /// Cases for each combination of shape, axis and frame.
 const CASES: usize = if cfg!(debug_assertions) { 300 } else { 5000 };
@@ -26,7 +26,7 @@ fn vector(rng: &mut fastrand::Rng) -> Vec3 {
     Vec3::new(next(), next(), next())
 }
 
-/// A number between 10^low and 10^high, with equally likely decades.
+/// A number between 10^low and 10^high, with all decades equally likely.
 fn decades(rng: &mut fastrand::Rng, low: f32, high: f32) -> f32 {
     10f32.powf(low + (high - low) * rng.f32())
 }
@@ -150,7 +150,7 @@ struct Case {
 }
 
 impl Case {
-    /// The size `S` to which the stated accuracy is relative.
+    /// The size `S` that the stated accuracy is relative to.
     fn size(&self) -> f64 {
         let start = self.start.as_dvec3();
         let reach = self.corners.map(|c| c.as_dvec3().distance(start)).into_iter();
@@ -161,14 +161,13 @@ impl Case {
         f64::from(ACCURACY) * self.size() + FLOOR
     }
 
-    /// The truth, certified from both sides.
+    /// The true distance, certified from both sides.
     fn truth(&self) -> f64 {
         let start = self.start.as_dvec3();
         let end = self.end.as_dvec3() - start;
         let corners = self.corners.map(|c| c.as_dvec3() - start);
         let pair = closest_pair(DVec3::ZERO, end, corners);
-        // The rounding of a short pair's direction has the size as its lever: only pairs of some length can be
-        // certified from below.
+        // The rounding of a short pair's direction grows with the size: only long pairs can be certified from below.
         let size = self.size();
         if pair.distance > 1e-6 * size {
             let doubt = 1e-3 * U * size + 1e-14 * size * size / pair.distance;
@@ -177,7 +176,7 @@ impl Case {
         pair.distance
     }
 
-    /// Compares a tool's kernel with the truth. Returns the error in units of `2^-24 S`.
+    /// Compares a tool's kernel with the true distance. Returns the error in units of `2^-24 S`.
     fn check(&self, tool: &impl Tool) -> f64 {
         let truth = self.truth();
         let allowed = self.allowed();
@@ -191,7 +190,7 @@ impl Case {
         assert!(error <= allowed, "{distance:e}, not {truth:e}: {}", describe());
         self.check_points(tool, &pair);
 
-        // A limit must drop no pair below it, and keep no pair above it.
+        // With a limit, no pair below it is dropped, and no pair above it is kept.
         let square = |x: f64| (x * x) as f32;
         let above = tool
             .closest_on_triangle(&self.corners, square((truth + allowed) * (1.0 + 2.0 * U) + FLOOR))
@@ -233,7 +232,8 @@ impl Case {
         assert!(f64::from(tool.axis_length()) >= start.distance(end) - FLOOR);
     }
 
-    /// Compares the node test with the truth at the triangle's corners. Returns the error in units of `2^-24 S`.
+    /// Compares the node test with the true distance at the triangle's corners. Returns the error in units of `2^-24
+    /// S`.
     fn check_node(&self, tool: &impl Tool) -> f64 {
         let (start, end) = (self.start.as_dvec3(), self.end.as_dvec3());
         let mut worst = 0.0_f64;
@@ -293,7 +293,7 @@ fn every_triangle_is_within_the_stated_accuracy() {
         f64::from(ACCURACY) / U,
         worst[2],
     );
-    // No more than half of the stated accuracy: a kernel with a larger error has lost one of its cases.
+    // At most half of the stated accuracy: a kernel with a larger error has lost one of its cases.
     assert!(worst[0] < 8.0 && worst[1] < 8.0 && worst[2] < 4.0, "{worst:?}");
 }
 
@@ -398,7 +398,7 @@ fn tools_name_the_value_that_they_refuse() {
 }
 
 fn any_point() -> impl Strategy<Value = Vec3> {
-    // Few distinct values make exact coincidences common, and shrink well.
+    // Few distinct values make exact coincidences frequent, and shrink well.
     let coordinate = prop_oneof![
         (-3_i8..=3).prop_map(f32::from),
         (-100.0_f32..100.0),

@@ -1,4 +1,4 @@
-//! Queries, contacts and forces against exhaustive search.
+//! Queries, contacts and forces compared with exhaustive search.
 
 mod answers;
 mod at_surface;

@@ -1,4 +1,4 @@
-//! The baseline of the paper's search agrees with exhaustive search, by fewer polygon tests.
+//! The baseline of the paper's search agrees with exhaustive search, with fewer polygon tests.
 
 // Requirement: E-05
 
@@ -23,7 +23,7 @@ fn probe(tool: &Instrument) -> Probe {
     }
 }
 
-/// Compares the paper's search with exhaustive search, at poses around deformed surfaces. Returns its polygon tests.
+/// Compares the paper's search with exhaustive search, around deformed surfaces. Returns its number of polygon tests.
 fn agrees(mesh: &Mesh, width: IndexWidth, seed: u64) -> u64 {
     let builder = Builder::new().construction(Construction::Paper).stretch(STRETCH);
     let built = builder.index(width).build(mesh).expect("a valid mesh");

@@ -1,4 +1,4 @@
-//! The proxy's force against a search of all active sets in f64. It is the same force, it points outward, it is
+//! The proxy's force compared with a search of all active sets in f64. It is the same force, it points outward, it is
 //! continuous, and no wall counts twice.
 
 // Requirement: C-03
@@ -14,14 +14,13 @@ use fastrand::Rng;
 use glam::{DMat3, DVec3, Vec3};
 
 const MARGIN: f32 = 3.0;
-/// The library's compliance.
 const COMPLIANCE: f64 = 1.0 / 16.0;
-/// A wall less deep than one in this many of the deepest one's depth has a smaller activation.
+/// A wall whose depth is less than the largest depth divided by this has a smaller activation.
 const SHALLOW: f64 = 16.0;
 /// Relative to the largest depth: f32 errors, which the compliance may multiply by 16.
 const TOLERANCE: f64 = 2e-4;
 
-/// The number of tried sets of walls: `DIBS_POSES`, if set.
+/// The number of tested sets of walls: `DIBS_POSES`, if set.
 fn cases() -> usize {
     let asked = std::env::var("DIBS_POSES").ok().map(|n| n.parse().expect("a number of cases"));
     asked.unwrap_or(if cfg!(debug_assertions) { 300 } else { 20_000 })
@@ -66,7 +65,7 @@ fn found(template: &Contact, walls: &[Wall]) -> [DVec3; 2] {
     [wrench.force.as_dvec3(), wrench.torque.as_dvec3()]
 }
 
-/// The true displacement and moment, and the walls' pushes, by trying every set of acting walls.
+/// The true displacement and moment, and the walls' pushes, by trying every active set.
 fn truth(walls: &[Wall]) -> ([DVec3; 2], Vec<f64>) {
     let depth = |wall: &Wall| f64::from(MARGIN - (MARGIN - wall.depth));
     let wanted = |wall: &Wall| depth(wall) * (1.0 + COMPLIANCE);
@@ -120,12 +119,12 @@ fn walls(rng: &mut Rng) -> Vec<Wall> {
                 _ => (other - axis * axis.dot(other) * (1.0 + 0.1 * rng.f32())).normalize(),
             };
             let depth = if rng.bool() { 2.0 } else { 10_f32.powf(rng.f32() * 4.0 - 3.0) };
-            // Some walls are still outside the margin.
+            // Some walls are outside the margin.
             let depth = if row > 0 && rng.u32(..4) == 0 { -depth } else { depth };
             Wall { normal, depth, at: other * 5.0 }
         })
         .collect();
-    // A list of contacts is in this order.
+    // Contacts in a list have this order.
     walls.sort_by(|a, b| b.depth.total_cmp(&a.depth));
     walls
 }
@@ -141,12 +140,12 @@ fn the_force_is_that_of_the_best_of_all_active_sets() {
         let [force, torque] = found(&template, &walls);
         let deepest = f64::from(walls[0].depth);
         let all: f64 = pushes.iter().sum();
-        // Where pushes nearly cancel, the torque's error is relative to their sum.
+        // If pushes nearly cancel, the torque's error is relative to the sum of their magnitudes.
         let off = [force.distance(moved) / deepest, torque.distance(moment) / (5.0 * all)];
         assert!(off[0] < TOLERANCE && off[1] < TOLERANCE, "{off:?} {walls:?} {force} {moved}");
         worst = [worst[0].max(off[0]), worst[1].max(off[1])];
         several += usize::from(pushes.iter().filter(|&&push| push > 0.0).count() > 2);
-        // Where no two walls face each other, each of activation 1 is held by at least its own depth.
+        // If no two walls face each other, each wall with activation 1 is kept off by at least its own depth.
         let face = |a: &Wall| walls.iter().any(|b| a.normal.dot(b.normal) < 0.0);
         if !walls.iter().any(face) {
             let is_whole = |wall: &&Wall| SHALLOW * f64::from(wall.depth) > 1.001 * deepest;
@@ -166,8 +165,8 @@ fn the_force_is_that_of_the_best_of_all_active_sets() {
 }
 
 /// A small change of the walls changes the force little. The compliance bounds the change: by `by_depths` times a
-/// change of the depths alone, and by `by_normals` times a change of the normals too. A shallow wall's activation grows
-/// by 16 over the deepest depth, and may move the proxy by three depths. A wall with a depth of 0 changes nothing.
+/// change of the depths alone, and by `by_normals` times a change of the normals as well. A shallow wall's activation
+/// grows by 16 over the deepest depth, and may move the proxy by three depths. One of depth 0 changes nothing.
 #[test]
 fn the_force_is_continuous() {
     let template = contact();
@@ -187,7 +186,7 @@ fn the_force_is_continuous() {
             }
         }
         let [one, _] = found(&template, &walls);
-        // Sometimes a wall is added that begins at the margin: wherever it is, it does not act.
+        // Sometimes a wall at the margin is added: in any direction, it has no effect.
         if near.len() < 8 && rng.bool() {
             let depth = -1e-6;
             near.push(Wall { normal: unit(&mut rng), depth, at: Vec3::ZERO });
@@ -217,7 +216,7 @@ fn one_wall_is_never_two() {
     }
 }
 
-/// A force and what it comes from.
+/// A force, and the contacts and pose that it comes from.
 #[derive(Clone, Debug)]
 struct Held {
     force: Vec3,
@@ -225,8 +224,8 @@ struct Held {
     contacts: Vec<(f32, Vec3)>,
 }
 
-/// A capsule's ends, and their steps (mm), across which a contact of a brain ended with activation 1. There two low
-/// triangles in much the same direction lie beside each other, with a high edge between.
+/// A capsule's ends, and their steps (mm), during which a contact on a brain ended with activation 1. Two low triangles
+/// there have similar directions and lie beside each other, with a high edge between them.
 const ENDED: [[Vec3; 4]; 3] = [
     [
         Vec3::new(0.638_053_36, 59.497_116, 19.683_912),
@@ -249,11 +248,11 @@ const ENDED: [[Vec3; 4]; 3] = [
 ];
 
 /// Outside a surface, steps between whose ends the force differs are halved down to some nanometres: no contact that
-/// begins or ends takes the force with it. What is left are directions of walls that are hardly apart.
+/// begins or ends makes the force jump. What remains are walls whose directions hardly differ.
 #[test]
 fn no_force_jumps_where_a_wall_begins_or_ends() {
     const RADIUS: f32 = 2.5;
-    // Nearer to an edge, directions turn within less than a step.
+    // Closer to an edge, directions change within less than a step.
     const NEAREST: f32 = 0.02;
     let waves = |x: f32, y: f32| 2.5 * (0.4 * x).sin() * (0.3 * y).cos();
     let folds = |x: f32, y: f32| 4.0 * ((x * 0.2).rem_euclid(2.0) - 1.0).abs() - 0.3 * y.abs();

@@ -1,4 +1,4 @@
-//! Refusals of a query, and the answer within a budget without triangle tests.
+//! Refused queries, and the answer within a budget without triangle tests.
 
 // Requirement: A-07
 
@@ -13,7 +13,7 @@ fn heart() -> (Mesh, BuiltTree) {
     (mesh, built)
 }
 
-/// Positions with the number of their frame.
+/// Positions with a frame number.
 struct Numbered<'r> {
     rows: &'r [Vec3],
     epoch: u32,
@@ -48,7 +48,7 @@ fn a_measurement_of_any_other_frame_is_refused() {
         assert_eq!(query.closest(&numbered(expected), &sphere, &options), refused);
         assert_eq!(query.closest_wide(&numbered(expected), &sphere, &options), refused);
     }
-    // The measured frame itself is taken, and a table without an epoch.
+    // The measured frame itself is accepted, and so is a table without an epoch.
     assert!(query.closest(&numbered(7), &sphere, &options).is_ok());
     assert!(query.closest(rows.as_slice(), &sphere, &options).is_ok());
 }
@@ -74,7 +74,7 @@ fn a_stack_is_enough_or_refused() {
     assert!((1..21).contains(&refused), "{needed} entries are not among those tried");
 }
 
-/// The triangle of a warm start is tested within the budget, as any other.
+/// The triangle of a warm start is tested within the budget, like any other.
 #[test]
 fn a_budget_of_nothing_tests_no_triangle() {
     let (mesh, built) = heart();
@@ -83,7 +83,7 @@ fn a_budget_of_nothing_tests_no_triangle() {
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("enough for any tree");
     for row in (0..rows.len()).step_by(7) {
         let sphere = Sphere::new(rows[row] * 1.2, 1.0).expect("valid");
-        // Unsigned, because a query that was cut short has no side.
+        // Unsigned, because a query that a budget ended has no side.
         let unsigned = Options::cold().unsigned();
         let whole = query.closest(rows.as_slice(), &sphere, &unsigned).expect("an answer");
         for budget in [Budget::new(0), Budget::new(Budget::TRIANGLE - 1)] {

@@ -1,4 +1,4 @@
-//! Surfaces that share no vertex in one tree: its answers are those of exhaustive search, however they move apart.
+//! Surfaces that share no vertex, in one tree: its answers equal those of exhaustive search, however they move apart.
 
 // Requirement: A-08
 
@@ -17,7 +17,7 @@ use dibs_tests::tree_bytes::reseal;
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A crumb of four triangles, facing outwards.
+/// A tiny part of four triangles, facing outwards.
 fn crumb() -> Mesh {
     let positions = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|p| p * 2.0).to_vec();
     let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
@@ -39,7 +39,7 @@ fn moved(part: &Mesh, by: Vec3) -> Mesh {
     Mesh { positions, ..part.clone() }
 }
 
-/// Each part deformed and moved by itself.
+/// Each part deformed and moved independently.
 fn frame(parts: &[Mesh], rng: &mut Rng) -> Vec<Vec3> {
     let mut all = Vec::new();
     for part in parts {
@@ -50,7 +50,7 @@ fn frame(parts: &[Mesh], rng: &mut Rng) -> Vec<Vec3> {
     all
 }
 
-/// Some parts of all sizes, and as many crumbs.
+/// Some parts of all sizes, and this many tiny ones.
 fn parts(crumbs: usize) -> Vec<Mesh> {
     let heart = generate::heart(320).expect("a valid size").mesh;
     let mut parts = vec![ball(2), heart, slivers(12)];
@@ -160,7 +160,7 @@ fn a_tracker_follows_several_surfaces() {
     }
 }
 
-/// The accuracy covers the rounding of the farthest part, whose pins are compared with the nearest's triangles.
+/// The accuracy covers the rounding of the farthest part, whose pins are compared with the nearest part's triangles.
 #[test]
 fn the_accuracy_is_that_of_the_farthest_part() {
     let away = Vec3::X * 10_000.0;
@@ -214,7 +214,7 @@ fn a_trackers_contacts_are_those_of_every_part_however_short_the_list() {
     let rows = built.to_rows(&mesh.positions);
     let mut odometer = Odometer::new(&tree);
     let surface = odometer.start(rows.as_slice());
-    // The roots have no place in the one tracker, and all have in the other.
+    // One tracker has no room for the roots, the other has room for all.
     let mut low = Tracker::<u16, MAX_STACK, 64, 6>::with_range(&tree).expect("deep enough");
     let mut high = Tracker::<u16, MAX_STACK, 64, 64>::with_range(&tree).expect("deep enough");
     let (mut short, mut long) = (Contacts::<32, 6>::new(), Contacts::<32, 64>::new());

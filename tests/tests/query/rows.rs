@@ -1,4 +1,4 @@
-//! Velocity rows of tools that are inside or cross, against finite differences of the deepest distance in f64.
+//! Velocity rows of tools that are inside or cross, compared with finite differences of the deepest distance in f64.
 
 // Requirement: S-06
 
@@ -17,15 +17,15 @@ use glam::{DQuat, DVec3, Vec3};
 
 /// Radius of the tools (mm).
 const RADIUS: f32 = 1.0;
-/// Step of the differences (s): the tool moves by less than half a micrometre.
+/// Time step of the differences (s): the tool moves by less than half a micrometre.
 const STEP: f64 = 1e-5;
-/// Depth (mm) from which on rows are judged, above the reference's grid along the axis.
+/// Least depth (mm) for which rows are checked, larger than the reference's grid along the axis.
 const LEAST_DEPTH: f64 = 1.0;
-/// Most that a row may be off (mm/s), at speeds of some 10 to 40.
+/// Largest error of a row (mm/s), at speeds of some 10 to 40.
 const WORST: f64 = 0.01;
 /// Largest difference of the two one-sided rates (mm/s). Beyond it three triangles tie within the step.
 const SMOOTH: f64 = 0.01;
-/// Slope below which the depth is level along the axis: within the accuracy, any of its points is the deepest.
+/// Slope below which the depth is constant along the axis: any of its points is the deepest within the accuracy.
 const LEVEL: f64 = 1e-3;
 
 /// The number of poses of each case: `DIBS_POSES`, if set.
@@ -94,7 +94,7 @@ struct Solid<'a> {
 }
 
 impl Solid<'_> {
-    /// The largest depth of an axis' points, and where; `None` if it is less than [`LEAST_DEPTH`].
+    /// The largest depth of an axis' points, and its point; `None` if it is less than [`LEAST_DEPTH`].
     fn deepest(&self, [start, end]: [DVec3; 2]) -> Option<(f64, DVec3)> {
         const PARTS: usize = 60;
         let point = |at: f64| start.lerp(end, at);
@@ -135,7 +135,7 @@ fn distance(point: DVec3, corners: &[[DVec3; 3]]) -> f64 {
     least_distance(point, point, corners.iter().copied())
 }
 
-/// The largest value within `reach` of a parameter, and where: the best of a grid, then by thirds.
+/// The largest value within `reach` of a parameter, and its parameter: the best of a grid, then by ternary search.
 fn highest(middle: f64, reach: f64, value: impl Fn(f64) -> f64) -> (f64, f64) {
     const PARTS: usize = 40;
     let at = |at: f64| (value(at.clamp(0.0, 1.0)), at.clamp(0.0, 1.0));
@@ -157,7 +157,7 @@ fn highest(middle: f64, reach: f64, value: impl Fn(f64) -> f64) -> (f64, f64) {
     best
 }
 
-/// A row's rate is that of the separation, for tools that are inside or cross, wherever their deepest point is.
+/// A row's rate equals that of the separation, for tools that are inside or cross, wherever their deepest point is.
 #[test]
 fn rows_of_deep_tools_have_the_rate_of_the_separation() {
     let (mut judged, mut inside, mut within, mut skipped, mut worst) = (0, 0, 0, 0, 0.0_f64);
@@ -249,7 +249,7 @@ fn rows_of_deep_tools_have_the_rate_of_the_separation() {
     assert!(judged > enough && within > enough / 2 && inside > enough / 4 && skipped < judged / 2);
 }
 
-/// Without a budget for the other triangle, the row is that of the closest one.
+/// Without a budget for the other triangle, the row is that of the closest triangle.
 #[test]
 fn a_row_without_budget_is_that_of_the_contact() {
     let mesh = ball(3);

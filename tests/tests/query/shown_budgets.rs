@@ -1,5 +1,5 @@
-//! The budgets in the README's and the guide's examples are enough. A query that its budget cuts short has no side, and
-//! the wall does not push.
+//! The budgets in the README's and the guide's examples are sufficient. If a budget ended a query, it would have no
+//! side, and the wall would not push.
 
 // Requirement: A-05
 
@@ -11,11 +11,11 @@ use dibs_nostd::{Budget, Cost, NoSide, Options, Query, Side, Sphere, Tool, measu
 use dibs_tests::method::Probe;
 use dibs_tests::streams::Beat;
 
-/// Number of queries, and ticks from one to the next: the last tool is near enough for a warm start.
+/// Number of queries, and ticks between them: the last tool is close enough for a warm start.
 const ASKED: u32 = 300;
 const APART: u32 = 23;
 
-/// The budgets that a page shows: their instructions, and the names of their cost models.
+/// The budgets in a page: their instructions, and the names of their cost models.
 fn shown(page: &str) -> Vec<(u32, String)> {
     let path = format!("{}/../{page}", env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(path).expect("a page");

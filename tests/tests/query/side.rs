@@ -1,4 +1,4 @@
-//! Sides and signed separations against f64: generalised winding numbers, exhaustive search, dense sampling.
+//! Sides and signed separations compared with f64: generalised winding numbers, exhaustive search, dense sampling.
 //!
 //! `DIBS_POSES` sets the number of poses.
 //!
@@ -21,7 +21,7 @@ use dibs_tests::{is_whole, sides};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
-/// The number of poses of all surfaces together.
+/// The total number of poses on all surfaces.
 fn poses() -> usize {
     let asked = std::env::var("DIBS_POSES").ok().map(|n| n.parse().expect("a number of poses"));
     asked.unwrap_or(if cfg!(debug_assertions) { 400 } else { 10_000 })
@@ -60,7 +60,7 @@ fn depths_are_those_of_dense_sampling() {
         let triangles = surfaces::triangles(&tree);
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
         for _ in 0..count {
-            // Far from the origin a point of the axis is rounded more than the surface is near.
+            // Far from the origin the rounding of a point of the axis exceeds its distance from the surface.
             let shift = unit(&mut rng) * [0.0, 0.0, 3e4][rng.usize(..3)];
             let bent = bent(&surface.mesh, &mut rng);
             let rows = surface.built.to_rows(&bent.iter().map(|&p| p + shift).collect::<Vec<_>>());
@@ -90,7 +90,7 @@ fn depths_are_those_of_dense_sampling() {
             } else {
                 crossing += 1;
             }
-            // The side alone costs the closest pair, and leaves the depth between two ends.
+            // The side alone costs the closest pair, and gives an interval for the depth.
             let [side, plain] =
                 [Options::cold().depth_tolerance(f32::INFINITY), Options::cold().unsigned()].map(
                     |options| {
@@ -99,7 +99,7 @@ fn depths_are_those_of_dense_sampling() {
                 );
             let touches = Side::Undefined(NoSide::BelowAccuracy);
             assert!(side.side == found.side || side.side == touches, "{side:?}");
-            // Ties that f32 cannot tell apart take node tests for their work in f64.
+            // Ties that f32 cannot resolve use up node tests for their work in f64.
             assert!(side.node_tests >= plain.node_tests, "{side:?} {plain:?}");
             assert_eq!(side.triangle_tests, plain.triangle_tests, "{side:?} {plain:?}");
             slow += u64::from(side.node_tests > plain.node_tests);
@@ -131,7 +131,7 @@ fn depths_are_those_of_dense_sampling() {
     assert!(crossing as usize > count / 10 && wide * 50 < crossing as usize);
 }
 
-/// From far outside a ball to near its middle, the separation falls steadily, and the direction points out.
+/// From far outside a ball to near its middle, the separation decreases steadily, and the direction points out.
 #[test]
 fn the_way_out_of_a_ball_never_turns() {
     let mesh = ball(4);
@@ -170,7 +170,7 @@ fn the_way_out_of_a_ball_never_turns() {
     }
 }
 
-/// Axes above a face, at its edge and across it, closer than a side needs: the interval holds the distance all the same.
+/// Axes above a face, at its edge and across it, closer than a side needs: the interval still contains the distance.
 #[test]
 fn next_to_a_face_the_interval_holds_the_distance() {
     const TOP: f32 = 20.0;
@@ -246,7 +246,7 @@ fn a_side_that_is_not_there_says_why() {
     is(ask(&built, &twisted, at, Options::cold()), NoSide::NoAdjacency);
 }
 
-/// A budget that ends within the search for the depth leaves an interval that holds the depth.
+/// A budget that ends the search for the depth leaves an interval that contains the depth.
 #[test]
 fn a_depth_that_was_cut_short_is_certified() {
     let mesh = ball(3);
@@ -295,11 +295,11 @@ fn neighbours_share_their_edges_and_wrong_ones_are_refused() {
     }
 }
 
-/// Every triangle of a closed surface has a neighbour at each edge, also where 16 bits cannot number all triangles; and
-/// a tree with adjacency and vertex order is small.
+/// Every triangle of a closed surface has a neighbour at each edge, even if 16 bits cannot number all triangles; and a
+/// tree with adjacency and vertex order is small.
 #[test]
 fn a_tree_with_adjacency_takes_at_most_16_bytes_a_triangle() {
-    // The largest has as many vertices as 16 bits count.
+    // The largest has as many vertices as 16 bits can count.
     let sizes = [if cfg!(debug_assertions) { 2_000 } else { 10_272 }, 66_000];
     for &triangles in &sizes[..if is_whole() { 2 } else { 1 }] {
         let mesh = generate::brain(triangles).expect("a valid size");
@@ -323,8 +323,8 @@ fn a_tree_with_adjacency_takes_at_most_16_bytes_a_triangle() {
     }
 }
 
-/// A vertex whose triangles form a saddle is never the closest point, but nearly: its pseudonormal is no proof. Here a
-/// tooth hangs over a point, and the triangles around it look the other way.
+/// A vertex whose triangles form a saddle is never the closest point, but nearly so, and its pseudonormal proves
+/// nothing. Here a tooth hangs over a point, and the triangles around it face the other way.
 #[test]
 fn no_side_is_wrong_next_to_a_saddle() {
     let mut rng = Rng::with_seed(21);
@@ -365,7 +365,7 @@ fn no_side_is_wrong_next_to_a_saddle() {
             let sphere = Sphere::new(point, 0.0).expect("finite");
             let found = query.closest(rows.as_slice(), &sphere, &Options::cold());
             let pair = exhaustive(&rows, &triangles, &Instrument::sphere(point, 0.0));
-            // Such a surface may cut itself, so the nearest sheet decides.
+            // Such a surface may intersect itself, so the nearest sheet decides.
             let inside = sides::is_below(&rows, &triangles, &pair.expect("it has triangles"));
             match found.expect("an answer").side {
                 Side::Undefined(_) => undefined += 1,
@@ -381,7 +381,7 @@ fn no_side_is_wrong_next_to_a_saddle() {
     assert!(cfg!(debug_assertions) || stated > 2_000, "{stated}");
 }
 
-/// An open surface may be passed around: an axis that meets it nowhere between two points has them on both sides.
+/// A path may lead around an open surface: an axis without intersection may have points on both sides.
 #[test]
 fn a_depth_behind_an_open_sheet_is_found() {
     // Two sheets with a gap between them, and a wall that the axis meets.
@@ -416,7 +416,7 @@ fn a_depth_behind_an_open_sheet_is_found() {
     assert!(found.lower <= -0.5 - deepest + found.accuracy, "{deepest} deep: {found:?}");
 }
 
-/// Two bodies next to each other: the axis leaves one and enters the other within less than the accuracy tells apart.
+/// Two bodies next to each other: the axis leaves one and enters the other within less than the accuracy.
 #[test]
 fn a_depth_behind_a_narrow_gap_is_found() {
     for gap in [0.0002, 0.001, 0.01] {
@@ -429,7 +429,7 @@ fn a_depth_behind_a_narrow_gap_is_found() {
         let tree = built.tree::<u16>().expect("16-bit indices");
         let rows = built.to_rows(&mesh.positions);
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-        // In the middle of one body, and 2 mm or 18 mm behind the face of the other one.
+        // In the middle of one body, and 2 mm or 18 mm behind the face of the other.
         for [start, end] in [[-2.0, 18.0], [18.0, -2.0], [-10.0, 2.0], [2.0, -10.0]] {
             for lean in 0..20 {
                 let y = 0.1 * lean as f32 - 1.0;
@@ -447,7 +447,7 @@ fn a_depth_behind_a_narrow_gap_is_found() {
     }
 }
 
-/// An axis through more bodies than a search tells apart, of which one is thick.
+/// An axis through more bodies than a search distinguishes, one of which is thick.
 #[test]
 fn a_depth_behind_many_bodies_is_found() {
     for (count, thick) in [2, 5, 12, 40].into_iter().flat_map(|n| (0..n).map(move |at| (n, at))) {

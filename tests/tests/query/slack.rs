@@ -1,5 +1,5 @@
-//! The slacks of a query, each on surfaces and poses that need it: radii that are used nearly in full, coordinates far
-//! from the origin, axes along long triangles.
+//! The rounding slacks of a query, each on surfaces and poses that need it: radii that are nearly exhausted,
+//! coordinates far from the origin, axes along long triangles.
 
 // Requirement: A-01
 
@@ -15,7 +15,7 @@ use dibs_tests::surfaces;
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A number between `low` and `high`, with equally likely decades.
+/// A number between `low` and `high`, with all decades equally likely.
 fn decades(rng: &mut Rng, low: f32, high: f32) -> f32 {
     low * (high / low).powf(rng.f32())
 }
@@ -32,8 +32,8 @@ impl<'b> Searched<'b> {
         Self { built, rows: built.to_rows(positions), worst: 0.0 }
     }
 
-    /// Compares both searches with the exhaustive one: with the tree's limit, with the measured stretch, and with a
-    /// warm start from the triangle closest to `known`.
+    /// Compares both searches with exhaustive search: with the tree's limit, with the measured stretch, and with a warm
+    /// start from the triangle closest to `known`.
     fn check(&mut self, tool: &Instrument, known: &Instrument) {
         let tree = self.built.tree::<u16>().expect("valid");
         let rows = self.rows.as_slice();
@@ -70,8 +70,8 @@ fn ladder(cells: usize, length: f32, width: f32) -> Mesh {
 }
 
 /// Straight bands, stretched nearly to their limit, whose first edge is the closest to `end`: every sphere around it
-/// reaches hardly farther. The band's other half runs back past the tool, hardly farther away. Calls
-/// `check(built, positions, end, radius)` for each.
+/// extends hardly farther. The band's other half runs back past the tool, hardly farther away. Calls `check(built,
+/// positions, end, radius)` for each.
 fn for_each_band(number: usize, mut check: impl FnMut(&BuiltTree, &[Vec3], Vec3, f32)) {
     const LIMIT: f32 = 1.5;
     let (cells, cell, width) = (100, 2.0, 1.0);
@@ -118,7 +118,7 @@ fn a_radius_is_used_in_full() {
     println!("largest error: {worst:.2} of the stated accuracy");
 }
 
-/// The same with a tracker, at its first tick and as its tool comes down to the band's end, and with contacts within a
+/// The same with a tracker, at its first tick and as its tool approaches the band's end, and with contacts within a
 /// margin hardly larger than the separation.
 #[test]
 fn tracker_and_contacts_use_a_radius_in_full() {
@@ -136,7 +136,7 @@ fn tracker_and_contacts_use_a_radius_in_full() {
                 let tool = Sphere::new(center, radius).expect("valid");
                 let whole = query.closest(&surface, &tool, &options).expect("an answer");
                 let found = tracker.closest(&surface, &tool, &options).expect("an answer");
-                // Above the rim the whole query has no side, and the tracker the last one.
+                // Above the rim the complete query has no side, and the tracker keeps the last one.
                 if found.is_kept {
                     assert!(matches!(whole.side, Side::Undefined(_)), "{whole:?}");
                     continue;
@@ -157,8 +157,8 @@ fn tracker_and_contacts_use_a_radius_in_full() {
     });
 }
 
-/// Coordinates of millions, at which the mesh's whole numbers are still exact. Near the centre of a ball every leaf is
-/// nearly the closest, so planes need their slack.
+/// Coordinates of millions, at which the mesh's integer coordinates are still exact. Near the centre of a ball every
+/// leaf is nearly the closest, so planes need their slack.
 #[test]
 fn planes_allow_for_large_coordinates() {
     let mut rng = Rng::with_seed(52);
@@ -188,8 +188,8 @@ fn planes_allow_for_large_coordinates() {
     println!("largest error: {worst:.2} of the stated accuracy");
 }
 
-/// A long tube, folded so that its ridges run along an axis in its middle, all about as close. The shortest vector to
-/// one end of a ridge is rounded, and so tilted along the axis, with the tube's length as its lever.
+/// A long tube, folded so that its ridges run along an axis in its middle, all about equally close. The shortest vector
+/// to one end of a ridge is rounded, and so tilted along the axis; the tube's length amplifies this.
 #[test]
 fn planes_allow_for_a_tilt_along_the_axis() {
     let mut rng = Rng::with_seed(53);
@@ -222,7 +222,7 @@ fn planes_allow_for_a_tilt_along_the_axis() {
                 let off = unit(&mut rng) * rough;
                 turn * Vec3::new(off.x, off.y, z)
             };
-            // Where the axis ends beyond the ridge, the vector leaves it far from its start: the longest lever.
+            // If the axis ends beyond the ridge, the vector starts far from the axis' start: the largest amplification.
             let reach = if round % 2 == 0 { length + 10.0 } else { length * 0.8 };
             let (start, end) = (end(-10.0), end(reach));
             let capsule = Instrument::capsule(start, end, 0.0);

@@ -1,6 +1,6 @@
-//! The one definition of the separation: the least signed distance of any point of the axis, less the radius. Its
-//! property: it changes by no more than tool and surface move, whatever solids overlap, touch or hold each other. And
-//! one geometry has one answer, as one tree or as a scene.
+//! The one definition of the separation: the least signed distance of any point of the axis, minus the radius. Its
+//! property: it changes by at most the motion of tool and surface, whatever solids overlap, touch or contain each
+//! other. And a geometry has the same answer as one tree and as a scene.
 
 // Requirement: S-02
 
@@ -43,7 +43,7 @@ fn joined(parts: &[Mesh]) -> Mesh {
     all
 }
 
-/// Parts, and the number of cavities at their end, all of the first part.
+/// Parts, and the number of cavities at their end, all in the first part.
 struct Case {
     name: &'static str,
     parts: Vec<Mesh>,
@@ -57,7 +57,7 @@ impl Case {
         Self { name, parts, cavities, built }
     }
 
-    /// The signed distance of a point, by winding numbers; `None` where they do not tell.
+    /// The signed distance of a point, by winding numbers; `None` if these are ambiguous.
     fn distance(&self, point: Vec3) -> Option<f64> {
         let of = |part: &Mesh| {
             let (positions, triangles) = (&part.positions, &part.triangles);
@@ -109,7 +109,7 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
     ]
 });
 
-/// How much farther than it may two separations are, one motion apart; not positive if they may be.
+/// By how much the difference of two separations exceeds the motion between them; not positive if it is allowed.
 fn jump(before: &Proximity, after: &Proximity, motion: f32) -> f32 {
     let apart = before.accuracy + after.accuracy + motion * (1.0 + 1e-5);
     (before.lower - after.separation - apart).max(after.lower - before.separation - apart)
@@ -196,7 +196,7 @@ fn the_separation_changes_by_no_more_than_the_tool_moves() {
     }
 }
 
-/// Pairs of poses, one small motion apart, that climb towards the largest jump between their separations.
+/// Pairs of poses, a small motion apart, found by hill climbing towards the largest jump between their separations.
 #[test]
 fn no_pair_of_poses_is_found_between_which_the_separation_jumps() {
     let (starts, steps) = if cfg!(debug_assertions) { (4, 20) } else { (60, 60) };

@@ -1,4 +1,4 @@
-//! Sweeps against dense sampling in f64: no contact may be jumped over.
+//! Sweeps compared with dense sampling in f64: no contact may be missed.
 
 // Requirement: A-10
 
@@ -21,14 +21,14 @@ fn ticks() -> usize {
     env::var("DIBS_SWEPT_TICKS").map_or(400, |text| text.parse().expect("a number of ticks"))
 }
 
-/// Times of a tick at which f64 gives the truth.
+/// Number of times in a tick at which the true separation is computed in f64.
 const INSTANTS: usize = 40;
 const SAMPLES: u32 = 32;
 const RADIUS: f32 = 1.0;
 
 type Follower<'t> = Tracker<'t, u16, MAX_STACK, 256>;
 
-/// A sheet without thickness, `size` long, of `2 * cells^2` triangles.
+/// A sheet without thickness, of this size, with `2 * cells^2` triangles.
 fn sheet(size: f32, cells: u32) -> Mesh {
     let side = cells + 1;
     let at = |i: u32| i as f32 / cells as f32 * size - size / 2.0;
@@ -50,7 +50,6 @@ struct Way<'a> {
 }
 
 impl Way<'_> {
-    /// The true separation at a time.
     fn separation(&self, time: f64) -> f64 {
         let [first, last] = self.t.map(f64::from);
         let share = first + time * (last - first);
@@ -101,10 +100,10 @@ struct Tally {
 }
 
 impl Tally {
-    /// Compares a sweep with the truth at many times.
+    /// Compares a sweep with the true separation at many times.
     fn check(&mut self, way: &Way<'_>, found: &SweepAnswer) {
         let margin = f64::from(way.margin);
-        // The accuracy, and room for the rounding of f32 coordinates of this size.
+        // The accuracy, plus the rounding of f32 coordinates of this size.
         let points = way.ends.iter().flat_map(|end| [end.start, end.end]);
         let size = points.map(|p| f64::from(p.length())).fold(0.0, f64::max);
         let spare = 1.5 * f64::from(found.at_end.accuracy) + 2e-5 * size;
@@ -131,7 +130,7 @@ impl Tally {
     }
 }
 
-/// The tool at both ends of a way through the surface, along it at about the margin, or anywhere.
+/// The tool at both ends of a motion: through the surface, along it at about the margin, or random.
 fn ends(rest: &[Vec3], size: f32, margin: f32, rng: &mut Rng) -> [Instrument; 2] {
     let target = rest[rng.usize(..rest.len())];
     let across = unit(rng);
@@ -200,7 +199,7 @@ fn nothing_is_jumped_over() {
     println!("{tally:?}");
     let all = tally.clear + tally.contacts + tally.undecided;
     assert!(tally.clear > all / 10 && tally.contacts > all / 10, "{tally:?}");
-    // Along the surface at the margin a search clears little, so some ways stay undecided.
+    // Along the surface at the margin each search rules out little, so some motions stay undecided.
     assert!(tally.undecided < all / 2, "{tally:?}");
 }
 
@@ -249,7 +248,7 @@ fn hostile_ways_are_refused_or_never_cleared() {
     assert!(is_unclear, "{found:?}");
 }
 
-/// Nothing moves, so any distance clears the whole way; a budget that shows none is no error.
+/// Nothing moves, so any positive distance rules out contact; a budget that shows none is no error.
 #[test]
 fn a_sweep_at_rest_needs_no_budget() {
     let mesh = dibs_build::generate::heart(1_000).expect("a valid size").mesh;

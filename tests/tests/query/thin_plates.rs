@@ -1,5 +1,5 @@
-//! Plates thinner than the rounding of their coordinates. A certain side is wrong only where a plate cuts itself, by exact
-//! predicates.
+//! Plates thinner than the rounding of their coordinates. A stated side is wrong only where a plate intersects itself,
+//! by exact predicates.
 
 // Requirement: S-01
 
@@ -11,7 +11,7 @@ use dibs_tests::sample;
 use fastrand::Rng;
 use glam::{Quat, Vec3};
 
-/// Coordinates are multiples of its inverse, and so exact as integers.
+/// Coordinates are multiples of 1 / SCALE, and so exact as integers.
 const SCALE: f64 = 16_777_216.0;
 
 type Point = [i128; 3];
@@ -24,7 +24,7 @@ fn orientation(a: Point, b: Point, c: Point, d: Point) -> i128 {
     (u[0] * minor(1, 2) - u[1] * minor(0, 2) + u[2] * minor(0, 1)).signum()
 }
 
-/// Whether a segment passes a triangle or ends on it.
+/// Whether a segment crosses a triangle or ends on it.
 fn passes(start: Point, end: Point, [a, b, c]: [Point; 3]) -> bool {
     let sides = [start, end].map(|point| orientation(a, b, c, point));
     let around = [(a, b), (b, c), (c, a)].map(|(a, b)| orientation(start, end, a, b));
@@ -51,7 +51,7 @@ fn cuts_itself(mesh: &Mesh) -> bool {
     })
 }
 
-/// A plate of 40 mm with `n` squares an edge, turned and uneven, its vertices rounded.
+/// A plate of 40 mm with `n` squares an edge, rotated and uneven, with rounded vertices.
 fn plate(n: u32, thickness: f32, rng: &mut Rng) -> Mesh {
     let turn = Quat::from_axis_angle(unit(rng), 6.0 * rng.f32());
     let shift = unit(rng) * 5.0;
@@ -102,7 +102,7 @@ fn a_certain_side_is_wrong_only_where_a_plate_cuts_itself() {
     for number in 0..sample(2_000) {
         let thickness = [4e-7, 7e-7, 1e-6, 1.4e-6, 3e-6, 2e-5][number % 6];
         let mesh = plate(2 + rng.u32(..4), thickness, &mut rng);
-        // One that is inside out by rounding is refused.
+        // A plate that rounding turned inside out is refused.
         let Ok(built) = Builder::new().build(&mesh) else { continue };
         let tree = built.tree::<u16>().expect("16-bit indices");
         let rows = built.to_rows(&mesh.positions);

@@ -1,6 +1,6 @@
-//! Sides where sheets tie, against winding numbers in f64: walls that touch or collapsed, blades, spikes, lattices.
+//! Sides at ties between sheets, compared with winding numbers: touching or collapsed walls, blades, spikes, lattices.
 //!
-//! `DIBS_CLIMBS` sets the number of climbs to ties.
+//! `DIBS_CLIMBS` sets the number of hill climbs towards ties.
 //!
 //! One file, because all tests compare with the same oracle.
 
@@ -73,7 +73,7 @@ fn plate(thickness: f32) -> Mesh {
     mesh(positions, all)
 }
 
-/// A cone with so many triangles at its apex, twice as high as wide.
+/// A cone with this many triangles at its apex, twice as high as wide.
 fn cone(sides: u32) -> Mesh {
     let mut positions = vec![Vec3::Z * 40.0, Vec3::ZERO];
     let mut all = Vec::new();
@@ -105,7 +105,7 @@ fn joined(parts: &[Mesh]) -> Mesh {
     all
 }
 
-/// Two cubes with the vertices of a common edge.
+/// Two cubes that share the vertices of an edge.
 fn pinched() -> Mesh {
     let low = block(Vec3::ZERO, Vec3::splat(10.0));
     let mut all = joined(&[low, block(Vec3::new(10.0, 10.0, 0.0), Vec3::new(20.0, 20.0, 10.0))]);
@@ -126,7 +126,7 @@ fn build(mesh: &Mesh) -> BuiltTree {
     builder.build(mesh).expect("a valid mesh")
 }
 
-/// A surface at rest, its frame, and whether it can tie with itself everywhere.
+/// A surface at rest, and its frame.
 struct Subject {
     name: &'static str,
     rest: Mesh,
@@ -156,7 +156,7 @@ fn subjects() -> Vec<Subject> {
         let flat = plate(thickness);
         all.push(Subject { name: "plate", rest: plate(1.0), frame: flat.positions });
     }
-    // The walls have collapsed but for the rim.
+    // The walls have collapsed except at the rim.
     let mut vessel = Subject { name: "vessel", rest: plate(1.0), frame: plate(1.0).positions };
     for position in &mut vessel.frame {
         if position.x.abs() < 25.0 && position.y.abs() < 25.0 {
@@ -171,12 +171,12 @@ fn subjects() -> Vec<Subject> {
 struct Tally {
     asked: usize,
     wrong: usize,
-    /// Undefined, though no two sheets tie within 1e-6 of the distance.
+    /// Undefined sides, although no two sheets tie within 1e-6 of the distance.
     undefined: usize,
     ties: usize,
 }
 
-/// A surface with everything that can be asked.
+/// A surface with all kinds of queries.
 struct Asked<'t> {
     tree: &'t Tree<'t, u16>,
     rows: Vec<Vec3>,
@@ -201,7 +201,7 @@ impl<'t> Asked<'t> {
         }
     }
 
-    /// The least lead of a sheet that has the point on its wrong side over the closest, relative to the distance.
+    /// By how much a sheet with the wrong side is farther than the closest, relative to the distance: the least value.
     fn lead(&self, at: DVec3, inside: bool) -> f64 {
         let (mut closest, mut wrong) = (f64::INFINITY, f64::INFINITY);
         for corners in &self.triangles {
@@ -254,7 +254,7 @@ impl<'t> Asked<'t> {
         Some(lead)
     }
 
-    /// Walks from a random point to where a sheet that it is on the wrong side of is as close as the closest.
+    /// Climbs from a random point to a tie between the closest sheet and one with the wrong side.
     fn climb(&mut self, rng: &mut Rng, steps: usize) {
         let corners = self.triangles[rng.usize(..self.triangles.len())];
         let [a, b, c] = corners.map(|v| self.rows[v as usize]);
@@ -295,7 +295,7 @@ impl<'t> Asked<'t> {
     }
 }
 
-/// Climbs to ties of every kind of surface: no side is wrong there, by a query, a wide one, or a tracker.
+/// Climbs to ties on every kind of surface: no side is wrong there, with a query, a wide one, or a tracker.
 #[test]
 fn no_side_is_wrong_where_sheets_tie() {
     climb_everywhere(1.0);
@@ -334,7 +334,7 @@ fn climb_everywhere(unit: f32) {
 }
 
 /// On a lattice through vertices, edges and planes, every point that is not on the surface has a side, and outside it
-/// the direction leads from the closest point.
+/// the direction points away from the closest point.
 #[test]
 fn lattice_points_have_a_side() {
     for rest in [tetrahedron(), ball(0), block(Vec3::splat(-20.0), Vec3::splat(20.0)), pinched()] {
@@ -362,7 +362,7 @@ fn lattice_points_have_a_side() {
     }
 }
 
-/// More triangles tie than are remembered: at a spike, on the axis of a cylinder, and in the middle of a ball.
+/// More triangles tie than are stored: at a spike, on the axis of a cylinder, and in the middle of a ball.
 #[test]
 fn many_ties_have_a_side() {
     let mut drum = Mesh::default();
@@ -395,7 +395,7 @@ fn many_ties_have_a_side() {
         };
         let found = ask(&mut query, u32::MAX);
         assert_eq!(found.side, side, "{at} {found:?}");
-        // Whatever the budget, the side is right or not known, and the budget holds.
+        // Whatever the budget, the side is correct or unknown, and the budget is not exceeded.
         for tests in (0..found.work() + 10).step_by(7) {
             let cut = ask(&mut query, tests);
             assert!(cut.side == side || cut.side == Side::Undefined(NoSide::CutShort), "{cut:?}");
@@ -413,7 +413,7 @@ fn many_ties_have_a_side() {
     assert!(found.separation < -10.9 && found.lower > -11.2, "{found:?}");
 }
 
-/// A collapsed wall looks like a slit, so above it there is no side; the rim tells.
+/// A collapsed wall looks like a slit, so there is no side above it; the rim decides.
 #[test]
 fn a_collapsed_vessel_has_no_inside() {
     let built = build(&block(Vec3::ZERO, Vec3::new(100.0, 100.0, 2.0)));
@@ -434,7 +434,7 @@ fn a_collapsed_vessel_has_no_inside() {
     }
 }
 
-/// Two solids that touch in an edge have a side everywhere but in it; a fin has none there, and the reason says so.
+/// Solids that touch at an edge have a side everywhere but at the edge; a fin has none there, and the reason says so.
 #[test]
 fn an_edge_of_more_than_two_triangles_takes_no_side_from_the_rest() {
     let mesh = pinched();

@@ -1,4 +1,4 @@
-//! Ticks whose budget ends: what the last tick left certain, less the motion since, is still an answer.
+//! Ticks that the budget ends: the last tick's bounds, reduced by the motion since, still give an answer.
 
 // Requirement: T-02
 
@@ -12,7 +12,7 @@ use dibs_tests::surfaces::cuboid;
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A tool that goes to and fro through a surface of this size, and turns on the way.
+/// A tool that moves back and forth through a surface of this size, and rotates.
 struct Path {
     tip: Vec3,
     along: Vec3,
@@ -35,7 +35,7 @@ impl Path {
     }
 }
 
-/// Any budget, from none to nearly enough.
+/// A random budget, from none to nearly enough.
 fn any_budget(rng: &mut Rng) -> Budget {
     let up_to = |most: u32, rng: &mut Rng| (most as f32 * rng.f32().powi(3)) as u32;
     Budget::new(up_to(6_000, rng))
@@ -45,7 +45,7 @@ fn meet(one: Interval, other: Interval) -> bool {
     one.lower <= other.upper && other.lower <= one.upper
 }
 
-/// A tracker's ticks with budgets that change, beside whole queries.
+/// A tracker's ticks with changing budgets, compared with complete queries.
 fn ticks_hold(mesh: &Mesh, frames: &[Vec<Vec3>], size: f32, ticks: u32, seed: u64) -> [u32; 3] {
     let built = Builder::new().stretch(1.5).build(mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");

@@ -1,4 +1,4 @@
-//! Several trackers against whole queries: the same answers, most pairs not looked at.
+//! Several trackers compared with complete queries: the same answers, but most pairs are not searched.
 
 // Requirement: T-01
 
@@ -38,7 +38,7 @@ fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
             let frame = tick / 30 % one.len();
             let next = (frame + 1) % one.len();
             if tick % 600 == 599 {
-                // Its next step starts anew.
+                // Its next step starts again.
                 odometers[1].start(one[next].as_slice());
             }
             if tick % 30 == 0 {
@@ -93,14 +93,14 @@ fn the_closest_of_tracked_pairs_is_that_of_whole_queries() {
         );
         if !cfg!(debug_assertions) {
             assert!(mean < 8.0 && cut_short + undefined > 100, "{mean} {cut_short}");
-            // A tick that is cut short has the last one's side.
+            // A tick that a budget ended keeps the last side.
             assert!(!is_signed || (inside > 500 && undefined < 10), "{inside} {undefined}");
         }
     }
 }
 
-/// A chain that turns around a heart, so that each of its links is closest for a while: no tick finds a link that rested
-/// long, since some tests are made ahead.
+/// A chain that rotates around a heart, so that each of its links is the closest for a while: no tick must catch up on
+/// a link that was skipped for long, because some tests are made in advance.
 #[test]
 fn no_tick_pays_for_a_long_rest() {
     let mesh = generate::heart(2_000).expect("a valid size").mesh;
@@ -140,7 +140,7 @@ fn no_tick_pays_for_a_long_rest() {
     }
 }
 
-/// The tracked answer for two pairs, and the separations of whole queries.
+/// The tracked answer for two pairs, and the separations of complete queries.
 fn closest_of_two(
     pairs: &mut [(&mut Tracked<'_>, &MovingTable<'_, [Vec3]>, &Sphere); 2],
     single: &mut Query<'_, u16, MAX_STACK>,
@@ -154,7 +154,7 @@ fn closest_of_two(
     (found, whole)
 }
 
-/// Around the border of an open sheet a tool comes to its other side without touching it, and is the deepest of all there.
+/// Around the border of a sheet a tool reaches its other side without touching it, and is the deepest of all there.
 #[test]
 fn a_resting_link_is_seen_to_pass_around_a_border() {
     let mesh = sheet(20, 80.0, |_, _| 0.0);
@@ -174,7 +174,7 @@ fn a_resting_link_is_seen_to_pass_around_a_border() {
         let mut pairs = [(&mut still, &surface, &near), (&mut moving, &surface, &far)];
         let (found, whole) = closest_of_two(&mut pairs, &mut single);
         let least = whole[0].min(whole[1]);
-        // A bound that rested holds until the motion since it was found has used it up.
+        // A skipped pair's bound is valid until the motion since has used it up.
         behind += u32::from(least < 0.0 && found.closest.separation > 0.0);
         assert!(least < 0.0 || (found.closest.separation - least).abs() < 0.01, "{tick}");
     }
@@ -182,8 +182,8 @@ fn a_resting_link_is_seen_to_pass_around_a_border() {
     assert!(behind < 400, "{behind}");
 }
 
-/// While one tool is deep inside, another sinks in and is passed over, since it is less deep. Once the first has left, the
-/// other is the deepest.
+/// While one tool is deep inside, another one moves in and is skipped, because it is less deep. Once the first has
+/// left, the other is the deepest.
 #[test]
 fn a_resting_link_that_sinks_in_is_inside() {
     let mesh = ball(3);
@@ -222,7 +222,7 @@ fn no_pairs_have_no_closest() {
     assert_eq!(none, Ok(None));
 }
 
-/// A pair that was asked without its side may be inside: with sides it is searched again.
+/// A pair that was searched without its side may be inside: if sides are requested it is searched again.
 #[test]
 fn a_pair_whose_side_was_not_asked_for_is_not_passed_over() {
     let mesh = ball(3);
@@ -245,6 +245,6 @@ fn a_pair_whose_side_was_not_asked_for_is_not_passed_over() {
     assert_eq!(ask(&Options::new().unsigned()).searched, 1);
     let found = ask(&Options::new());
     assert_eq!((found.pair, found.closest.side), (1, Side::Inside), "{found:?}");
-    // Inside, it is asked at every tick.
+    // Inside, it is searched at every tick.
     assert_eq!(ask(&Options::new()).pair, 1);
 }

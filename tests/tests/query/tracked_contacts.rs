@@ -1,4 +1,4 @@
-//! A tracker's contacts against those of whole queries.
+//! A tracker's contacts compared with those of complete queries.
 
 // Requirement: T-01
 
@@ -13,10 +13,10 @@ use glam::Vec3;
 
 use dibs_tests::wanderer::Wanderer;
 
-/// Least separation of a tool whose axis does not cross, with rounding to spare.
+/// Least separation of a tool whose axis does not cross, with an allowance for rounding.
 const LEAST_OUTSIDE: f32 = -1.999;
 
-/// How far contacts are looked for, in mm.
+/// Margin of the contacts, in mm.
 const MARGIN: f32 = 8.0;
 
 type Tracked<'t> = Tracker<'t, u16, MAX_STACK, 256, 256>;
@@ -46,7 +46,7 @@ fn contacts_of_a_tracker_are_those_of_a_query() {
         let options = Options::new();
         let opened = tracker.opened_in_range();
         let found = tracker.contacts(&surface, &tool, MARGIN, &options, &mut own);
-        // A front that is kept only grows.
+        // As long as a front is kept, it only grows.
         restarts += usize::from(tracker.opened_in_range() < opened);
         let found = found.expect("an answer");
         let closest = query.contacts(&surface, &tool, MARGIN, &Options::cold(), &mut whole);
@@ -77,9 +77,9 @@ fn contacts_of_a_tracker_are_those_of_a_query() {
     assert!(own.is_empty());
 }
 
-/// Contacts of one list that another lacks, of those whose separation is less than `bound`. The pair of an axis that
-/// crosses, found to a tolerance, is not compared. A part of a wall is no contact of its own, but may be in a list with too
-/// few places.
+/// Contacts of one list that another lacks, among those with a separation less than `bound`. The pair of a crossing
+/// axis, which is found to a tolerance, is not compared. A part of a wall is not a separate contact, but may be in a
+/// list with too little room.
 fn missing<'c>(
     from: impl Iterator<Item = &'c Contact>,
     list: &(impl Iterator<Item = &'c Contact> + Clone),
@@ -101,7 +101,7 @@ fn missing<'c>(
         .count()
 }
 
-/// Compares a tracker's contacts with a whole query's. Adds the contacts compared, and those missing or of nothing.
+/// Compares a tracker's contacts with a complete query's. Adds the numbers of compared, missing and invalid contacts.
 fn compare<S: MovingSurface, T: Tool, const NEAR: usize>(
     tracker: &mut Tracked<'_>,
     surface: &S,
@@ -125,7 +125,7 @@ fn compare<S: MovingSurface, T: Tool, const NEAR: usize>(
 fn contacts_survive_leaps_rests_budgets_and_other_trackers() {
     let generate::MovingMesh { mesh, motion } = generate::heart(2_000).expect("a valid size");
     let heart = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
-    // The same surface in another tree: a list may go from one to the other.
+    // The same surface in another tree: a list may be used with both.
     let other = Builder::new().stretch(1.8).build(&mesh).expect("a valid mesh");
     let trees = [&heart, &other].map(|built| built.tree::<u16>().expect("16-bit indices"));
     let frames = [&heart, &other].map(|built| -> Vec<_> {
@@ -133,7 +133,7 @@ fn contacts_survive_leaps_rests_budgets_and_other_trackers() {
     });
     let [mut one, mut two] = [0, 1].map(|at| Tracked::with_range(&trees[at]).expect("deep enough"));
     let mut odometers = [0, 1].map(|at| Odometer::new(&trees[at]));
-    // Too short for any front, for most, and long enough.
+    // One budget is too small for any front, one for most, and one is sufficient.
     let (mut short, mut middle, mut long) =
         (Contacts::<64, 24>::new(), Contacts::<64, 96>::new(), Contacts::<64, 2048>::new());
     let (mut chain, mut rng) = (Wanderer::new(5), Rng::with_seed(16));
@@ -141,7 +141,7 @@ fn contacts_survive_leaps_rests_budgets_and_other_trackers() {
     for frame in 0..if cfg!(debug_assertions) { 4 } else { 300 } {
         let now = [0, 1].map(|at| frames[at][frame % frames[at].len()].as_slice());
         let next = [0, 1].map(|at| frames[at][(frame + 1) % frames[at].len()].as_slice());
-        // Now and then the odometer starts anew.
+        // Sometimes the odometer starts again.
         if rng.u32(..20) == 0 {
             odometers[0].start(frames[0][0].as_slice());
         }
@@ -200,8 +200,8 @@ fn no_budget_hides_contacts_for_which_the_front_has_no_place() {
     assert!(compared > 500, "{compared}");
 }
 
-/// A search that its budget cut short leaves nodes opened whose parents do not know: a front kept from it would find their
-/// contacts twice.
+/// A search that its budget ended leaves opened nodes that their parents do not record: a front kept from it would find
+/// their contacts twice.
 #[test]
 fn a_search_that_was_cut_short_doubles_no_contact() {
     let mesh = generate::brain(2_000).expect("a valid size");
@@ -231,7 +231,7 @@ fn a_search_that_was_cut_short_doubles_no_contact() {
     assert!(compared > 500, "{compared}");
 }
 
-/// A jump of many times the surface's size is more than the bounds of a front can count.
+/// A jump of many times the surface's size exceeds what the bounds of a front can represent.
 #[test]
 fn a_jump_far_away_starts_the_range_anew() {
     let mesh = generate::heart(2_000).expect("a valid size").mesh;

@@ -1,4 +1,4 @@
-//! The depth of a crossing axis through a tracker, which keeps its proof from tick to tick, against whole queries.
+//! The depth of a crossing axis by a tracker, which keeps its proof between ticks, compared with complete queries.
 
 // Requirements: S-03, T-01
 
@@ -10,7 +10,7 @@ use dibs_tests::surfaces::{ball, cuboid};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A shaft that wanders through a surface of this size: slowly as a rule, now and then with a leap.
+/// A shaft on a random walk through a surface of this size: usually slow, sometimes with a leap.
 struct Shaft {
     tip: Vec3,
     along: Vec3,
@@ -40,7 +40,7 @@ impl Shaft {
     }
 }
 
-/// A whole query's answer is right where a tracker's is: their intervals meet.
+/// A complete query's answer is correct where a tracker's is: their intervals intersect.
 fn meets(tracked: &Proximity, whole: &Proximity) -> bool {
     let accuracy = tracked.accuracy + whole.accuracy;
     tracked.lower <= whole.separation + accuracy && whole.lower <= tracked.separation + accuracy
@@ -64,7 +64,7 @@ fn the_depth_is_that_of_a_whole_query() {
         let (frame, next) = (tick / 30 % frames.len(), (tick / 30 + 1) % frames.len());
         if tick % 30 == 0 {
             if shaft.rng.u32(..40) == 0 {
-                // The motion until now is lost.
+                // The motion so far is discarded.
                 odometer.start(frames[frame].as_slice());
             }
             step = Some(odometer.step(frames[frame].as_slice(), frames[next].as_slice()));
@@ -103,7 +103,7 @@ fn the_depth_is_that_of_a_whole_query() {
     assert!(3 * tests[0] < tests[1], "{tests:?}: the tracker saves little");
 }
 
-/// The stated tolerance is kept on a slow path, and a resting tool needs one point only.
+/// The stated tolerance is kept on a slow path, and for a resting tool one point is enough.
 #[test]
 fn the_interval_is_within_the_tolerance() {
     let generate::MovingMesh { mesh, .. } = generate::heart(2_000).expect("a valid size");
@@ -125,8 +125,8 @@ fn the_interval_is_within_the_tolerance() {
     }
 }
 
-/// An axis that leaves the surface at a small angle, from a point that is nearer than a tracker's accuracy and farther
-/// than a search's: it is passed over after one look.
+/// An axis that leaves the surface at a small angle, from a point that is closer than a tracker's accuracy and farther
+/// than a search's: one test rules it out.
 #[test]
 fn an_axis_that_all_but_touches_takes_few_tests() {
     let (positions, triangles) = cuboid(Vec3::splat(-40.0), Vec3::splat(40.0));
@@ -153,7 +153,7 @@ fn an_axis_that_all_but_touches_takes_few_tests() {
     assert!(apart > 2, "{apart}: no pose is between the accuracies");
 }
 
-/// Around the middle of a ball all of the surface is equally far, and a tracker has no place for so many leaves.
+/// Around the middle of a ball the whole surface is equally far, and a tracker has no room for so many leaves.
 #[test]
 fn a_depth_at_the_middle_of_a_ball_is_that_of_a_whole_query() {
     let mesh = ball(4);
@@ -167,7 +167,7 @@ fn a_depth_at_the_middle_of_a_ball_is_that_of_a_whole_query() {
     let size = mesh.positions[0].length();
     let (mut rng, mut at, mut slow) = (Rng::with_seed(5), Vec3::ZERO, 0.0);
     for tick in 0..2_000 {
-        // Steps of very different sizes, so that the leaves of some searches have places.
+        // Steps of very different sizes, so that there is room for the leaves of some searches.
         slow = if tick % 50 == 0 { 0.1 * 10.0_f32.powf(-4.0 * rng.f32()) } else { slow };
         at = (at + unit(&mut rng) * slow * size).clamp_length_max(0.1 * size);
         let end = at + Vec3::new(2.0, 0.3, 0.1) * size;

@@ -1,4 +1,4 @@
-//! Poses that jitter where triangles tie: a tracker's direction does not turn to and fro with their last digits.
+//! Poses with jitter where triangles tie: a tracker's direction does not alternate with their last digits.
 
 // Requirement: T-03
 
@@ -14,20 +14,20 @@ use fastrand::Rng;
 /// Ticks at a tie.
 const TICKS: u32 = 60;
 
-/// How far (mm) each coordinate of a pose jitters to either side.
+/// Amplitude (mm) of the jitter of each coordinate of a pose.
 const JITTER: f32 = 3e-4;
 
-/// How far (mm) beyond a tie no accuracy hides which triangle is closest.
+/// Distance (mm) from a tie at which the closest triangle is certain whatever the accuracy.
 const CLEAR: f32 = 0.1;
 
-/// What was found at the ties of one kind of pose.
+/// Results at the ties of one kind of pose.
 #[derive(Debug, Default)]
 struct Turns {
     ties: u32,
-    /// Turns by 45 degrees and more between two ticks: of whole queries, and of a tracker.
+    /// Changes of the direction by 45 degrees and more between two ticks: with complete queries, and with a tracker.
     whole: u32,
     tracked: u32,
-    /// Ticks in which the tracker's direction is not the query's.
+    /// Ticks in which the tracker's direction differs from the query's.
     kept: u32,
     /// Ticks beyond a tie.
     beyond: u32,
@@ -36,12 +36,12 @@ struct Turns {
 /// The cosine of 45 degrees: a smaller product of two directions is a turn.
 const TURN: f32 = 0.707;
 
-/// The distance (mm) between the points of a pair, from the axis.
+/// The distance (mm) between the points of a pair, from the tool's axis.
 fn length(tool: &Capsule, found: &Proximity) -> f32 {
     tool.axis_point(found.axis_parameter).distance(found.point_on_surface)
 }
 
-/// A scene at rest, and what a whole query says of it.
+/// A scene at rest, and a complete query on it.
 struct Scene<'t, 's> {
     query: Query<'t, u16, MAX_STACK>,
     surface: MovingTable<'s, [Vec3]>,
@@ -52,7 +52,7 @@ impl Scene<'_, '_> {
         self.query.closest(&self.surface, tool, &Options::cold()).expect("an answer")
     }
 
-    /// Of two poses with the same side and other directions, two neighbours in between.
+    /// Two neighbouring poses between two poses with the same side and different directions.
     fn tie(&mut self, from: Capsule, to: Capsule) -> Option<[Capsule; 2]> {
         let (mut from, mut to) = (from, to);
         let side = self.ask(&from).side;
@@ -69,7 +69,7 @@ impl Scene<'_, '_> {
             if found.direction.dot(first) < TURN { to = middle } else { from = middle }
         }
         let (one, other) = (self.ask(&from), self.ask(&to));
-        // Where the direction turns slowly nothing ties, and next to the surface it is the surface's own.
+        // Where the direction changes slowly nothing ties, and next to the surface it is the surface's own normal.
         let is_tie = one.direction.dot(other.direction) < TURN && length(&from, &one) > 0.5;
         is_tie.then_some([from, to])
     }
@@ -126,7 +126,7 @@ fn turns_at_ties(mesh: &Mesh, size: f32, axis: f32, most: u32) -> [Turns; 2] {
             turns.kept += u32::from(tracked.direction.dot(whole.direction) < TURN);
             (last, last_whole) = (Some(tracked.direction), Some(whole.direction));
         }
-        // Beyond the tie, either way, the direction is that of a whole query, whatever error the surface states.
+        // Beyond the tie, on either side, the direction is that of a complete query, whatever error the surface states.
         let apart = (to.start() - from.start()).normalize() * CLEAR;
         for error in [0.0, 1.0] {
             let table = Inexact(&rows, error);

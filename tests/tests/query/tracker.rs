@@ -1,4 +1,4 @@
-//! The tracker against whole queries: the same separation at every tick, for any motion of tool and surface.
+//! The tracker compared with complete queries: the same separation at every tick, for any motion of tool and surface.
 
 // Requirement: T-01
 
@@ -29,10 +29,10 @@ fn ticks(few: usize) -> usize {
 struct Tally {
     ticks: usize,
     cut_short: usize,
-    /// Ticks by the cause of their fallback: start, surface, jump, full, and none.
+    /// Ticks by the reason for a complete query: start, surface, jump, full, and none.
     fallbacks: [usize; 5],
     nodes: [u64; 2],
-    /// Largest difference from the whole query, in units of the accuracy stated for both.
+    /// Largest difference from the complete query, in units of the accuracy stated for both.
     worst: f32,
 }
 
@@ -67,7 +67,7 @@ impl<'t, const OPENED: usize> Subject<'t, OPENED> {
         }
     }
 
-    /// Makes one tick, and compares it with a whole query.
+    /// Makes one tick, and compares it with a complete query.
     fn tick(
         &mut self,
         surface: &impl MovingSurface,
@@ -103,7 +103,7 @@ impl<'t, const OPENED: usize> Subject<'t, OPENED> {
                 "{:?}: {tracked:?}\n{whole:?}",
                 self.tally
             );
-            // The root is not counted, nor a warm triangle.
+            // The root is not counted, and neither is a warm triangle.
             let most = budget.tests().saturating_add(1 + Budget::TRIANGLE);
             assert!(found.work() <= most, "{tracked:?} {budget:?}");
             self.tally.cut_short += usize::from(found.lower < found.separation);
@@ -120,7 +120,7 @@ impl<'t, const OPENED: usize> Subject<'t, OPENED> {
     }
 }
 
-/// The next frame: the same again, a random deformation of the mesh, or the surface moved as a whole.
+/// The next frame: the same one, a random deformation of the mesh, or a rigid motion of the surface.
 fn next_frame(built: &BuiltTree, mesh: &Mesh, before: &[Vec3], rng: &mut Rng) -> Vec<Vec3> {
     match rng.u32(..12) {
         0 => before.to_vec(),
@@ -129,7 +129,7 @@ fn next_frame(built: &BuiltTree, mesh: &Mesh, before: &[Vec3], rng: &mut Rng) ->
             let paths = built.tree::<u16>().expect("16-bit indices").paths();
             built.to_rows(&deformation.apply(mesh, paths, 1.4, rng))
         }
-        // A motion of the whole keeps the stretch.
+        // A rigid motion keeps the stretch.
         _ => {
             let by = unit(rng) * rng.f32() * if rng.u32(..8) == 0 { 5.0 } else { 0.5 };
             before.iter().map(|&p| p + by).collect()
@@ -174,7 +174,7 @@ fn wander<const OPENED: usize>(mesh: &Mesh, ticks: usize, seed: u64) -> Tally {
         let after = next_frame(&built, mesh, &before, &mut rng);
         let measured = stretch_of(&after);
         if rng.u32(..40) == 0 {
-            // The odometer starts anew: the way to this frame is unknown.
+            // The odometer starts again: the motion to this frame is unknown.
             odometer.start(after.as_slice());
         }
         let step = odometer.step(before.as_slice(), after.as_slice());
@@ -248,13 +248,13 @@ fn a_tick_takes_all_of_its_budget_and_no_more() {
             tracker.closest(&surface, &sphere, &options).expect("an answer").closest
         };
         let whole = first(Budget::UNLIMITED);
-        // A plane's test needs an exact one to spare.
+        // A plane's test requires that an exact test would still fit.
         let enough = whole.work() + Budget::TRIANGLE;
         assert_eq!(first(Budget::new(enough)), whole);
         most = most.max(whole.triangle_tests);
         for too_few in 0..whole.work() - 1 {
             let found = first(Budget::new(too_few));
-            // No children are tested that do not all fit in.
+            // Children are only tested if all of them fit in the budget.
             let spare = 8.max(1 + Budget::TRIANGLE);
             assert!(
                 found.work() <= too_few + 1 && found.work() + spare > too_few,
@@ -281,13 +281,13 @@ fn odometers_wrap() {
     let mut rng = Rng::with_seed(6);
     let middle = rows.iter().sum::<Vec3>() / rows.len() as f32;
     let size = rows.iter().map(|p| p.distance(middle)).fold(0.0, f32::max);
-    // The tool moves to and fro, so far in all that the odometer wraps within the test.
+    // The tool moves back and forth, so far in total that the odometer wraps within the test.
     let mut tip = middle + Vec3::X * size * 1.2;
     for tick in 0..40_000 {
         let step = Vec3::X * size / 70.0;
         tip += (if tick % 2 == 0 { step } else { -step }) + unit(&mut rng) * size * 1e-4;
         let tool = Instrument::capsule(tip, tip + Vec3::ONE * size, 1.0);
-        // For a long time no node is tested, so that bounds get as old as they can.
+        // For a long time no node is tested, so that bounds get as old as possible.
         let is_starved = tick / 8_000 % 3 == 1;
         let budget = is_starved.then_some(Budget::new(8));
         subject.tick(&surface, &tool, &Options::cold().unsigned(), budget);
@@ -321,7 +321,7 @@ fn a_tick_on_the_path_of_table_3_takes_few_tests() {
     assert!(tally.nodes[0] * 12 < tally.nodes[1], "{tally:?}");
 }
 
-/// A front that was full starts anew: it is full again only where one that just started is.
+/// A front that was full starts again: it is full again only if a newly started one is.
 #[test]
 fn a_full_front_does_not_stay_full() {
     type Small<'t> = Tracker<'t, u16, MAX_STACK, 100>;
@@ -360,7 +360,7 @@ fn a_full_front_does_not_stay_full() {
     assert!(full_again > 0 && stuck == 0);
 }
 
-/// A tick may pass over a triangle that is closer than its pair by less than a query's accuracy.
+/// A tick may skip a triangle that is closer than its pair by less than a query's accuracy.
 #[test]
 fn a_tick_states_twice_the_accuracy_of_a_query() {
     let mesh = generate::heart(1_000).expect("a valid size").mesh;

@@ -1,5 +1,5 @@
-//! Every wall within the margin is in the list of contacts: climbing searches against f64 over thin, close, coarse and
-//! lattice-aligned closed meshes, few places, parts with labels, and the force between two walls.
+//! Every wall within the margin is in the list of contacts: hill climbing compared with f64 on thin, close, coarse and
+//! lattice-aligned closed meshes, short lists, labelled parts, and the force between two walls.
 //!
 //! One file, because all tests compare with the same oracle.
 
@@ -20,7 +20,7 @@ use glam::{DVec3, Vec3};
 
 const MARGIN: f32 = 3.0;
 const RADIUS: f32 = 2.5;
-/// Two contacts within this angle (radians) may be one, with the rounding of the library's directions.
+/// Directions (radians) of two contacts within this angle may count as one, including the library's rounding.
 const ALIKE: f64 = 0.14;
 
 /// A box whose faces have `cells` squares an edge.
@@ -75,7 +75,7 @@ fn joined(parts: &[Mesh]) -> Mesh {
     all
 }
 
-/// A wall that a tool outside must see: the middle of a triangle that faces it, or the lowest place of a part.
+/// A wall that faces a tool outside: the middle of a triangle that faces it, or the lowest point of a part.
 #[derive(Clone, Copy, Debug)]
 struct Wall {
     separation: f64,
@@ -100,7 +100,7 @@ fn walls(rows: &[Vec3], triangles: &[[u32; 3]], [start, end]: [Vec3; 2]) -> Vec<
     triangles.iter().filter_map(wall).collect()
 }
 
-/// The deepest wall below the list's bound that no contact stands for.
+/// The deepest wall below the list's bound that no contact represents.
 fn missing(walls: &[Wall], contacts: &[Contact], bound: f32, accuracy: f32) -> Option<Wall> {
     let error = 2.0 * f64::from(accuracy);
     let stands_for = |wall: &Wall, contact: &Contact| {
@@ -115,7 +115,7 @@ fn missing(walls: &[Wall], contacts: &[Contact], bound: f32, accuracy: f32) -> O
     walls.iter().filter(is_missing).min_by(least).copied()
 }
 
-/// How near two walls in different directions are to a tie, where the nearer one changes.
+/// How close two walls in different directions are to a tie, where the nearer one changes.
 fn tie(walls: &[Wall]) -> f64 {
     let pairs = walls.iter().flat_map(|one| walls.iter().map(move |other| (one, other)));
     let apart = pairs.filter(|(one, other)| one.towards.dot(other.towards) < 0.98);
@@ -174,7 +174,7 @@ fn no_wall_is_missing_from_a_list_of_contacts() {
                 let found = query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut list);
                 let found = found.expect("an answer");
                 let tracked = tracker.contacts(&surface, &tool, MARGIN, &options, &mut own);
-                // A front may pass over a triangle that is closer by less than the accuracy.
+                // A front may skip a triangle that is closer by less than the accuracy.
                 assert!(
                     tracked.expect("an answer").fallback.is_some()
                         || own.accuracy() > 1.9 * list.accuracy()
@@ -220,7 +220,7 @@ fn no_wall_is_missing_from_a_list_of_contacts() {
     assert!(checked > starts * 60 && several * 40 > checked && cut > 10);
 }
 
-/// A capsule along a fine flat wall has more triangles near it than the list has places.
+/// A capsule along a fine flat wall has more triangles near it than fit in the list.
 #[test]
 fn a_list_with_too_few_places_still_has_the_wall() {
     let mesh = lattice(Vec3::new(-40.0, -20.0, -10.0), Vec3::new(40.0, 20.0, 0.0), [120, 60, 4]);
@@ -258,7 +258,7 @@ fn a_list_with_too_few_places_still_has_the_wall() {
     assert!(cut_short > 20, "{cut_short}");
 }
 
-/// A shaft through two lobes of an organ has one contact, the deepest, and its list does not say that this is all.
+/// A shaft through two lobes of an organ has one contact, the deepest, and its list does not claim to be complete.
 #[test]
 fn a_shaft_through_two_lobes_has_no_complete_list() {
     let block = |low: f32, high: f32| {
@@ -287,7 +287,7 @@ fn a_shaft_through_two_lobes_has_no_complete_list() {
     assert!(deepest < -7.0 && bound == MARGIN, "{deepest} {bound}");
 }
 
-/// An axis that crosses ridges aslant is below each of their faces at one of its corners, and is outside of both.
+/// An axis that crosses ridges obliquely is below each of their faces at one of its corners, and outside of both.
 #[test]
 fn ridges_that_an_axis_crosses_aslant_are_contacts() {
     let roof = |y: f32| {
@@ -317,8 +317,8 @@ fn ridges_that_an_axis_crosses_aslant_are_contacts() {
     assert!(at_ridges[0] < -14.0 && at_ridges[1] > 14.0, "{at_ridges:?}");
 }
 
-/// Between two walls of a groove that both face the tool, no step changes the force by more than the walls change, and
-/// their activations.
+/// Between two walls of a groove that both face the tool, each step changes the force by at most the change of the
+/// walls and their activations.
 #[test]
 fn the_force_between_two_walls_is_continuous() {
     const STEP: f32 = 1e-3;
@@ -342,13 +342,13 @@ fn the_force_between_two_walls_is_continuous() {
         let mut rng = Rng::with_seed(7);
         for _ in 0..if cfg!(debug_assertions) { 20 } else { 200 } {
             let depth = 0.5 + 4.5 * rng.f32();
-            // Up the groove's middle, this far from both walls.
+            // Upwards in the groove's middle, at this distance from both walls.
             let mut at = Vec3::new(0.0, depth / angle.cos(), 20.0 * rng.f32());
             let (mut largest, mut size) = (0.0, 0.1);
             for _ in 0..100 {
                 let from = at + unit(&mut rng) * size * rng.f32();
                 let to = from + unit(&mut rng).with_z(0.0) * STEP;
-                // The closest point of neither wall is at the groove's bottom, where a contact begins.
+                // Neither wall's closest point is at the groove's bottom, where a contact begins.
                 let faces_both = |at: Vec3| at.x.abs() < 0.9 * at.y * angle.tan();
                 if !faces_both(from) || !faces_both(to) {
                     continue;
@@ -375,7 +375,7 @@ fn the_force_between_two_walls_is_continuous() {
 const MUSCLE: u8 = 1;
 const ARTERY: u8 = 2;
 
-/// The example of [`Tree::label`]: the margin of an artery holds beside muscle that is nearer.
+/// The example of [`Tree::label`]: the margin around an artery is kept beside muscle that is closer.
 #[test]
 fn a_label_keeps_its_margin_beside_a_nearer_part() {
     const WIDE: f32 = 5.0;
@@ -420,7 +420,7 @@ fn a_label_keeps_its_margin_beside_a_nearer_part() {
                 assert!(all.is_complete());
                 assert!(found.iter().all(|one| tree.label(one.triangle) == Some(ARTERY)));
                 let deepest = found.iter().next().map_or(f32::INFINITY, |one| one.separation);
-                // At the surface it is that of an axis as far inside.
+                // At the surface the bound is that of an axis equally far inside.
                 let distance = least + RADIUS;
                 let is_at = distance <= 3.0 * found.accuracy();
                 let under = found.accuracy() + if is_at { 2.0 * distance } else { 0.0 };
@@ -434,7 +434,7 @@ fn a_label_keeps_its_margin_beside_a_nearer_part() {
     assert!(near * 4 > checked && checked > 100);
 }
 
-/// The bound of a list whose places ran out is a ridge below the farthest triangle kept.
+/// If the list has too little room, its bound is a prominence below the farthest stored triangle.
 #[test]
 fn the_bound_of_a_list_leaves_room_for_a_ridge() {
     let mesh = generate::brain(2_000).expect("a valid size");

@@ -1,4 +1,4 @@
-//! The wide search: its counts, its stacks and its budgets. `differential.rs` tests the accuracy of both searches.
+//! The wide (batched) search: its counts, stacks and budgets. `differential.rs` tests the accuracy of both searches.
 
 // Requirement: A-01
 
@@ -20,7 +20,7 @@ fn tool(mesh: &Mesh, rng: &mut Rng) -> Sphere {
     Sphere::new(on_surface + unit(rng) * 40.0 * rng.f32(), 2.0).expect("valid")
 }
 
-/// Counts are compared exactly: a change of the tree or of the batches shows here, and must be intended.
+/// Counts are compared exactly: they reveal any change of the tree or of the batches, which must be intended.
 #[test]
 fn counts_of_a_fixed_stream_are_what_they_were() {
     let (mesh, built) = heart();
@@ -86,7 +86,7 @@ fn tests_with<const D: usize>(mesh: &Mesh, built: &BuiltTree, rows: &[Vec3]) -> 
     tests
 }
 
-/// A larger budget continues the same search: the interval grows at neither end by more than the accuracy.
+/// A larger budget continues the same search: neither bound of the interval widens by more than the accuracy.
 #[test]
 fn more_budget_tells_no_less() {
     let (mesh, built) = heart();

@@ -1,5 +1,4 @@
-//! Limits hold as they are configured: of size where triangles have their own limits of stretch, of exactly 1, and those
-//! learned from a motion.
+//! Limits hold as configured: on size if triangles have their own limits, of exactly 1, and learned from a motion.
 
 // Requirements: F-02, F-03
 
@@ -19,7 +18,7 @@ fn heart() -> Mesh {
     generate::heart(1_000).expect("a valid size").mesh
 }
 
-/// A mesh pressed flat along an axis, so that many of its triangles are slivers, and turned.
+/// A mesh flattened along an axis, so that many of its triangles are slivers, and rotated.
 fn squashed(mesh: &Mesh, by: f32, turn: f32) -> Mesh {
     let turn = Mat3::from_axis_angle(Vec3::new(0.6, 0.8, 0.0), turn);
     let positions = mesh.positions.iter().map(|p| turn * (*p * Vec3::new(1.0, by, 1.0)));
@@ -37,7 +36,7 @@ fn admitted(built: &BuiltTree, rows: &[Vec3], shrinkage: f32) -> Result<(), Stre
     }
 }
 
-/// A region may shrink to the configured part of its size, and not below, whatever the triangles' limits of stretch.
+/// A region may shrink to the configured fraction of its size, and not below, whatever the triangles' stretch limits.
 #[test]
 fn shrinkage_is_as_configured_where_triangles_have_their_own_limits() {
     let mesh = heart();
@@ -60,7 +59,7 @@ fn shrinkage_is_as_configured_where_triangles_have_their_own_limits() {
     }
 }
 
-/// A limit of 1 admits the rest shape, moved and turned by what f32 holds exactly too, and modes are built on it.
+/// A limit of 1 admits the rest shape, also after rigid motions exact in f32, and modes can be built on it.
 #[test]
 fn a_limit_of_exactly_one_admits_the_rest_shape() {
     let whole = generate::heart(320).expect("a valid size");
@@ -83,7 +82,7 @@ fn a_limit_of_exactly_one_admits_the_rest_shape() {
                 admitted(&built, &rest, 0.25).expect("the rest shape");
                 let turned: Vec<Vec3> = rest.iter().map(|p| Vec3::new(-p.y, p.x, p.z)).collect();
                 admitted(&built, &turned, 0.25).expect("turned by a quarter");
-                // It stays a limit: the least triangle's, and what rounding takes.
+                // It still limits: at the least triangle's limit plus the rounding.
                 let larger: Vec<Vec3> = rest.iter().map(|&p| p * 1.51).collect();
                 assert!(measure_stretch(&tree, larger.as_slice()).is_err());
                 let limit = tree.stretch();
@@ -112,8 +111,8 @@ fn volume(mesh: &Mesh, positions: &[Vec3]) -> f64 {
     mesh.triangles.iter().map(|&[a, b, c]| at(a).dot(at(b).cross(at(c))) / 6.0).sum()
 }
 
-/// Limits learned from a motion admit its frames with a margin of 0, on meshes pressed flat too. Only a frame that turned
-/// the surface inside out is refused, which on the flattest ones a frame can by less than it stretches them.
+/// Limits learned from a motion admit its frames with a margin of 0, even on flattened meshes. Only a frame that turns
+/// the surface inside out is refused; on the flattest meshes less stretch than in the motion suffices for that.
 #[test]
 fn every_frame_that_limits_were_learned_from_is_admitted() {
     let mut rng = Rng::with_seed(191);
@@ -162,13 +161,13 @@ fn every_frame_that_limits_were_learned_from_is_admitted() {
     assert!(refused < frames_seen / 64, "{refused} of {frames_seen}");
 }
 
-/// The stretch of the worst triangle of a motion is a tree's limit, as learned, also where that triangle joins a flat one:
-/// their shared edge is rounded as the flat one's.
+/// The stretch of the worst triangle of a motion is the learned limit of a tree, even if that triangle joins a flat
+/// one: their shared edge is rounded for the flat one.
 #[test]
 fn a_learned_limit_admits_a_triangle_beside_a_flat_one() {
     let mut rng = Rng::with_seed(192);
     for _ in 0..2_000 {
-        // Both are measured from the corner at (1, 0): the flat one has nearly 180 degrees there.
+        // Both are measured from the corner at (1, 0): the flat one's angle there is nearly 180 degrees.
         let (open, flat) = (1.2 + rng.f32() * 0.2, 0.1 + rng.f32() * 0.1);
         let corner = |angle: f32| Vec3::new(1.0 + angle.cos(), angle.sin(), 0.0);
         let turn = Mat3::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), rng.f32() * 6.0);

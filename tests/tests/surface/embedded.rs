@@ -23,7 +23,7 @@ use dibs_tests::{ask, sample, surfaces};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
-/// A heart and a brain in lattices, in volumes that are no box, and in one that vertices stick out of.
+/// A heart and a brain in lattices, in volumes that are not boxes, and in a volume with vertices outside.
 fn built(rng: &mut Rng) -> Vec<(Mesh, BuiltTree)> {
     let heart = generate::heart(1_000).expect("a valid size").mesh;
     let brain = generate::brain(2_000).expect("a valid size");
@@ -44,9 +44,9 @@ fn built(rng: &mut Rng) -> Vec<(Mesh, BuiltTree)> {
     trees
 }
 
-/// Every vertex lies within its spheres' measured stretch times radius, in f64, whatever the motion; and the radius is
-/// needed: where all elements are pulled by the limit along the line from a pin to a vertex, straight through a box, it is
-/// reached.
+/// Every vertex is within its spheres' radii times the measured stretch, in f64, whatever the motion. The radius is
+/// needed: if all elements are stretched to the limit along the line from a pin to a vertex, straight through a box, it
+/// is reached.
 #[test]
 fn coverage_holds_in_every_admitted_frame() {
     let mut rng = Rng::with_seed(1);
@@ -93,7 +93,7 @@ fn coverage_holds_in_every_admitted_frame() {
 }
 
 /// Climbs, over the shape of an element and its deformation, towards a stretch above the measured one: there is none.
-/// Shapes are needles, plates and slivers, too; a measured stretch is hardly above the true one.
+/// Shapes include needles, plates and slivers; the measured stretch is hardly above the true one.
 #[test]
 fn no_admitted_element_is_stretched_further_than_measured() {
     let mut rng = Rng::with_seed(2);
@@ -153,7 +153,7 @@ fn no_admitted_element_is_stretched_further_than_measured() {
     assert!(highest > 1.0 - 3e-5 && loosest < 0.02, "{highest} {loosest}");
 }
 
-/// Frames beyond the limit, turned inside out, flat or not finite are refused, by the number of the element.
+/// Frames beyond the limit, inside out, flat or not finite are refused, and the error states the element's number.
 #[test]
 fn frames_beyond_the_limit_are_refused() {
     let mut rng = Rng::with_seed(3);
@@ -188,11 +188,11 @@ fn frames_beyond_the_limit_are_refused() {
     }
 }
 
-/// Tools asked for on each frame, each at the tree's limit and at the measured stretch.
+/// Number of tools for each frame, each with the tree's limit and with the measured stretch.
 const TOOLS: usize = 8;
 
-/// Answers on embedded surfaces agree with exhaustive search, in f64 on vertices blended in f64, within the accuracy that
-/// they state. `DIBS_EMBEDDED_QUERIES` says how many, if set.
+/// Answers on embedded surfaces agree with exhaustive search, on vertices blended in f64, within the stated accuracy.
+/// `DIBS_EMBEDDED_QUERIES` sets the number of queries.
 #[test]
 fn answers_are_right() {
     let mut rng = Rng::with_seed(4);
@@ -235,7 +235,7 @@ fn answers_are_right() {
     println!("{queries} queries, errors up to {largest:.3} of the accuracy");
 }
 
-/// The wide query, the side and a tracker answer as they do on the same vertices in a table.
+/// The wide query, the side and a tracker give the same answers as on the same vertices in a table.
 #[test]
 fn every_query_takes_embedded_surfaces() {
     let mut rng = Rng::with_seed(5);
@@ -273,12 +273,12 @@ fn every_query_takes_embedded_surfaces() {
     }
 }
 
-/// Most nodes of the frames below.
+/// Largest number of nodes in the frames below.
 const NODES: usize = 120;
 
-/// Frames of nodes over the bus: published with the stretch of a whole measurement whatever the slices of work, refused
-/// where they must be while the last good one stays, and moving between their times and beyond. The tracker's answers on
-/// all of these surfaces are those of exhaustive search.
+/// Frames of nodes over the bus: published with the stretch of a complete measurement whatever the slices of work;
+/// wrong frames are refused while the last good one stays; the surface is interpolated and extrapolated. The tracker's
+/// answers on all of these surfaces equal those of exhaustive search.
 #[test]
 fn nodes_come_over_the_bus() {
     let mut rng = Rng::with_seed(6);
@@ -391,8 +391,8 @@ fn nodes_come_over_the_bus() {
     assert!(unknown < 3, "{unknown}");
 }
 
-/// In slices the monitor decides as a whole measurement does, without the assembler, too; and names a node that moves too
-/// fast.
+/// The monitor in slices has the result of a complete measurement, even without the assembler; and it reports a node
+/// that moves too fast.
 #[test]
 fn the_monitor_compares_frames_itself() {
     let mut rng = Rng::with_seed(7);
@@ -436,8 +436,8 @@ fn beside(at: &[Vec3], rng: &mut Rng) -> Instrument {
     Instrument::capsule(start, end, 2.5)
 }
 
-/// Node tests on meshes in lattices of two thousand nodes, beside those of geodesics along the surface at the same
-/// stretch: fewer, because straight lines are shorter than ways along the surface.
+/// Node tests on meshes in lattices of two thousand nodes, compared with those of geodesics along the surface at the
+/// same stretch: fewer, because straight lines are shorter than paths along the surface.
 #[test]
 fn straight_radii_take_fewer_node_tests() {
     let mut rng = Rng::with_seed(8);

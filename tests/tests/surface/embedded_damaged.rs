@@ -1,4 +1,4 @@
-//! Volumes that cannot carry a surface, and damaged nodes: typed errors.
+//! Volumes that cannot move a surface, and damaged nodes: typed errors.
 
 // Requirement: F-07
 
@@ -79,7 +79,8 @@ fn damaged_nodes_are_refused() {
     assert_eq!(error, Some(NodesError::Weights { vertex: 9, sum: 6 * 65_535 - 65_536 }));
 }
 
-/// Nodes belong to trees whose radii are lengths of paths through a volume, and to no others; metrics do not.
+/// Trees whose radii are lengths of paths through a volume must have nodes, and other trees must not; trees with nodes
+/// have no metric.
 #[test]
 fn nodes_and_path_kind_go_together() {
     let built = built();
@@ -132,7 +133,7 @@ fn volumes_that_cannot_carry_a_surface_are_refused() {
         Err(other) => panic!("{other}"),
         Ok(_) => None,
     };
-    // A corner's cell missing, and the whole surface elsewhere.
+    // A volume without the cell at a corner, and a surface that is elsewhere.
     let without: Vec<[u32; 4]> = tetrahedra[..66].to_vec();
     let part = Volume::new(nodes.clone(), without).expect("connected");
     let error = build(&part);
@@ -142,7 +143,7 @@ fn volumes_that_cannot_carry_a_surface_are_refused() {
     let error = build(&Volume::new(far, tetrahedra.clone()).expect("valid"));
     let Some(VolumeError::Outside { count, distance, .. }) = error else { panic!("{error:?}") };
     assert!(count == mesh.positions.len() && distance > 900.0, "{count} {distance}");
-    // Pressed flat, and far too small.
+    // Flattened, and far too small.
     let flat: Vec<DVec3> = nodes.iter().map(|&at| at * DVec3::new(1.0, 1.0, 1e-9)).collect();
     let error = build(&Volume::new(flat, tetrahedra.clone()).expect("upright"));
     assert!(matches!(error, Some(VolumeError::Shape { .. } | VolumeError::Outside { .. })));
@@ -159,12 +160,12 @@ fn volumes_that_cannot_carry_a_surface_are_refused() {
     assert!(matches!(below, Err(BuildError::Limit { of: "tetrahedron", element: 7, .. })));
 }
 
-/// A vertex on a node, an edge or a face is bound exactly, and a volume whose skin is the surface holds it.
+/// A vertex on a node, an edge or a face is bound exactly, and a volume whose boundary is the surface contains it.
 #[test]
 fn a_skin_is_in_its_volume() {
     let (_, lattice) = heart();
     let positions: Vec<_> = lattice.nodes().iter().map(|node| node.as_vec3()).collect();
-    // Faces of one tetrahedron alone.
+    // Faces that belong to one tetrahedron only.
     let mut faces: Vec<([u32; 3], [u32; 3])> = Vec::new();
     for &[a, b, c, d] in lattice.tetrahedra() {
         for face in [[a, c, b], [a, b, d], [b, c, d], [a, d, c]] {

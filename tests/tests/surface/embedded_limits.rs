@@ -9,7 +9,7 @@ use dibs_tests::sample;
 use fastrand::Rng;
 use glam::Vec3;
 
-/// A heart in a lattice and in two volumes that are no box, one of which vertices stick out of.
+/// A heart in a lattice and in two volumes that are not boxes, one of them with vertices outside.
 fn hearts(rng: &mut Rng) -> (Mesh, Vec<Volume>) {
     let mesh = generate::heart(1_000).expect("a valid size").mesh;
     let hull = hull(&mesh, [7, 6, 5], rng);
@@ -18,7 +18,7 @@ fn hearts(rng: &mut Rng) -> (Mesh, Vec<Volume>) {
     (mesh, volumes)
 }
 
-/// A motion that stretches one side alone.
+/// A motion that stretches only one side.
 fn motion(volume: &Volume) -> Motion {
     let frame = |number: usize| {
         let by = 0.4 * (number as f64 * 0.7).sin();
@@ -39,8 +39,8 @@ fn built(mesh: &Mesh, volume: &Volume, limits: Vec<f32>) -> BuiltTree {
     Builder::new().limits(limits).nodes(volume).build(mesh).expect("bound")
 }
 
-/// The stretch in f64 is that of an independent computation, and a tree with the learned limits admits every frame of the
-/// motion, with smaller spheres than one limit for all gives.
+/// The stretch in f64 equals that of an independent computation, and a tree with the learned limits admits every frame
+/// of the motion, with smaller spheres than with one limit for all.
 #[test]
 fn limits_are_learned_from_nodes() {
     let mut rng = Rng::with_seed(80);
@@ -55,7 +55,7 @@ fn limits_are_learned_from_nodes() {
             let (stretch, _) = stretch_of(rest, now);
             assert!((stretch - needed.stretch).abs() < 1e-5, "{stretch} {needed:?}");
         }
-        // Without a margin, too: the check's rounding is in the limits.
+        // Even without a margin, because the limits include the check's rounding.
         let learned = built(&mesh, volume, needed.limits(0.0));
         let tree = learned.tree::<u16>().expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
@@ -76,7 +76,7 @@ fn limits_are_learned_from_nodes() {
     assert!(MotionStretch::of_nodes(&volumes[1], &other, &|_| ()).is_err());
 }
 
-/// Climbs towards a vertex beyond its sphere, where neighbours have different limits.
+/// Climbs towards a vertex outside its sphere, where neighbours have different limits.
 #[test]
 fn coverage_holds_with_limits_of_each() {
     let mut rng = Rng::with_seed(81);
@@ -118,7 +118,7 @@ fn no_element_goes_beyond_its_own_limit() {
         let tree = built.tree::<u16>().expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
         let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
-        // What the tree says of them, below the builder's by the check's rounding.
+        // The tree's limits are below the builder's by the check's rounding.
         let sorted = |mut limits: Vec<f32>| {
             limits.sort_by(f32::total_cmp);
             limits

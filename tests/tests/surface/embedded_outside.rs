@@ -28,7 +28,7 @@ fn built() -> BuiltTree {
     Builder::new().stretch(1.4).nodes(&smaller).build(&mesh).expect("bound")
 }
 
-/// The vertex whose weights' sizes sum up to most.
+/// The vertex with the largest sum of the weights' magnitudes.
 fn farthest_out(nodes: &Nodes<'_>) -> (u32, i32) {
     let sizes = |row| {
         let weights = nodes.weights(row).expect("in the table");
@@ -38,7 +38,7 @@ fn farthest_out(nodes: &Nodes<'_>) -> (u32, i32) {
     all.max_by_key(|&(_, sizes)| sizes).expect("not empty")
 }
 
-/// Nodes moved by this step each, so that a vertex moves as far as it can.
+/// Nodes moved by this step each, in the directions that move a vertex farthest.
 fn levered(nodes: &Nodes<'_>, frame: &[Vec3], vertex: u32, step: Vec3) -> Vec<Vec3> {
     let mut next = frame.to_vec();
     for (node, weight) in nodes.weights(vertex).expect("in the table") {
@@ -47,8 +47,8 @@ fn levered(nodes: &Nodes<'_>, frame: &[Vec3], vertex: u32, step: Vec3) -> Vec<Ve
     next
 }
 
-/// At rest a vertex is where its mesh has it, but for the rounding of its weights, and the tree states how much farther
-/// than nodes it can move.
+/// At rest a vertex is at its position in the mesh, up to the rounding of its weights, and the tree states by what
+/// factor it can move farther than the nodes.
 #[test]
 fn weights_carry_vertices_outside() {
     let (mesh, _) = heart();
@@ -72,8 +72,8 @@ fn weights_carry_vertices_outside() {
     assert!(tree.position_error() < 5e-3, "{}", tree.position_error());
 }
 
-/// Climbs, over the positions of the nodes that carry a section, towards a vertex beyond the sphere: there is none, though
-/// lines between vertices outside seldom are paths.
+/// Climbs, over the positions of the nodes that move a section, towards a vertex outside the sphere: there is none,
+/// although lines between vertices outside are seldom paths through the volume.
 #[test]
 fn coverage_holds_outside() {
     let mut rng = Rng::with_seed(72);
@@ -98,7 +98,7 @@ fn coverage_holds_outside() {
     assert!(highest > 0.98, "{highest}");
 }
 
-/// A vertex at the end of its lever comes towards the tool as fast as it can, and the tracker's answer keeps up.
+/// A vertex outside moves towards the tool as fast as possible, and the tracker's answer stays correct.
 #[test]
 fn a_tracker_counts_the_lever() {
     let built = built();
@@ -137,7 +137,7 @@ fn a_tracker_counts_the_lever() {
     }
 }
 
-/// No vertex of an admitted frame moved faster than the limit, however far it sticks out; and its error is stated.
+/// No vertex of an admitted frame moved faster than the limit, however far outside it is; and its error is stated.
 #[test]
 fn limits_are_those_of_vertices() {
     let built = built();
@@ -161,14 +161,14 @@ fn limits_are_those_of_vertices() {
         }
     }
     assert!(admitted <= 1.0 && admitted > 0.97 && refused < 1.03, "{admitted} {refused}");
-    // A table's error grows as its motion does.
+    // A table's error is amplified like its motion.
     let surface = nodes.surface(rest.as_slice());
     let erroneous = surfaces::Inexact(&rest, 0.25);
     let stated = nodes.surface(&erroneous).position_error() - surface.position_error();
     assert!((stated - 0.25 * nodes.amplification()).abs() < 1e-6, "{stated}");
 }
 
-/// Vertices beyond the distance, and at levers that would make too much of the nodes' errors.
+/// Vertices beyond the distance, and those with too large an amplification of the nodes' errors, are refused.
 #[test]
 fn vertices_too_far_outside_are_refused() {
     let (mesh, volume) = heart();
@@ -189,7 +189,7 @@ fn vertices_too_far_outside_are_refused() {
     assert_eq!(build(&shrunk(&volume, 0.85, f64::NAN)), error);
     let error = build(&shrunk(&volume, 0.3, 1_000.0));
     assert!(matches!(error, Some(VolumeError::Lever { .. })), "{error:?}");
-    // A lattice holds its surface, and one of another does not: its lines are no longer all straight.
+    // A lattice contains its own surface, but not another one: its lines are then no longer all paths.
     let lattice = Volume::lattice(&mesh, [3, 3, 3]).expect("a lattice").bind_within(5.0);
     let inside = Builder::new().nodes(&lattice).build(&mesh).expect("held");
     let nodes = Nodes::of(&inside.tree::<u16>().expect("valid")).expect("valid").amplification();
@@ -199,7 +199,8 @@ fn vertices_too_far_outside_are_refused() {
     assert!(Builder::new().nodes(&lattice).build(&larger).is_ok());
 }
 
-/// Weights of a tree whose vertices are all inside have no sign, and none is a longer lever than the limits count on.
+/// Weights of a tree whose vertices are all inside are unsigned, and no amplification exceeds the factor that the
+/// limits assume.
 #[test]
 fn damaged_levers_are_refused() {
     let built = built();
@@ -219,7 +220,7 @@ fn damaged_levers_are_refused() {
             bytes[at..at + 2].copy_from_slice(&weight.to_le_bytes());
         }
     };
-    // 1.5 and -0.5 are a lever of two, 2 less a unit and -1 one of three less two units.
+    // 1.5 and -0.5 have an amplification of two; 2 less a unit and -1 of three less two units.
     let (zero, one) = (32_768, 16_384);
     let with = |weights: [u16; 3]| defect(&|bytes| of(3, weights, bytes.len(), bytes));
     assert_eq!(with([zero + one / 2 * 3, zero - one / 2, zero]), None);
@@ -229,7 +230,7 @@ fn damaged_levers_are_refused() {
     let longest = [0, 0, 0];
     let sum = 4 * (3 * 32_768 + (16_384 + 3 * 32_768));
     assert_eq!(with(longest), Some(NodesError::Weights { vertex: 3, sum }));
-    // As weights without a sign they sum up to more than the whole.
+    // As unsigned weights their sum exceeds the whole.
     let unsigned = defect(&|bytes| bytes[16..20].copy_from_slice(&[0; 4]));
     assert!(matches!(unsigned, Some(NodesError::Weights { vertex: 0, .. })), "{unsigned:?}");
 }

@@ -1,4 +1,4 @@
-//! A surface carries its stretch and its error, and a query its last answer: the caller states none of them.
+//! A surface carries its stretch and its error, and a query its last answer: the caller does not pass them.
 
 // Requirement: F-04
 
@@ -87,7 +87,7 @@ fn a_frame_is_searched_with_its_own_stretch_and_error() {
             let limit = ask(&rows, &options).widened(ERROR);
             assert!(same(&ask(&known, &options), &by_hand));
             assert!(same(&ask(&unknown, &options), &limit));
-            // A stretch that the caller states takes precedence.
+            // A stretch that the caller passes takes precedence.
             let stated = ask(&rows, &options.stretch(less)).widened(ERROR);
             assert!(same(&ask(&known, &options.stretch(less)), &stated));
             assert!(stated.node_tests <= by_hand.node_tests);
@@ -142,7 +142,7 @@ fn tracker_and_contacts_read_the_same_facts() {
     let found = query(&tree).contacts(&surface, &tool, margin, &options, &mut contacts);
     assert!(same(&found.expect("an answer"), &closest));
     assert_eq!(contacts.accuracy(), closest.accuracy);
-    // The error widens the interval, not the contacts: they are of the positions as published.
+    // The error widens the interval, but not the contacts, which refer to the positions as published.
     let mut exact = Contacts::<8>::new();
     query(&tree).contacts(rows, &tool, margin, &options, &mut exact).expect("an answer");
     assert!(!exact.is_empty() && exact.iter().eq(contacts.iter()));
@@ -175,7 +175,7 @@ fn a_surface_between_two_frames_and_beyond_them_has_a_stretch_of_both() {
     let stated = beyond.stretch().expect("both are known").sigma();
     assert!((stated - (1.5 * more.sigma() + 0.5 * less.sigma())).abs() < 1e-6);
     assert!(measure_stretch(&tree, &beyond).map_or(1.5, |measured| measured.sigma()) <= stated);
-    // Half a step beyond: one and a half errors of the later frame, and half an error of the earlier.
+    // Half an interval beyond the later frame: one and a half of its errors, plus half an error of the earlier.
     assert!((beyond.position_error() - 2.0 * ERROR).abs() < 1e-6);
 }
 

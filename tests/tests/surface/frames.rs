@@ -19,7 +19,7 @@ fn label(epoch: u32) -> FrameLabel {
     }
 }
 
-/// Every vertex carries the epoch and its own number.
+/// A vertex that encodes the epoch and its own number.
 fn vertex_of(epoch: u32, vertex: u32) -> Vec3 {
     Vec3::new(f32::from_bits(epoch), vertex as f32, f32::from_bits(!epoch))
 }
@@ -38,10 +38,10 @@ fn nothing_is_read_before_the_first_frame() {
     assert!(reader.read().is_none());
     assert!(writer.front().is_none());
     assert_eq!(writer.publish(label(1)), Err(PublishError::Incomplete { missing: 2 }));
-    // The read without a frame does not hold the publication up.
+    // A read without a frame does not delay the publication.
     writer.push(Vec3::ONE).unwrap();
     assert_eq!(writer.publish(label(1)), Err(PublishError::Incomplete { missing: 1 }));
-    // A frame that is begun anew has no vertices.
+    // A frame that is begun again has no vertices.
     writer.begin();
     assert_eq!(writer.missing(), 2);
     writer.push(Vec3::ONE).unwrap();
@@ -124,7 +124,7 @@ fn age_is_right_over_a_wrap_of_the_clock() {
     );
 }
 
-/// The clock may wrap any number of times: a frame's age never falls.
+/// The clock may wrap any number of times: a frame's age never decreases.
 #[test]
 fn a_frame_does_not_grow_young_again() {
     let frames = Frames::<1>::new();
@@ -140,7 +140,7 @@ fn a_frame_does_not_grow_young_again() {
         last = age;
         clock = clock.wrapping_add(0x3FFF_FFFF);
     }
-    // The next frame is young.
+    // The next frame has a small age.
     writer.push(Vec3::ZERO).unwrap();
     writer.publish(FrameLabel { received: Millis(clock), ..label(2) }).unwrap();
     assert_eq!(age(&mut reader, clock.wrapping_add(7)), 7);
@@ -150,8 +150,9 @@ fn age(reader: &mut FrameReader<'_>, now: u32) -> u32 {
     reader.latest(Millis(now)).frame().expect("published").age.0
 }
 
-/// Another core may have stamped the frame a little later than this one read its clock: such a frame is new. A frame
-/// from farther ahead is old: otherwise one flipped bit of the stamp would keep a frozen surface fresh for days.
+/// Another core may have stamped the frame slightly later than this one read its clock: such a frame counts as new. A
+/// frame from farther ahead counts as old: otherwise one flipped bit of the stamp would keep a frozen surface fresh for
+/// days.
 #[test]
 fn a_frame_from_the_future_is_new_or_old_but_never_in_between() {
     let frames = Frames::<1>::new();
@@ -175,8 +176,8 @@ fn a_double_buffer_takes_24_bytes_a_vertex() {
     assert!(size_of::<Frames<1>>() <= 24 + 160, "{}", size_of::<Frames<1>>());
 }
 
-/// A writer and a reader run at full speed: every read sees one whole frame, and epochs never fall. The test ends when
-/// the reader has seen many frames, however the machine schedules the two threads.
+/// A writer and a reader run at full speed: every read sees one complete frame, and epochs never decrease. The test
+/// ends when the reader has seen many frames, however the machine schedules the two threads.
 #[test]
 fn no_read_is_torn() {
     const N: usize = 97;
@@ -224,7 +225,7 @@ fn no_read_is_torn() {
                     }
                     last = epoch;
                 }
-                // Pauses of many lengths: publications come at every place of a read.
+                // Pauses of many lengths, so that publications occur at every point of a read.
                 for _ in 0..reads % 61 {
                     std::hint::spin_loop();
                 }

@@ -1,4 +1,4 @@
-//! Surfaces that move: frames, stretch, modes, and the frames that are refused.
+//! Moving surfaces: frames, stretch, modes, and refused frames.
 
 mod as_configured;
 mod embedded;

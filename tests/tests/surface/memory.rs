@@ -1,4 +1,4 @@
-//! A surface's share of a controller's memory: two or three buffers of positions, and some bytes for both of their ends,
+//! The memory of a surface on a controller: two or three buffers of positions, and some bytes for both of their ends,
 //! the assembler, and the stretch of every region.
 
 // Requirement: F-09
@@ -6,7 +6,7 @@
 use dibs_nostd::guard::{Bus, Guard, Surface};
 use dibs_nostd::{Assembler, FrameReader, Frames, StretchMonitor, Tracker};
 
-/// Bytes besides the positions, of a surface of `N` vertices.
+/// Bytes of a surface of `N` vertices in addition to the positions.
 const fn besides<const N: usize>() -> usize {
     size_of::<Frames<N>>()
         + size_of::<FrameReader<'static>>()
@@ -14,7 +14,7 @@ const fn besides<const N: usize>() -> usize {
         - 2 * 12 * N
 }
 
-/// References on this computer are at least as long as the board's, so the board takes no more.
+/// References on the host are at least as long as the board's, so the board needs no more.
 #[test]
 fn a_surface_takes_1750_bytes_besides_its_positions() {
     let all = [besides::<162>(), besides::<5_138>(), besides::<65_536>()];
@@ -33,7 +33,7 @@ fn a_guard_takes_as_much_as_its_pages_say() {
     assert!(notes < 400 && bus < 3_000 && guard < 500, "{notes} {bus} {guard}");
 }
 
-/// Besides its gate and the ends of the buffers.
+/// Without its gate and the ends of the buffers.
 #[test]
 fn an_assembler_takes_less_than_700_bytes() {
     type Monitor = StretchMonitor<'static, u16>;
@@ -42,7 +42,7 @@ fn an_assembler_takes_less_than_700_bytes() {
     assert!(besides < 700, "{besides}");
 }
 
-/// A surface that moves between frames has a third buffer, and the stretch of its extrapolation.
+/// A surface that is extrapolated has a third buffer, and the stretch of its extrapolation.
 #[test]
 fn a_continuous_surface_takes_36_bytes_a_vertex_and_2050() {
     type Continuous = Frames<5_138, 3>;

@@ -22,8 +22,7 @@ use dibs_tests::{ask, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// The stated errors hold at every vertex of every frame, and are reached. Positions agree with a sum in f64 up to
-/// rounding.
+/// The stated errors hold at all vertices of all frames, and are reached. Positions are a sum in f64 up to rounding.
 #[test]
 fn every_frame_is_within_the_stated_error() {
     let (mesh, motion) = trembling(2_000, 5, 1);
@@ -64,7 +63,7 @@ fn every_frame_is_within_the_stated_error() {
     }
 }
 
-/// A vertex table that notes the rows that are read.
+/// A vertex table that records which rows are read.
 struct Watched<'a, T> {
     table: &'a T,
     asked: RefCell<Vec<u32>>,
@@ -81,7 +80,7 @@ impl<T: VertexTable> VertexTable for Watched<'_, T> {
     }
 }
 
-/// A query that computes vertices when it reads them answers with the same bits as one on a table computed before. The
+/// A query that computes vertices when it reads them gives the same bits as one on a table computed in advance. The
 /// answer agrees with exhaustive search, and most vertices are never computed.
 #[test]
 fn lazy_is_eager_bit_for_bit_and_right() {
@@ -226,7 +225,7 @@ fn what_cannot_be_fitted_is_named() {
     assert!(matches!(Modes::of(&bare), Err(modes::ModesError::Absent)));
 }
 
-/// Frames beyond the limit are listed, and are no anchors of the bound: they stay beyond the limit.
+/// Frames beyond the limit are listed, and are not anchors of the bound: they stay beyond the limit.
 #[test]
 fn frames_beyond_the_limit_are_named() {
     let generate::MovingMesh { mesh, motion } = generate::heart(320).expect("a valid size");
@@ -248,8 +247,8 @@ fn frames_beyond_the_limit_are_named() {
     }
 }
 
-/// A wrong field of the section is an error that names it. Damage at random is an error, or gives other positions
-/// without a panic.
+/// A wrong field of the section is an error that names it. Random damage is an error, or gives other positions without
+/// a panic.
 #[test]
 fn damaged_modes_do_not_validate() {
     let (built, _) = small(3);
@@ -325,7 +324,7 @@ fn damaged_modes_do_not_validate() {
 
 dibs_nostd::include_tree!("modal_heart");
 
-/// The generated module holds the builder's modes.
+/// The generated module contains the builder's modes.
 #[test]
 fn the_generated_module_holds_the_modes() {
     let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a valid size");
@@ -345,7 +344,7 @@ fn the_generated_module_holds_the_modes() {
     assert_eq!(modal_heart::STACK, tree_of_module.stack() as usize);
 }
 
-/// All modes of the real heart's motion together give its recorded frames; fewer modes give them less exactly. Prints
+/// All modes of the real heart's motion together reproduce its recorded frames; fewer modes do so less exactly. Prints
 /// errors, positions read and the bound's excess.
 #[test]
 #[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]

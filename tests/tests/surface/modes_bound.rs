@@ -1,4 +1,4 @@
-//! The bound of a modal surface's stretch, from its weights alone.
+//! The bound on a modal surface's stretch, computed from its weights alone.
 
 // Requirement: F-06
 
@@ -37,7 +37,7 @@ fn the_stretch_bound_is_sound_and_tight() {
         let check = |weights: &[f32], most: f64| {
             let surface = modes.surface::<10>(weights).expect("in range");
             let now = positions(&surface);
-            // A triangle's stretch counts relative to its own limit.
+            // A triangle's stretch relative to its own limit.
             let share = |triangle: u32| {
                 let limit = tree.stretch_limit(TriangleRow(triangle)).expect("in the table");
                 let own = stretch::of_triangle(&rows, &now, triangle as usize, tree.paths());
@@ -68,7 +68,7 @@ fn the_stretch_bound_is_sound_and_tight() {
     }
 }
 
-/// The stored numbers of the bound, read by `docs/format.md` alone, in f64.
+/// The stored numbers of the bound, read only by `docs/format.md`, in f64.
 struct Stored {
     growths: Vec<f64>,
     /// The weights and the stretch of each anchor.
@@ -124,7 +124,7 @@ impl Stored {
     }
 }
 
-/// Anchors, segments, rounding and slack count as documented: less would not be sound, and more would refuse frames.
+/// Anchors, segments, rounding and slack are as documented: less would not be sound, and more would refuse frames.
 #[test]
 fn the_stretch_bound_is_the_documented_one() {
     const SLACK: f32 = 0.01;

@@ -1,4 +1,4 @@
-//! The limit on speed holds for modal surfaces as for surfaces of vertices, whether a frame is measured or not.
+//! The speed limit holds for modal surfaces as for surfaces of vertices, whether a frame is measured or not.
 
 // Requirement: F-06
 
@@ -33,8 +33,8 @@ fn largest_step(modes: &Modes<'_>, before: &[f32], now: &[f32]) -> f32 {
     rows(before).zip(rows(now)).map(|(a, b)| a.distance(b)).fold(0.0, f32::max)
 }
 
-/// A recorded motion passes a limit at the speed of its fastest vertex. A jump is refused and counted as too fast, and
-/// passes after enough time.
+/// A recorded motion satisfies a limit equal to its fastest vertex's speed. A jump is refused and counted as too fast,
+/// and is accepted after enough time.
 #[test]
 fn a_modal_surface_that_jumps_is_too_fast() {
     let built = surface();
@@ -93,8 +93,8 @@ fn a_modal_surface_that_jumps_is_too_fast() {
     assert_eq!(send(epoch, far).0, Ok(Advance::Published { epoch }));
 }
 
-/// For any weights, a step a little beyond the limit is refused, a step a little within it passes, and a step far
-/// within it passes, often without a measurement.
+/// For any weights, a step slightly beyond the limit is refused, a step slightly within it is accepted, and a step far
+/// within it is accepted, often without a measurement.
 #[test]
 fn the_limit_on_the_speed_of_modes_is_exact() {
     let built = surface();

@@ -1,5 +1,5 @@
-//! Implausible surfaces are not published, and counted by their cause: collapsed, in another unit, mirrored, turned or
-//! jumped. Plausible ones pass.
+//! Implausible surfaces are not published, and counted by their cause: collapsed, in another unit, mirrored, rotated or
+//! displaced too far. Plausible ones are accepted.
 
 // Requirement: F-03
 
@@ -16,7 +16,7 @@ use dibs_tests::bus::collect;
 
 /// Vertices of the generated heart of 1,000 triangles.
 const N: usize = 502;
-/// Limit on speed in mm a tick, for a heart of one beat a second at ticks of a millisecond.
+/// Speed limit in mm a tick, for a heart of one beat a second at ticks of a millisecond.
 const SPEED: f32 = 0.3;
 
 struct Bus {
@@ -41,7 +41,7 @@ impl Bus {
         self.send_on(None, rows, now, work)
     }
 
-    /// The same; of a surface whose rows were `base` as the part that changed.
+    /// The same, as a partial frame based on the rows `base`.
     fn send_on(
         &mut self,
         base: Option<&[Vec3]>,
@@ -80,7 +80,7 @@ fn heart() -> (&'static BuiltTree, Motion) {
     (Box::leak(Box::new(Builder::new().stretch(1.5).build(&mesh).unwrap())), motion)
 }
 
-/// Collapsed shapes, which no first frame may have.
+/// Collapsed shapes, which a first frame must not have.
 fn collapsed(rest: &[Vec3]) -> Vec<(&'static str, Vec<Vec3>)> {
     let of = |f: &dyn Fn(Vec3) -> Vec3| rest.iter().map(|&p| f(p)).collect();
     vec![
@@ -107,7 +107,7 @@ fn a_collapsed_surface_is_refused_from_the_first_frame_on() {
             assert_eq!(bus.counted(Event::Shrunk), 1, "{name}");
             assert_eq!(bus.assembler.counters().rejected(), 1, "{name}: nothing else");
             assert!(bus.reader.read().is_none());
-            // A good frame passes afterwards.
+            // A good frame is accepted afterwards.
             assert_eq!(bus.send(&rest, 0, work), Ok(()));
         }
     }
@@ -136,7 +136,7 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
         for (name, rows) in &wrong {
             let mut bus = Bus::new(built, limits);
             bus.send(&rest, u32::MAX - 5, work).unwrap();
-            // 30 ticks later, over the wrap of the clock; one more counts for rounding, so 3.1 mm are allowed.
+            // 30 ticks later, after the wrap of the clock; one more counts because of rounding, so 3.1 mm are allowed.
             let refused = bus.send(rows, 24, work);
             let is_fast = matches!(
                 refused,
@@ -151,13 +151,13 @@ fn a_surface_that_is_mirrored_turned_or_jumped_is_too_fast() {
             );
             assert_eq!(bus.assembler.counters().rejected(), 1, "{name}: nothing else");
         }
-        // As first frames these pass, but for the mirrored one: without an earlier frame there is no speed.
+        // As first frames these are accepted, except the mirrored one: without an earlier frame there is no speed.
         for (name, rows) in &wrong[1..3] {
             assert_eq!(Bus::new(built, limits).send(rows, 0, work), Ok(()), "{name}");
         }
         let mirrored = Bus::new(built, limits).send(&wrong[0].1, 0, work);
         assert!(is_inside_out(&mirrored), "{mirrored:?}");
-        // After enough time the jump passes, without a limit on recovery: 200 mm in two seconds are 0.1 mm a tick.
+        // After enough time the jump is accepted, without a limit on recovery: 200 mm in two seconds are 0.1 mm a tick.
         let mut bus = Bus::new(built, limits.recovery_mm(f32::INFINITY));
         bus.send(&rest, 0, work).unwrap();
         assert!(bus.send(&wrong[2].1, 1_990, work).is_err());
@@ -169,7 +169,7 @@ const fn is_inside_out(outcome: &Result<(), ReceiveError>) -> bool {
     matches!(outcome, Err(ReceiveError::Stretch(StretchError::InsideOut { .. })))
 }
 
-/// Also where all packets come before the checks: the refusal names a vertex that moved too far, and how far.
+/// Even if all packets arrive before the checks, the refusal states a vertex that moved too far, and the distance.
 #[test]
 fn a_refusal_names_the_vertex_that_was_too_fast() {
     let (built, motion) = heart();
@@ -201,7 +201,7 @@ fn a_refusal_names_the_vertex_that_was_too_fast() {
     }
 }
 
-/// After any silence a surface comes back near its last trusted pose, or somebody registers it anew.
+/// After any silence a surface must be near its last trusted pose, or an operator registers it again.
 #[test]
 fn a_silence_admits_no_other_surface() {
     let (built, motion) = heart();
@@ -217,7 +217,7 @@ fn a_silence_admits_no_other_surface() {
         ("a quarter turn", turned(Vec3::Y, std::f32::consts::FRAC_PI_2)),
         ("moved", moved.clone()),
     ];
-    // With the default, a tenth of the reach; with one of its own; and without a limit on speed.
+    // With the default, a tenth of the reach; with another value; and without a speed limit.
     let reach = SurfaceLimits::reach_mm(250.0);
     let all = [reach.speed(SPEED), reach.speed(SPEED).recovery_mm(40.0), reach];
     for (limits, most) in all.into_iter().zip([25.0, 40.0, 25.0]) {
@@ -233,13 +233,13 @@ fn a_silence_admits_no_other_surface() {
                         if limit == most
                 );
                 assert!(is_far, "{name} after {silence}: {refused:?}");
-                // The surface as it was, and as far as the limit allows, passes.
+                // The unchanged surface is accepted, and one as far away as the limit allows.
                 let near = of(&|p| p + Vec3::X * (most - 1.0));
                 assert_eq!(bus.send(&near, later, 64), Ok(()), "{silence}");
             }
         }
     }
-    // A registration admits one surface elsewhere, but not an inside-out one; from there on the limits hold again.
+    // A registration admits one surface elsewhere, but not an inside-out one; after that the limits hold again.
     let mut bus = Bus::new(built, reach);
     bus.send(&rest, 0, 64).unwrap();
     bus.assembler.register();
@@ -247,7 +247,7 @@ fn a_silence_admits_no_other_surface() {
     assert_eq!(bus.send(&moved, 40, 64), Ok(()));
     assert!(bus.send(&rest, 60, 64).is_err());
     assert_eq!(bus.send(&moved, 80, 64), Ok(()));
-    // A partial frame is no registration, and does not end it.
+    // A partial frame is not used for the registration, and does not end it.
     let mut bus = Bus::new(built, reach);
     bus.send(&rest, 0, 64).unwrap();
     bus.assembler.register();
@@ -257,7 +257,7 @@ fn a_silence_admits_no_other_surface() {
     assert!(bus.send(&rest, 60, 64).is_err());
 }
 
-/// A closed surface is turned inside out through a plane, by small steps within all other limits: by whole frames, and
+/// A closed surface is turned inside out through a plane, in small steps within all other limits: by whole frames, and
 /// by partial ones. It is refused once its volume has the other sign.
 #[test]
 fn a_surface_is_not_turned_inside_out_however_slowly() {
@@ -287,7 +287,7 @@ fn a_surface_is_not_turned_inside_out_however_slowly() {
     }
 }
 
-/// The generated heart's motion passes at its own speed, and so do strongly squeezed shapes as first frames.
+/// The generated heart's motion is accepted at its own speed, and so are strongly compressed shapes as first frames.
 #[test]
 fn the_motion_of_a_heart_is_plausible() {
     let (built, motion) = heart();
@@ -296,7 +296,7 @@ fn the_motion_of_a_heart_is_plausible() {
     for (number, frame) in (0..).zip(motion.frames.iter().cycle().take(3 * motion.frames.len())) {
         bus.send(&built.to_rows(frame), number * interval, 64).unwrap();
     }
-    // Shapes of half the size, or squeezed along one or two axes, are still plausible.
+    // Shapes of half the size, or compressed along one or two axes, are still plausible.
     let rest = built.to_rows(&motion.frames[0]);
     for scale in [Vec3::splat(0.5), Vec3::new(0.3, 1.0, 1.0), Vec3::new(1.2, 0.5, 0.4)] {
         let rows: Vec<_> = rest.iter().map(|&p| p * scale).collect();
@@ -305,8 +305,7 @@ fn the_motion_of_a_heart_is_plausible() {
     }
 }
 
-/// The default limit on shrinkage leaves room on a heart whose motion was recorded: no region shrinks to less than
-/// half.
+/// The default limit on shrinkage leaves a margin on a recorded heart: no region shrinks to less than half.
 #[test]
 #[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]
 fn a_recorded_heart_shrinks_far_less_than_the_limit() {

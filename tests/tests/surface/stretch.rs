@@ -1,4 +1,4 @@
-//! The measured stretch against f64, and as a gate.
+//! The measured stretch compared with f64, and its use as a gate.
 
 // Requirement: F-02
 
@@ -16,7 +16,7 @@ use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::{sample, stretch};
 use fastrand::Rng;
 
-/// The measured stretch is never below the truth, and above it by no more than the added rounding.
+/// The measured stretch is never below the true one, and exceeds it by at most the added rounding.
 #[test]
 fn the_measured_stretch_is_the_true_one_rounded_up() {
     let mesh = generate::heart(600).expect("a valid size").mesh;
@@ -39,8 +39,8 @@ fn the_measured_stretch_is_the_true_one_rounded_up() {
     }
 }
 
-/// A nearly flat triangle is measured with less precision; its neighbours are not. At rest, all of them are within a
-/// limit that leaves room for that.
+/// A nearly flat triangle is measured less precisely; its neighbours are not. At rest, all of them satisfy a limit with
+/// room for that.
 #[test]
 fn a_flat_triangle_does_not_spoil_its_neighbours() {
     let mut rng = Rng::with_seed(37);
@@ -66,7 +66,7 @@ fn a_flat_triangle_does_not_spoil_its_neighbours() {
             let (e1, e2) = (b - a, c - a);
             let squares = [e1.length_squared(), e1.dot(e2), e2.length_squared()];
             if e1.angle_between(e2).sin() > 0.35 {
-                // Each stored number is off only by a few roundings.
+                // Each stored number has an error of only a few roundings.
                 let scale = squares[0].max(squares[2]);
                 for (stored, exact) in metric.squares.into_iter().zip(squares) {
                     let off = (f64::from(stored) - exact).abs();
@@ -77,7 +77,7 @@ fn a_flat_triangle_does_not_spoil_its_neighbours() {
     }
 }
 
-/// Triangles of every shape and size, needles and caps too, squeezed and pulled in every direction.
+/// Triangles of every shape and size, including needles and caps, compressed and stretched in every direction.
 #[test]
 fn no_triangle_is_taken_for_less_stretched_than_it_is() {
     let mut rng = Rng::with_seed(22);
@@ -97,7 +97,7 @@ fn no_triangle_is_taken_for_less_stretched_than_it_is() {
         let mesh =
             Mesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Mesh::default() };
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        // A pull along or across the triangle, and noise from a millionth of its size to all of it.
+        // Stretch along or across the triangle, and noise from a millionth of its size to all of it.
         let (axis, pull) = (if rng.bool() { x } else { y }, rng.f32() * 3.0);
         let noise = size * 10f32.powf(-6.0 * rng.f32());
         let moved = corners.map(|p| {
@@ -125,7 +125,7 @@ fn no_triangle_is_taken_for_less_stretched_than_it_is() {
                 );
                 excess.push(above);
             }
-            // A triangle too flat for f32 may be refused, but must not pass with too small a stretch.
+            // A triangle too flat for f32 may be refused, but must not be accepted with too small a stretch.
             Err(StretchError::Exceeded { .. }) => excess.push(f64::INFINITY),
             Err(error) => panic!("{error}"),
         }
@@ -143,7 +143,7 @@ fn no_triangle_is_taken_for_less_stretched_than_it_is() {
     assert!(at(0.5) < 1.2e-5);
 }
 
-/// The largest `1 - |cos|` of the three angles, without its cancellation.
+/// The largest `1 - |cos|` of the three angles, computed without cancellation.
 fn openness(corners: [Vec3; 3]) -> f64 {
     let at = corners.map(Vec3::as_dvec3);
     let of = |i: usize| {
@@ -193,8 +193,7 @@ fn each_region_is_measured_on_its_own() {
     }
 }
 
-/// A region may begin in the middle of a fan. The edge that its first triangle shares with the region before is also
-/// its own.
+/// A region may begin within a fan. The edge that its first triangle shares with the previous region belongs to both.
 #[test]
 fn an_edge_between_two_regions_counts_for_both() {
     let mesh = generate::heart(2_000).expect("a valid size").mesh;
@@ -301,7 +300,7 @@ fn a_surface_beyond_the_stretch_limit_is_refused() {
 }
 
 /// A real heart stretches strongly in few places: with a limit for each triangle, queries need less than half the node
-/// tests that they need with one limit for all, and their answers are as right. Prints mean node and triangle tests.
+/// tests of one limit for all, and their answers are as accurate. Prints mean node and triangle tests.
 #[test]
 #[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]
 fn limits_of_single_triangles_spare_tests_on_a_real_heart() {

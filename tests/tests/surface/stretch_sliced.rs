@@ -1,4 +1,4 @@
-//! The stretch check in slices has the result of a measurement of the whole frame.
+//! The stretch check in slices has the same result as a measurement of the whole frame.
 
 // Requirement: F-02
 
@@ -9,7 +9,7 @@ use dibs_nostd::{
 use dibs_tests::deform::{deformed, unit};
 use fastrand::Rng;
 
-/// Feeds a frame to a gate as a bus does: packets of rows in some order, and slices of work between them.
+/// Passes a frame to a gate as a bus does: packets of rows in some order, and slices of work between them.
 fn feed<V: VertexTable + ?Sized>(
     gate: &mut impl Gate,
     surface: &V,
@@ -56,8 +56,8 @@ fn in_packets(rows: u32, each: usize) -> Vec<std::ops::Range<u32>> {
     (0..rows).step_by(each).map(|first| first..rows.min(first + each as u32)).collect()
 }
 
-/// Compares the results of a monitor that has measured earlier frames, and of a whole measurement: they are the same
-/// but for the added rounding.
+/// Compares the results of a monitor that has measured earlier frames with a complete measurement: they are equal
+/// except for the added rounding.
 fn assert_same(
     sliced: Result<MeasuredStretch, StretchError>,
     whole: Result<MeasuredStretch, StretchError>,
@@ -110,7 +110,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
     let mut rng = Rng::with_seed(26);
     let mut surface = built.to_rows(&mesh.positions);
     let vertices = tree.vertex_count();
-    // Before the first publication, a partial frame is measured whole.
+    // Before the first publication a partial frame is measured completely.
     let first =
         feed(&mut monitor, surface.as_slice(), FrameExtent::Partial, &in_packets(1, 1), &mut rng);
     assert_eq!(first, measure_stretch(&tree, surface.as_slice()));
@@ -125,7 +125,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
         let whole = measure_stretch(&tree, next.as_slice());
         let packets: Vec<_> = moved.clone().map(|row| row..row + 1).collect();
         if rng.u32(..5) == 0 {
-            // A frame that is abandoned half-way.
+            // An abandoned frame.
             monitor.begin(FrameExtent::Partial);
             monitor.moved(moved);
             let _ = monitor.advance(IncomingSurface::new(next.as_slice(), vertices), 20);
@@ -144,7 +144,7 @@ fn partial_is_whole_and_measures_only_what_moved() {
     }
     assert!(refused > 10 && abandoned > 10, "{refused} refused, {abandoned} abandoned");
 
-    // For one vertex, only the triangles of its regions are measured.
+    // If one vertex changes, only the triangles of its regions are measured.
     monitor.begin(FrameExtent::Partial);
     monitor.moved(7..8);
     let mut work = 0;
@@ -156,8 +156,8 @@ fn partial_is_whole_and_measures_only_what_moved() {
     assert!(work > 0 && work < tree.triangle_count() / 4, "{work} triangles for one vertex");
 }
 
-/// No call does more work than it may. With work for one triangle a call, a frame takes as many calls as it has
-/// triangles; from the second frame on, each region takes one more, for its last worst triangle.
+/// No call exceeds its work. With work for one triangle a call, a frame takes as many calls as it has triangles; from
+/// the second frame on, each region takes one more, for its last worst triangle.
 #[test]
 fn a_slice_is_no_longer_than_it_may_be() {
     let (mesh, built, _) = deformed(0, 0);

@@ -1,4 +1,4 @@
-//! The peers' bounds on boxes, against a search along the axis.
+//! The peers' bounds on boxes, compared with a search along the axis.
 
 // Requirement: E-05
 
@@ -17,7 +17,7 @@ fn a_bound_is_below_the_distance_and_near_it() {
         let high = low + unit(&mut rng).abs() * 20.0 * rng.f32();
         let (start, end) = (unit(&mut rng) * 40.0, unit(&mut rng) * 40.0);
         let distance = |p: Vec3| (p - p.clamp(low, high)).length_squared();
-        // A convex function's minimum, by ternary search.
+        // The minimum of a convex function, by ternary search.
         let (mut a, mut b) = (0.0_f32, 1.0_f32);
         for _ in 0..100 {
             let (x, y) = (a + (b - a) / 3.0, b - (b - a) / 3.0);

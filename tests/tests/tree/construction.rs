@@ -1,4 +1,4 @@
-//! The builder: coverage against independently computed distances, determinism, cost, refusals.
+//! The builder: coverage compared with independently computed distances, determinism, cost, refusals.
 
 // Requirements: A-02, M-04
 
@@ -148,7 +148,7 @@ fn spheres_cover_their_sections_up_to_each_triangles_limit() {
         let random = triangles.clone().map(|_| 1.05 + rng.f32() * rng.f32() * 2.0).collect();
         for limits in [needed, random] {
             let limits: Vec<f32> = limits;
-            // A little within the limits, for the f32 rounding of the measurement.
+            // Slightly within the limits, because of the f32 rounding of the measurement.
             let fits = |moved: &[Vec3]| {
                 triangles.clone().all(|t| of(moved, t) <= f64::from(limits[t]) * 0.99998)
             };
@@ -188,7 +188,7 @@ fn spheres_cover_their_sections_up_to_each_triangles_limit() {
     assert!(narrowest < 1.01, "no case comes near the limit: {narrowest}");
 }
 
-/// A stretch beyond the limit is refused and named. Without this check, some answers would be wrong.
+/// A stretch beyond the limit is refused, and the error names it. Without this check some answers would be wrong.
 #[test]
 fn a_violated_limit_is_reported_not_tolerated() {
     let mesh = heart(320);
@@ -224,7 +224,7 @@ fn the_bytes_do_not_depend_on_the_threads() {
     }
 }
 
-/// Up to 65,535 triangles a neighbour's 16-bit code is its row; beyond, up to four rows share one.
+/// With up to 65,535 triangles a neighbour's 16-bit code is its row; with more, up to four rows share one code.
 #[test]
 fn neighbours_share_an_edge() {
     let all = [surfaces::sheet(6, 1.0, |_, _| 0.0), heart(1_000), surfaces::ball(6)];
@@ -329,7 +329,7 @@ fn what_cannot_be_built_is_named() {
     assert!(shallow.is_err(), "a stack of 3 is too small");
 }
 
-/// Triangles that repeat each other unfold to chords without length, which cross no edge: the builder accepts them.
+/// Repeated triangles unfold to chords of length zero, which cross no edge: the builder accepts them.
 #[test]
 fn limits_on_triangles_that_repeat_each_other_build() {
     let positions = [[3.0, 2.0, 1.0], [2.0, 2.0, 1.0], [2.0, 3.0, 0.0], [3.0, 1.0, 0.0]];
@@ -339,7 +339,7 @@ fn limits_on_triangles_that_repeat_each_other_build() {
     Builder::new().limits(vec![1.85, 1.5, 1.65, 1.01, 1.0]).build(&mesh).expect("a valid mesh");
 }
 
-/// Counts are compared exactly: a change of the tree or of the traversal shows here, and must be intended.
+/// Counts are compared exactly: they reveal any change of the tree or of the traversal, which must be intended.
 #[test]
 fn counts_of_a_fixed_stream_are_what_they_were() {
     let mesh = heart(2_000);

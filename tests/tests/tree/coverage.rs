@@ -1,10 +1,10 @@
 //! Coverage: in every frame that the stretch check admits, each vertex of every section lies within its sphere, whose
 //! radius is the tree's radius times the measured stretch.
 //!
-//! Hill climbing searches for frames that break this: it drives a vertex of a section away from its pin while the check
-//! admits the frame. It finds spheres that are too small by so little that random poses would miss them. Comparisons
-//! are in f64 with the stored numbers, with a tolerance of 1e-9. `COVERAGE=20 cargo test ...` tries twenty times as
-//! many trees.
+//! Hill climbing searches for frames that violate this: it moves a vertex of a section away from its pin as long as the
+//! check admits the frame. It finds spheres that are too small by so little that random poses would miss them.
+//! Comparisons are in f64 with the stored numbers, with a tolerance of 1e-9. `COVERAGE=20 cargo test ...` tries twenty
+//! times as many trees.
 
 // Requirement: A-02
 
@@ -57,7 +57,7 @@ impl Sphere {
     }
 }
 
-/// The largest copy of the rest shape that the check admits: all triangles are stretched alike.
+/// The largest copy of the rest shape that the check admits: all triangles have the same stretch.
 fn scaled(tree: &Tree<'_, u16>, rest: &[Vec3]) -> Option<Vec<Vec3>> {
     let at = |scale: f32| rest.iter().map(|&p| p * scale).collect::<Vec<_>>();
     let admits = |scale: &f32| measure_stretch(tree, at(*scale).as_slice()).is_ok();
@@ -72,7 +72,7 @@ fn scaled(tree: &Tree<'_, u16>, rest: &[Vec3]) -> Option<Vec<Vec3>> {
     Some(at(low))
 }
 
-/// Drives a vertex away from the pin of a sphere through frames that the check admits.
+/// Moves a vertex away from the pin of a sphere through frames that the check admits.
 fn climb(
     tree: &Tree<'_, u16>,
     sphere: &Sphere,
@@ -89,14 +89,14 @@ fn climb(
         let pin = frame[sphere.pin];
         let away = (frame[target] - pin).normalize_or_zero();
         match rng.u32(..3) {
-            // One vertex anywhere.
+            // One vertex moves in any direction.
             0 => {
                 let off = Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 0.5;
                 next[rng.usize(..frame.len())] += off * step;
             }
-            // Some vertices away from the pin.
+            // Some vertices move away from the pin.
             1 => next.iter_mut().filter(|_| rng.bool()).for_each(|p| *p += away * step),
-            // All vertices towards the line from the pin to the target, and along it.
+            // All vertices move towards the line from the pin to the target, and along it.
             _ => {
                 let narrower = 0.5 * rng.f32();
                 for p in &mut next {
@@ -117,7 +117,7 @@ fn climb(
     }
 }
 
-/// Counts of trees and climbs, and the largest distance of a vertex from its pin, as a part of what its sphere covers.
+/// Counts of trees and climbs, and the largest distance of a vertex from its pin, relative to its sphere's radius.
 #[derive(Debug, Default)]
 struct Seen {
     trees: u32,
@@ -169,7 +169,7 @@ fn climb_on(family: impl Fn(&mut Rng) -> Mesh, trees: u32, seed: u64) {
             let limit = |_: &[u32; 3]| 1.0 + (stretch - 1.0) * rng.f32() * 2.0;
             builder = builder.limits(mesh.triangles.iter().map(limit).collect());
         }
-        // The builder refuses meshes with triangles without area, or of several parts.
+        // The builder refuses meshes with triangles without area, or with several parts.
         let Ok(built) = builder.build(&mesh) else { continue };
         let tree = built.tree::<u16>().expect("valid");
         let all = spheres(&tree);
@@ -195,7 +195,7 @@ fn climb_on(family: impl Fn(&mut Rng) -> Mesh, trees: u32, seed: u64) {
 }
 
 /// Triangles on these points, each of which shares an edge with an earlier one. Some edges have three triangles, and
-/// some triangles repeat.
+/// some triangles are repeated.
 fn grown(mut positions: Vec<Vec3>, rng: &mut Rng) -> Mesh {
     let mut triangles = vec![[0, 1, 2]];
     let mut used = 3;
@@ -219,7 +219,7 @@ fn thinness(rng: &mut Rng) -> f32 {
     [1.0, 0.1, 0.01, 1e-3, 1e-5][rng.usize(..5)]
 }
 
-/// Edges of equal length, triangles without area, points in one place.
+/// Edges of equal length, triangles without area, coincident points.
 #[test]
 fn on_lattices_with_ties_and_degenerate_triangles() {
     let family = |rng: &mut Rng| {
@@ -234,7 +234,7 @@ fn on_lattices_with_ties_and_degenerate_triangles() {
     climb_on(family, 6000, 1);
 }
 
-/// Random points: fat triangles, needles and slivers, folded and in a plane.
+/// Random points: fat triangles, needles and slivers, folded and planar.
 #[test]
 fn on_clouds_from_fat_to_flat() {
     let family = |rng: &mut Rng| {
@@ -247,7 +247,7 @@ fn on_clouds_from_fat_to_flat() {
 }
 
 /// A flat triangle between two fat ones: a chord across it can grow by more than the measured stretch, because the
-/// check counts the flat triangle as higher at rest.
+/// check treats the flat triangle as higher at rest.
 #[test]
 fn on_chords_from_fat_to_fat_across_flat() {
     let family = |rng: &mut Rng| {
@@ -275,7 +275,7 @@ fn on_chords_from_fat_to_fat_across_flat() {
 fn on_fans_of_isosceles_needles() {
     let family = |rng: &mut Rng| {
         let (width, rest) = (10f32.powf(-2.0 - 3.0 * rng.f32()), 0.4);
-        // All spokes have the same length, also after rounding.
+        // All spokes have the same length, even after rounding.
         let around = [(1, -4), (1, 4), (4, 1), (-4, 1), (-1, 4), (-1, -4), (-4, -1), (4, -1)];
         let spokes =
             around.map(|(y, z)| Vec3::new(10.0, y as f32 * width * rest, z as f32 * width));

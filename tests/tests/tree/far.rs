@@ -36,8 +36,8 @@ fn read(folder: &TempDir, text: &str, options: &ReadOptions) -> Result<Import, R
     options.read(path).map_err(|error| error.kind)
 }
 
-/// The largest error of 300 answers as a part of their accuracy, and the largest accuracy. Truth is exhaustive search in
-/// f64, in the file's coordinates.
+/// The largest error of 300 answers relative to their accuracy, and the largest accuracy. The true separation is that
+/// of an exhaustive search in f64, in the file's coordinates.
 fn worst_answer(import: &Import, exact: &[DVec3]) -> (f64, f64) {
     let built = Builder::new().build(import).unwrap();
     let tree = built.tree::<u16>().unwrap();
@@ -66,7 +66,7 @@ fn worst_answer(import: &Import, exact: &[DVec3]) -> (f64, f64) {
     (worst, accuracy)
 }
 
-/// A mesh far from the origin is as accurate as near it; where nothing would be lost it keeps its coordinates.
+/// A mesh far from the origin is as accurate as near it; if nothing would be lost it keeps its coordinates.
 #[test]
 fn no_distance_from_the_origin_costs_accuracy() {
     let folder = tempfile::tempdir().unwrap();
@@ -94,7 +94,7 @@ fn no_distance_from_the_origin_costs_accuracy() {
     }
 }
 
-/// An origin that is given is taken; one so far away that f32 does not hold the mesh is refused.
+/// A given origin is used; one so far away that f32 cannot represent the mesh is refused.
 #[test]
 fn an_origin_may_be_given() {
     let folder = tempfile::tempdir().unwrap();
@@ -109,13 +109,13 @@ fn an_origin_may_be_given() {
     assert!(matches!(kind, ReadErrorKind::Elsewhere { largest, .. } if largest > 3.9e6), "{kind}");
     let kind = read(&folder, &text, &with(DVec3::NAN)).unwrap_err();
     assert!(matches!(kind, ReadErrorKind::Origin { .. }), "{kind}");
-    // A mesh near the origin keeps its coordinates unless it is told otherwise.
+    // A mesh near the origin keeps its coordinates unless an origin is given.
     let (mesh, exact) = far_ball(0.0);
     let import = read(&folder, &obj(&exact, &mesh), &with(DVec3::X)).unwrap();
     assert_eq!(import.mesh.positions[0], mesh.positions[0] - Vec3::X);
 }
 
-/// A surface whose digits are gone is refused, one whose coordinates are short is not.
+/// A surface whose digits are lost is refused; one whose coordinates have few digits is not.
 #[test]
 fn lost_digits_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,7 +129,7 @@ fn lost_digits_are_refused() {
         let kind = far(away, digits).unwrap_err();
         assert!(matches!(kind, ReadErrorKind::TooFar { .. }), "{away}: {kind}");
     }
-    // Sizes that no surface has get the sentences that they had before.
+    // Implausible sizes get the errors of the later checks.
     let of = |corners: [&str; 3]| {
         let [a, b, c] = corners;
         let text = format!("v {a} 0 0\nv {b} 0 0\nv {c} {c} 0\nf 1 2 3\n");
@@ -143,7 +143,7 @@ fn lost_digits_are_refused() {
     assert!(matches!(kind, ReadErrorKind::NoTriangles { .. }), "{kind}");
     let kind = of(["0", "1e-30", "2e-30"]);
     assert!(matches!(kind, ReadErrorKind::TooSmall { .. }), "{kind}");
-    // Whole numbers are f32 too, and exact.
+    // Whole numbers are exact in f32 as well.
     let import = far(4e6, DVec3::round).unwrap();
     assert!(import.report.recentred && import.report.position_error < 1e-8);
     // Vertices that no triangle uses may be anywhere.
@@ -153,7 +153,7 @@ fn lost_digits_are_refused() {
     assert!(import.report.recentred && import.report.position_error < 1e-4);
 }
 
-/// A motion is taken from its mesh's origin before it is rounded.
+/// The mesh's origin is subtracted from a motion before it is rounded.
 #[test]
 fn a_far_motion_keeps_its_digits() {
     let folder = tempfile::tempdir().unwrap();
@@ -192,7 +192,7 @@ fn a_far_motion_keeps_its_digits() {
         let kind = Motion::read_around(&path, Unit::Metre, -1e6 * origin).unwrap_err().kind;
         assert!(matches!(kind, ReadErrorKind::Elsewhere { .. }), "{kind}");
     }
-    // Single precision has lost the digits already.
+    // Single precision has already lost the digits.
     let rounded = |scale: f64| -> Vec<Vec<Vec3>> {
         frames.iter().map(|f| f.iter().map(|p| (*p * scale).as_vec3()).collect()).collect()
     };

@@ -1,4 +1,4 @@
-//! The tree's bytes against their specification, `docs/format.md`, and against corruption.
+//! The tree's bytes compared with their specification, `docs/format.md`, and damaged trees.
 //!
 //! One file, because all tests damage the same trees.
 
@@ -21,7 +21,7 @@ fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
 }
 
-/// Changes a word and makes the checksum right again, so that only the word is wrong.
+/// Changes a word and corrects the checksum, so that only the word is wrong.
 fn with_word(bytes: &[u8], at: usize, value: u32) -> Vec<u8> {
     let mut changed = bytes.to_vec();
     changed[at..at + 4].copy_from_slice(&value.to_le_bytes());
@@ -82,7 +82,7 @@ fn every_field_and_section_stands_where_the_specification_says() {
 fn every_flipped_bit_and_every_truncation_is_refused() {
     let (_, built) = heart(IndexWidth::Bits16);
     let mut bytes = built.blob().to_vec();
-    // Unoptimised builds, such as the sanitizers', take a fifth of the bytes.
+    // Unoptimised builds, such as the sanitizers', test a fifth of the bytes.
     let step = if cfg!(debug_assertions) { 5 } else { 1 };
     for at in (0..bytes.len()).step_by(step) {
         for bit in 0..8 {
@@ -130,7 +130,7 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
         let expected = FormatError::Field { offset: at as u8, value };
         assert_eq!(refuse(at, value), expected, "field at {at}");
     }
-    // The kinds that are reserved, and those of newer libraries, must not be skipped unless they say so.
+    // Reserved kinds, and those of newer libraries, must not be skipped unless they are marked as optional.
     for kind in [0, 11, 13, 99, (1 << 31) - 1] {
         assert_eq!(refuse(80, kind), FormatError::Kind { kind });
     }
@@ -148,11 +148,11 @@ fn a_wrong_value_with_a_right_checksum_is_named() {
     assert!(matches!(corner, FormatError::Corner { triangle: 0, vertex: 0xFFFF }));
 }
 
-/// A leaf's vertices must be at the places that a query reads: otherwise it could reject the leaf too early.
+/// A leaf's vertices must be at the positions that a query reads: otherwise it could reject the leaf too early.
 #[test]
 fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
     let (mesh, _) = heart(IndexWidth::Bits16);
-    // Without rest metric and adjacency, whose checks would refuse the change too.
+    // Without rest metric and adjacency, whose checks would also refuse the change.
     let built = Builder::new().with_metric(false).with_adjacency(false).build(&mesh);
     let built = built.expect("a valid mesh");
     let tree = built.tree::<u16>().expect("valid");
@@ -184,7 +184,7 @@ fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
     assert!(refused > 50, "{refused} leaves tried");
 }
 
-/// A query that reads a leaf's first rows relies on their vertices being at the leaf's first places.
+/// A query that reads a leaf's first rows relies on their vertices being at the leaf's first positions.
 #[test]
 fn a_leaf_whose_triangles_come_too_early_is_refused() {
     let (mesh, _) = heart(IndexWidth::Bits16);
@@ -222,7 +222,7 @@ fn a_leaf_whose_triangles_come_too_early_is_refused() {
     assert!(refused > 50 && accepted > 5, "{refused} refused, {accepted} accepted");
 }
 
-/// A query on a validated tree whose bytes were corrupted afterwards ends, with an error or an answer.
+/// A query on a validated tree whose bytes were damaged afterwards ends, with an error or an answer.
 #[test]
 fn a_query_on_damaged_bytes_ends() {
     let (mesh, built) = heart(IndexWidth::Bits16);
@@ -261,7 +261,7 @@ fn a_query_on_damaged_bytes_ends() {
     assert!(answers > 0 && errors > 0);
 }
 
-/// Metric and limits, read by the specification alone, and the refusals of wrong ones.
+/// Metric and limits, read only by the specification, and the refusals of wrong ones.
 #[test]
 fn metric_and_limits_stand_where_the_specification_says() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -336,8 +336,7 @@ fn metric_and_limits_stand_where_the_specification_says() {
             let refused = refuse(metric + 24, wrong.to_bits());
             assert_eq!(refused, Err(FormatError::Metric { triangle: 2 }));
         }
-        // A triangle that starts a fan cannot be marked as one that continues or flips a fan, or be measured from
-        // another corner.
+        // A fan's first triangle must not be marked as continuing or flipping it, or be measured from another corner.
         let touches = |row: usize| rows(row).iter().any(|v| rows(row - 1).contains(v));
         let alone = starts.into_iter().skip(1).find(|&row| !touches(row)).expect("not one patch");
         let at = metric + 12 * alone;
@@ -349,7 +348,7 @@ fn metric_and_limits_stand_where_the_specification_says() {
     }
 }
 
-/// Labels stand in the order of the triangles' rows, change no other bytes, and must be one for each triangle.
+/// Labels are in the order of the triangles' rows, change no other bytes, and must be one for each triangle.
 #[test]
 fn labels_are_stored_by_row() {
     let (mesh, plain) = heart(IndexWidth::Bits16);
@@ -382,11 +381,12 @@ fn labels_are_stored_by_row() {
     }
 }
 
-/// A tree keeps its file's unit and counts, whatever was dropped, and the builder's word goes before the file's.
+/// A tree stores its file's unit and counts, whatever was dropped, and the builder's unit takes precedence over the
+/// file's.
 #[test]
 fn the_files_unit_and_counts_are_stored() {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_Z];
-    // One triangle is degenerate, one a duplicate; the last vertex is of no triangle.
+    // One triangle is degenerate, one a duplicate; no triangle uses the last vertex.
     let triangles = [[0, 1, 1], [0, 1, 2], [1, 2, 0], [0, 2, 3]];
     let plain = Mesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
@@ -420,7 +420,7 @@ fn labelled<I: dibs_nostd::Index>(tree: &Tree<'_, I>, row: u32) -> ([u32; 3], Op
     (corners.map(number), tree.label(TriangleRow(row)))
 }
 
-/// The origin is stored whole, belongs to the mesh's identity, and is checked.
+/// The origin is stored in double precision, is part of the mesh's identity, and is checked.
 #[test]
 fn an_origin_is_stored_and_checked() {
     let (near, built) = heart(IndexWidth::Bits16);

@@ -15,8 +15,8 @@ enum Want {
     Mesh(usize, usize, &'static [(&'static str, usize)]),
     /// A kind of error, and a part of its message.
     Error(fn(&ReadErrorKind) -> bool, &'static str),
-    /// Several components: their number; then vertices, triangles and counts where only the largest is kept. All are
-    /// kept if a tree has so many roots.
+    /// Several components: their number; then vertices, triangles and counts if only the largest is kept. All are kept
+    /// if a tree can have so many roots.
     Components(usize, usize, usize, &'static [(&'static str, usize)]),
 }
 use ReadErrorKind as K;
@@ -48,7 +48,7 @@ const fn inconsistent(count: usize) -> (&'static str, usize) {
 }
 
 const OUTCOMES: &[(&str, Want)] = &[
-    // Exported by 3ds Max: a binary file with the extension in capitals, of 24 parts.
+    // Exported by 3ds Max: a binary file with the extension in capitals and 24 parts.
     ("assimp_3DSMaxExport.STL", Components(24, 1042, 170, &[welded(4958), unreferenced(955)])),
     (
         "assimp_OutOfMemory.off",
@@ -74,7 +74,7 @@ const OUTCOMES: &[(&str, Want)] = &[
             ],
         ),
     ),
-    // A ring, cut open to be one polygon; a test below checks its area.
+    // A ring that is cut open to make it one polygon; a test below checks its area.
     ("assimp_concave_polygon.obj", Mesh(64, 64, &[polygons(1), border(64)])),
     ("assimp_cube.ply", Mesh(8, 12, &[polygons(6)])),
     ("assimp_cube_with_vertexcolors.obj", Mesh(8, 12, &[])),
@@ -90,7 +90,7 @@ const OUTCOMES: &[(&str, Want)] = &[
         "assimp_point_cloud.obj",
         Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces"),
     ),
-    // A quad, and both of its halves again.
+    // A quad, followed by both of its halves.
     ("assimp_regr_3429812.obj", Mesh(4, 2, &[polygons(1), duplicates(2), border(4)])),
     (
         "assimp_spider.obj",
@@ -116,14 +116,14 @@ const OUTCOMES: &[(&str, Want)] = &[
         "synthetic_count_too_large.stl",
         Error(|k| matches!(k, K::Count { claimed: 1_000_000_000, found: 320, .. }), "triangles"),
     ),
-    // The file does not tell whether its count or its data is wrong.
+    // The file does not show whether its count or its data is wrong.
     (
         "synthetic_count_zero_with_data.stl",
         Error(|k| matches!(k, K::Count { claimed: 0, found: 320, .. }), "triangles"),
     ),
     ("synthetic_dup_faces_and_flipped.obj", Mesh(162, 320, &[duplicates(20)])),
     ("synthetic_empty_file.stl", Error(|k| matches!(k, K::Empty), "empty")),
-    // A ball pressed flat: its two sides coincide, but stay two sheets.
+    // A ball flattened to a plane: its two sides coincide, but stay two sheets.
     ("synthetic_flat_plane_z0.obj", Mesh(162, 304, &[coincident(73), degenerate(16), border(32)])),
     ("synthetic_header_only_83_bytes.stl", Error(|k| matches!(k, K::Truncated { .. }), "83 bytes")),
     (
@@ -149,9 +149,9 @@ const OUTCOMES: &[(&str, Want)] = &[
     ("trimesh_LICENSE.md", Error(|k| matches!(k, K::UnknownFormat), "convert")),
     ("trimesh_empty.obj", Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces")),
     ("trimesh_empty.stl", Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces")),
-    // Its faces name normals that are absent; a group's name contains an f.
+    // Its faces refer to normals that are missing; a group's name contains an f.
     ("trimesh_face_in_group_name_mid_file.obj", Mesh(5, 2, &[border(6)])),
-    // Two tetrahedra, each of which has the triangle between them.
+    // Two tetrahedra that both contain the triangle between them.
     ("trimesh_joined_tetrahedra.obj", Mesh(5, 7, &[duplicates(1), ("non_manifold_edges", 3)])),
     ("trimesh_mirror.ply", Mesh(143, 286, &[])),
     (
@@ -170,7 +170,7 @@ const OUTCOMES: &[(&str, Want)] = &[
         "trimesh_ply_empty_header.ply",
         Error(|k| matches!(k, K::NoTriangles { degenerate: 0, .. }), "faces"),
     ),
-    // A polygon of five corners in no plane: seen along its normal, one side runs back over another.
+    // A non-planar polygon of five corners: seen along its normal, one side runs back over another.
     ("trimesh_polygonfaces.obj", Mesh(5, 3, &[polygons(1), ("polygons_not_simple", 1), border(5)])),
     ("trimesh_soup.stl", Components(100, 300, 1, &[unreferenced(297), border(3)])),
     (
@@ -185,7 +185,7 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/nasty")
 }
 
-/// Every count of the report that is not 0, besides the sizes of the mesh.
+/// Every count of the report that is not 0, except the sizes of the mesh.
 fn counts(import: &Import) -> BTreeMap<String, usize> {
     let report = serde_json::to_value(&import.report).unwrap();
     let report = report.as_object().unwrap();

@@ -100,7 +100,7 @@ fn stl_agrees_with_stl_io() {
 
 #[test]
 fn text_is_rounded_to_f32_once() {
-    // A number above the middle between 1 and its successor, by less than f64 resolves.
+    // A number above the midpoint between 1 and its successor, by less than f64 can resolve.
     let above = "1.000000059604644775390625000000000001";
     let text = format!("v {above} 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
     let mesh = Folder::new().read("a.obj", text).unwrap().mesh;
@@ -214,12 +214,12 @@ fn faces_of_fewer_than_three_corners_are_degenerate() {
 #[test]
 fn triangles_that_rounding_made_from_a_line_are_degenerate() {
     let folder = Folder::new();
-    // Three points of one line in space that f32 cannot hold exactly.
+    // Three points of one line in space that f32 cannot represent exactly.
     let line =
         "v 0.1 0.2 0.3\nv 10.1 20.2 30.3\nv 4.1 8.2 12.3\nv 9 9 0\nf 1 2 3\nf 1 3 4\nf 3 2 4\n";
     let import = folder.read("a.obj", line).unwrap();
     assert_eq!((import.report.dropped_degenerate, import.report.triangles), (1, 2));
-    // A sliver that is not an effect of rounding stays.
+    // A sliver that is not caused by rounding is kept.
     let sliver = "v 0 0 0\nv 30 0 0\nv 15 0.004 0\nf 1 2 3\n";
     assert_eq!(folder.read("a.obj", sliver).unwrap().report.dropped_degenerate, 0);
 }
@@ -307,7 +307,7 @@ fn motions_round_trip_and_bad_ones_are_errors() {
     let read = |bytes: &[u8]| Motion::read_pc2(folder.put("b.pc2", bytes)).map_err(|e| e.kind);
     assert!(matches!(read(&[]), Err(ReadErrorKind::Empty)));
     assert!(matches!(read(&bytes[..20]), Err(ReadErrorKind::NotPc2)));
-    // The rate stands after the last frame: a file cut within it has all frames, as one without a rate has.
+    // The rate follows the last frame: a file that is cut off within it has all frames, like a file without a rate.
     let frames = bytes.len() - 12;
     for end in frames..bytes.len() {
         let unrated = read(&bytes[..end]).unwrap();

@@ -1,4 +1,4 @@
-//! Damaged mesh files are refused with a message, or give a sound mesh; no reader panics.
+//! Damaged mesh files are refused with a message, or give a valid mesh; no reader panics.
 
 // Requirement: M-03
 
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::mesh_files::{Folder, samples};
 
-/// Checks the promises of every accepted mesh.
+/// Checks the guarantees of every accepted mesh.
 fn check_promises(import: &Import) {
     let mesh = &import.mesh;
     assert!(!mesh.triangles.is_empty());
@@ -56,8 +56,7 @@ proptest! {
         }
     }
 
-    /// Polygons of any shape, flat or not, simple or not, are cut without a panic, and n corners give at most n - 2
-    /// triangles.
+    /// Polygons of any shape, flat or not, simple or not, are cut without panic: n corners give up to n - 2 triangles.
     #[test]
     fn polygons_of_any_shape_are_cut(
         points in prop::collection::vec((-5_i8..5, -5_i8..5, -1_i8..2), 3..40)

@@ -1,4 +1,4 @@
-//! The numbers of an accessor: of any type that positions and vertex numbers may have, and sparse ones.
+//! The numbers of an accessor: of any type allowed for positions and vertex numbers, including sparse accessors.
 
 use super::buffers::Buffers;
 use super::document::{Document, Sparse};
@@ -6,16 +6,16 @@ use super::{Result, get, malformed, packed};
 use crate::read::ReadErrorKind;
 use crate::read::scalar::{Endian, Scalar, index};
 
-/// The use of an accessor's numbers.
+/// What an accessor's numbers are used for.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Use {
     /// Three numbers a vertex.
     Positions,
-    /// One number of a vertex each.
+    /// One vertex number each.
     Indices,
     /// Sixteen numbers, column by column.
     Matrices,
-    /// Four numbers of joints a vertex.
+    /// Four joint numbers a vertex.
     Joints,
     /// Four weights a vertex.
     Weights,
@@ -37,7 +37,7 @@ pub fn numbers(
     let is_unsigned = matches!(scalar, Scalar::U8 | Scalar::U16 | Scalar::U32);
     let is_share = accessor.normalized && is_unsigned;
     let (shape, width, fits) = match used {
-        // Integers by the extension KHR_mesh_quantization.
+        // Integers are allowed by the extension KHR_mesh_quantization.
         Use::Positions => ("VEC3", 3, scalar != Scalar::U32),
         Use::Indices => ("SCALAR", 1, is_unsigned),
         Use::Matrices => ("MAT4", 16, !is_integer),
@@ -91,15 +91,15 @@ fn scalar(component_type: u32) -> Option<Scalar> {
     })
 }
 
-/// Where elements stand.
+/// Where in the buffers elements are.
 struct Place {
     view: usize,
     offset: usize,
-    /// Whether the view's stride counts.
+    /// Whether the view's stride applies.
     strided: bool,
 }
 
-/// A defect of an accessor, whose number is not known yet.
+/// A defect of an accessor whose number the caller adds.
 enum Defect {
     Sentence(&'static str),
     Known(ReadErrorKind),
@@ -148,7 +148,7 @@ fn elements(
     Ok(elements.flat_map(|element| scalar.read_all(element, Endian::Little)).collect())
 }
 
-/// Puts the elements of a sparse accessor in their places.
+/// Overwrites elements with those of the accessor's sparse part.
 fn replace(
     document: &Document,
     buffers: &mut Buffers<'_>,

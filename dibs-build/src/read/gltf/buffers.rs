@@ -1,4 +1,4 @@
-//! The bytes of a document's buffers: each is read when it is first asked for, and only once.
+//! The bytes of a document's buffers: each is read when it is first needed, and only once.
 
 use super::document::Buffer;
 use super::{Result, get, malformed};
@@ -14,7 +14,7 @@ pub struct Buffers<'a> {
     /// The binary part of a GLB file.
     binary: &'a [u8],
     buffers: &'a [Buffer],
-    /// By their numbers, and the files by their paths.
+    /// Contents of buffers by number, and of files by path.
     data: HashMap<usize, Vec<u8>>,
     files: HashMap<PathBuf, Vec<u8>>,
 }
@@ -24,7 +24,7 @@ impl<'a> Buffers<'a> {
         Self { folder, binary, buffers, data: HashMap::new(), files: HashMap::new() }
     }
 
-    /// Bytes in the files that the document names.
+    /// Total size in bytes of the files that the document refers to.
     pub fn room(&self) -> usize {
         let uris = self.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
         let names: HashSet<_> = uris.filter(|uri| !uri.starts_with("data:")).map(decoded).collect();
@@ -36,8 +36,8 @@ impl<'a> Buffers<'a> {
         names.iter().map(length).fold(0, usize::saturating_add)
     }
 
-    /// The bytes of a buffer, as many as the document says: the binary part, data inside the document, or a file beside
-    /// it.
+    /// The bytes of a buffer, of the length that the document states: from the binary part, from the document, or from
+    /// a file in the document's folder.
     pub fn bytes(&mut self, number: usize) -> Result<&[u8]> {
         let buffer = get(self.buffers, number, "buffer")?;
         let bytes = match &buffer.uri {
@@ -70,7 +70,7 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// A file is read as far as the longest of its buffers says.
+    /// Reads a file up to the end of the longest buffer in it.
     fn beside(&mut self, uri: &str) -> Result<&[u8]> {
         let name = decoded(uri);
         let no_file = || malformed(format!("the buffer '{}' is no file beside it", excerpt(uri)));
@@ -80,7 +80,7 @@ impl<'a> Buffers<'a> {
                 |buffer: &&Buffer| buffer.uri.as_deref().map(decoded).as_ref() == Some(&name);
             let same = self.buffers.iter().filter(is_same);
             let most = same.map(|buffer| buffer.byte_length as u64).max().unwrap_or(0);
-            // Some programs write the name as it is.
+            // Some programs write the name without percent-encoding.
             let spellings = [self.folder.join(path), self.folder.join(uri)];
             let there = spellings.iter().find(|path| path.exists()).unwrap_or(&spellings[0]);
             let bytes = file::first(there, most).map_err(|error| {
@@ -95,23 +95,23 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// A document names files beside it, not those of the computer.
+/// A document may only refer to files in its own folder.
 fn file_beside(name: &str) -> Option<&Path> {
     let path = Path::new(name);
     let is_beside = path.components().all(|part| matches!(part, Component::Normal(_)));
     (is_beside && !name.is_empty()).then_some(path)
 }
 
-/// A URI's name of a file.
+/// The file name of a URI.
 fn decoded(uri: &str) -> Cow<'_, str> {
     if !uri.contains('%') {
         return uri.into();
     }
-    // Names that are no UTF-8 stay as they are.
+    // Names that are not UTF-8 stay as they are.
     String::from_utf8(unescaped(uri)).map_or(uri.into(), Into::into)
 }
 
-/// The bytes of a URI's part: `%20` is a space.
+/// The bytes of a part of a URI after percent-decoding: `%20` is a space.
 fn unescaped(uri: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();

@@ -1,10 +1,10 @@
-//! The parts of a glTF document that the reader knows. Unknown ones are passed over.
+//! The parts of a glTF document that the reader knows. Unknown ones are ignored.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::HashMap;
 
-/// The part that all versions have: in the first, lists are maps.
+/// The part that all versions have: in version 1, lists are maps.
 #[derive(Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub struct Head {
@@ -47,7 +47,7 @@ pub struct Node {
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
     pub skin: Option<usize>,
-    /// Of its mesh's morph targets.
+    /// Weights of its mesh's morph targets.
     pub weights: Option<Vec<f64>>,
     pub matrix: Option<[f64; 16]>,
     pub translation: Option<[f64; 3]>,
@@ -66,7 +66,7 @@ pub struct Mesh {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Skin {
-    /// Nodes.
+    /// Numbers of nodes.
     pub joints: Vec<usize>,
     pub inverse_bind_matrices: Option<usize>,
 }
@@ -76,7 +76,7 @@ pub struct Primitive {
     #[serde(default)]
     pub attributes: HashMap<String, usize>,
     pub indices: Option<usize>,
-    /// Triangles (4) where it is not said, strips (5), fans (6), or no surface.
+    /// Triangles (4, the default), strips (5), fans (6), or no surface.
     pub mode: Option<u32>,
     /// Morph targets.
     #[serde(default)]
@@ -100,7 +100,7 @@ pub struct Accessor {
     pub sparse: Option<Sparse>,
 }
 
-/// Elements that differ from the accessor's own, or from zero.
+/// Elements that override the accessor's own, or zeros.
 #[derive(Deserialize)]
 pub struct Sparse {
     pub count: usize,
@@ -131,7 +131,7 @@ pub struct View {
     pub buffer: usize,
     #[serde(default)]
     pub byte_offset: usize,
-    /// To the buffer's end where a writer left it out.
+    /// Up to the buffer's end if left out.
     pub byte_length: Option<usize>,
     pub byte_stride: Option<usize>,
     #[serde(default)]

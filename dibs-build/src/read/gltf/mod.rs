@@ -1,7 +1,7 @@
-//! glTF 2.0 and GLB: the triangles of the default scene in its default pose, where its nodes put them, in metres.
+//! glTF 2.0 and GLB: the triangles of the default scene in its default pose, transformed by its nodes, in metres.
 //!
-//! Our own reader, although `gltf` exists: that panics on documents whose numbers of accessors, and on accessors whose
-//! bytes, are not there. With these checked first, nothing would be left for it to do.
+//! Our own reader, although `gltf` exists: it panics on documents that refer to accessors, or to bytes of accessors,
+//! that do not exist. After checking these first, nothing would be left for it to do.
 //!
 //! One file, because a document's parts refer to each other.
 
@@ -23,10 +23,10 @@ use std::path::Path;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// Positions and corners for each byte: ten times as many as a mesh has that a scene places once.
+/// Most positions and corners for each byte of the files: ten times as many as a mesh has that a scene places once.
 const MOST_A_BYTE: usize = 3;
 
-/// Extensions that change no position: surfaces look the same without them.
+/// Extensions that change no position: surfaces are the same without them.
 const HARMLESS: [&str; 7] = [
     "KHR_materials_",
     "KHR_texture_",
@@ -65,14 +65,14 @@ pub(super) fn read(bytes: &[u8], folder: &Path) -> Result<Raw> {
     while let Some((number, above)) = waiting.pop() {
         let node = get(&document.nodes, number, "node")?;
         if std::mem::replace(&mut seen[number], true) {
-            return Err(malformed(format!("node {number} stands in the scene twice")));
+            return Err(malformed(format!("node {number} is in the scene twice")));
         }
         let place = above * node.place();
         surface.node(node, number, &place)?;
         waiting.extend(node.children.iter().rev().map(|&child| (child, place)));
     }
     if document.nodes.is_empty() {
-        // A library of meshes, each where it was made.
+        // A library of meshes without a scene: each mesh untransformed.
         for (number, mesh) in document.meshes.iter().enumerate() {
             surface.mesh(mesh, number, &Placed::At(DMat4::IDENTITY), &mesh.weights)?;
         }
@@ -134,7 +134,7 @@ fn parts<'a>(bytes: &'a [u8]) -> Result<(&'a [u8], &'a [u8])> {
     if let Some(&[version @ (0 | 1), 0, 0, 0]) = bytes.get(4..8) {
         return Err(old(&version.to_string()));
     }
-    // Magic, version and length; then parts, each after its length and kind.
+    // Magic, version and length; then parts, each preceded by its length and kind.
     let part = |bytes: &'a [u8]| {
         let (length, after) = bytes.split_first_chunk::<4>()?;
         after.get(4..)?.split_at_checked(u32::from_le_bytes(*length) as usize)
@@ -147,7 +147,7 @@ fn parts<'a>(bytes: &'a [u8]) -> Result<(&'a [u8], &'a [u8])> {
     Ok((json, binary))
 }
 
-/// The nodes at the top of the default scene, or where there is none of all nodes.
+/// The root nodes of the default scene; without one, those of the whole document.
 fn roots(document: &Document) -> Result<Vec<usize>> {
     match (document.scene, &document.scenes[..]) {
         (Some(number), _) => {
@@ -166,11 +166,11 @@ fn roots(document: &Document) -> Result<Vec<usize>> {
     }
 }
 
-/// Lengths of a rotation's quaternion, which should be 1: as far off as it is rounded to a few digits.
+/// Accepted lengths of a rotation's quaternion, which should be 1 but may be rounded to a few digits.
 const UNIT: std::ops::RangeInclusive<f64> = 0.99..=1.01;
 
 impl Node {
-    /// Fails for a placement that other readers would understand differently.
+    /// Fails for a transform that other readers would interpret differently.
     fn check(&self) -> std::result::Result<(), &'static str> {
         let is_unit = |rotation| UNIT.contains(&DQuat::from_array(rotation).length());
         if !self.rotation.is_none_or(is_unit) {
@@ -195,7 +195,7 @@ impl Node {
     }
 }
 
-/// Numbers of things that are not read.
+/// Counts of elements that are not read.
 #[derive(Default)]
 struct LeftOut {
     /// Nodes with a mesh that are not in the default scene.
@@ -211,23 +211,23 @@ struct LeftOut {
     instanced: usize,
 }
 
-/// What places a mesh.
+/// What transforms a mesh.
 enum Placed {
     /// Its node.
     At(DMat4),
-    /// The joints of its skin, and its node does not.
+    /// The joints of its skin, and not its node.
     Posed(Vec<DMat4>),
 }
 
 struct Surface<'a> {
     document: &'a Document,
     buffers: Buffers<'a>,
-    /// The place of each node.
+    /// The transform of each node; `None` for nodes in a cycle.
     worlds: Vec<Option<DMat4>>,
     raw: Raw,
-    /// The first row of the positions of each part that has its own: parts of one mesh share them.
+    /// The first row of positions by node and accessors: parts of one mesh share positions.
     first: HashMap<(usize, Vec<usize>), u32>,
-    /// Positions and corners that the files can honestly have.
+    /// Most positions and corners of a plausible mesh in files of this size.
     most: usize,
     left_out: LeftOut,
 }
@@ -320,7 +320,7 @@ impl Surface<'_> {
         let corners: Vec<u32> = match primitive.indices {
             Some(indices) => {
                 let indices = self.numbers(indices, Use::Indices)?;
-                // A number beyond the part's own vertices is none of another part's.
+                // A number beyond the part's own vertices must not refer to another part's.
                 let row = |index: f64| {
                     if index < f64::from(count) { first + index as u32 } else { u32::MAX }
                 };
@@ -328,7 +328,7 @@ impl Surface<'_> {
             }
             None => (first..first.saturating_add(count)).collect(),
         };
-        // A mirror turns triangles over: the other way round their outer side stays outside.
+        // A mirror turns triangles inside out: reversing their order keeps their outer side outside.
         let is_mirrored = match placed {
             Placed::At(place) => place.determinant() < 0.0,
             Placed::Posed(joints) => joints.first().is_some_and(|joint| joint.determinant() < 0.0),

@@ -1,4 +1,4 @@
-//! Skins: each vertex goes with a few joints, nodes of the scene, in their default pose.
+//! Skins: each vertex follows a few joints, which are nodes of the scene, in their default pose.
 
 use super::accessor::{Use, numbers};
 use super::buffers::Buffers;
@@ -6,7 +6,7 @@ use super::document::{Document, Primitive, Skin};
 use super::{Result, get, malformed};
 use glam::{DMat4, DVec3};
 
-/// The place of each node in the world; `None` for nodes that are above themselves.
+/// The transform of each node to the world; `None` for nodes that are their own ancestors.
 pub fn worlds(document: &Document) -> Vec<Option<DMat4>> {
     let mut is_child = vec![false; document.nodes.len()];
     for &child in document.nodes.iter().flat_map(|node| &node.children) {
@@ -29,7 +29,7 @@ pub fn worlds(document: &Document) -> Vec<Option<DMat4>> {
     worlds
 }
 
-/// Moves from a mesh's own place to where each joint of a skin takes it.
+/// For each joint of a skin, the transform from the mesh's own coordinates to the world.
 pub fn joints(
     document: &Document,
     buffers: &mut Buffers<'_>,
@@ -43,14 +43,14 @@ pub fn joints(
     };
     let inverse = inverse.as_chunks::<16>().0;
     let joint = |(number, &node): (usize, &usize)| {
-        let world = get(worlds, node, "node")?.ok_or_else(|| malformed("a joint above itself"))?;
+        let world = get(worlds, node, "node")?.ok_or_else(|| malformed("a joint in a cycle"))?;
         let bind = inverse.get(number).map_or(DMat4::IDENTITY, DMat4::from_cols_array);
         Ok(world * bind)
     };
     skin.joints.iter().enumerate().map(joint).collect()
 }
 
-/// Puts the vertices of a part where their joints are, by their weights.
+/// Moves the vertices of a part by the transforms of their joints, by their weights.
 pub fn pose(
     document: &Document,
     buffers: &mut Buffers<'_>,

@@ -1,7 +1,7 @@
-//! 3MF: the objects that its build names, from all models of the package.
+//! 3MF: the objects that its build refers to, from all models of the package.
 //!
-//! Our own reader of what `zip` and `quick-xml` find, although `threemf` exists: that leaves out where an object's
-//! parts are placed, and takes all the memory that a compressed file asks for.
+//! Our own reader on top of `zip` and `quick-xml`, although `threemf` exists: it ignores the transforms of an object's
+//! parts, and allocates as much memory as a compressed file asks for.
 
 mod package;
 
@@ -15,16 +15,16 @@ use std::collections::{HashMap, HashSet};
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-/// More copies of its vertices than this are no organ, unless they are few.
+/// An organ has no more copies of its vertices than this, unless the copies are few.
 const MOST_COPIES: usize = 10;
 
-/// Parts of the namespaces of extensions that are read, or change no position.
+/// Parts of the namespaces of extensions that are read, or that change no position.
 const KNOWN: [&str; 3] = ["/production/", "/material/", "/trianglesets/"];
 
-/// The beginning of the namespaces of most extensions.
+/// The prefix of most extensions' namespaces.
 const NAMESPACES: &str = "http://schemas.microsoft.com/3dmanufacturing/";
 
-/// Elements that are geometry of another kind.
+/// Elements with geometry of another kind.
 const OTHERS: [&str; 5] =
     ["beamlattice", "booleanshape", "displacementmesh", "levelset", "slicestack"];
 
@@ -38,7 +38,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
         let text = package.text(&path)?;
         (model.path, model.current) = (path, None);
         tags(&text, |tag| model.enter(tag))?;
-        // The production extension keeps objects in models of their own.
+        // With the production extension, objects may be in models of their own.
         for other in std::mem::take(&mut model.others) {
             if seen.insert(other.clone()) {
                 waiting.push(other);
@@ -49,10 +49,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     model.assemble(bytes.len())
 }
 
-/// Parts that slicers note, in files of their own, as taken away from an object, or as a place of other settings.
+/// Parts that slicers mark, in files of their own, as subtracted from an object or as a region of other settings.
 fn modifiers(package: &mut Package<'_>) -> Result<usize> {
     let mut modifiers = 0;
-    // Of Bambu Studio and OrcaSlicer; of PrusaSlicer.
+    // The files of Bambu Studio and OrcaSlicer, and of PrusaSlicer.
     for path in ["Metadata/model_settings.config", "Metadata/Slic3r_PE_model.config"] {
         if !package.has(path) {
             continue;
@@ -80,11 +80,11 @@ fn malformed(what: impl Into<String>) -> ReadErrorKind {
 
 #[derive(Default)]
 struct Object {
-    /// Not `model`, but `support` or another kind that is no part of the surface.
+    /// Whether its type is not `model`, but `support` or another kind that is not part of the surface.
     is_support: bool,
     positions: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
-    /// Other objects, and where they are placed.
+    /// Component objects, and their transforms.
     parts: Vec<(Key, DMat4)>,
 }
 
@@ -95,20 +95,20 @@ type Key = (String, String);
 struct Model {
     /// The unit of the package's first model.
     unit: Option<Unit>,
-    /// Such units that one of the present model is.
+    /// Length of the present model's unit in the package's unit.
     scale: f64,
-    /// The present model, and the others that it names.
+    /// The path of the present model, and the other models that it refers to.
     path: String,
     others: Vec<String>,
     objects: Vec<Object>,
     /// The present object.
     current: Option<usize>,
-    /// The place in `objects` of each number in a model.
+    /// The index in `objects` of each object's key.
     numbers: HashMap<Key, usize>,
     items: Vec<(Key, DMat4)>,
-    /// Elements that are left out.
+    /// Number of elements that are left out.
     unread: usize,
-    /// Parts that are no part of the surface, and are read as if they were.
+    /// Number of parts that are not part of the surface, but are read as if they were.
     modifiers: usize,
 }
 
@@ -131,7 +131,7 @@ impl Model {
         let row = |of: &str| {
             let text = needed(of)?;
             let row = text.trim().parse();
-            row.map_err(|_| malformed(format!("'{}' is no number of a vertex", excerpt(&text))))
+            row.map_err(|_| malformed(format!("'{}' is not a vertex number", excerpt(&text))))
         };
         match name.as_ref() {
             "model" => {
@@ -190,13 +190,13 @@ impl Model {
         self.numbers.get(key).copied().ok_or_else(unknown)
     }
 
-    /// Places every item, and the parts of which it is made.
+    /// Places every item of the build, with all its components.
     fn assemble(self, bytes: usize) -> Result<Raw> {
         if self.items.is_empty() {
             return Err(malformed("its build names no object"));
         }
         let vertices: usize = self.objects.iter().map(|object| object.positions.len()).sum();
-        // Many copies of a small object are as much as an honest file of so many bytes may have.
+        // A plausible file of so many bytes may contain many copies of a small object.
         let most = bytes.max(MOST_COPIES * vertices);
         let mut raw = Raw::new(0);
         let items = self.items.iter().rev().map(|(key, place)| Ok((self.find(key)?, *place)));
@@ -252,13 +252,13 @@ impl Object {
         let first = raw.positions.len() as u32;
         let positions = self.positions.iter();
         raw.positions.extend(positions.map(|&p| place.transform_point3(DVec3::from(p)).to_array()));
-        // A mirror turns triangles over: the other way round their outer side stays outside.
+        // A mirror turns triangles inside out: reversing their order keeps their outer side outside.
         let is_mirrored = place.determinant() < 0.0;
         for &[a, b, c] in &self.triangles {
             let triangle = if is_mirrored { [a, c, b] } else { [a, b, c] };
             raw.corners.extend(triangle.map(|row| match self.positions.get(row as usize) {
                 Some(_) => first + row,
-                // Of no vertex of any object.
+                // A number that no vertex has.
                 None => u32::MAX,
             }));
             raw.end_face();
@@ -287,14 +287,14 @@ fn check_required(model: &BytesStart<'_>) -> Result<()> {
     Ok(())
 }
 
-/// An attribute of an extension, whose prefix any letters may be.
+/// An attribute of an extension, with any prefix.
 fn with_prefix(tag: &BytesStart<'_>, name: &str) -> Option<String> {
     let attributes = tag.attributes().filter_map(std::result::Result::ok);
     let mut named = attributes.filter(|attribute| attribute.key.local_name().as_ref() == name);
     named.next().map(|attribute| attribute.value.into_owned())
 }
 
-/// The unit that a model states, and how many of it are one of the file's.
+/// The unit for the one that a model states, and the stated unit's length in it: a foot is 12 inches.
 fn unit(name: Option<&str>) -> Result<(Unit, f64)> {
     Ok(match name {
         None | Some("millimeter") => (Unit::Millimetre, 1.0),
@@ -307,7 +307,7 @@ fn unit(name: Option<&str>) -> Result<(Unit, f64)> {
     })
 }
 
-/// Twelve numbers: the images of the axes, and then of the origin, a length.
+/// Twelve numbers: the images of the axes, then the translation, which is a length.
 fn transform(text: Option<&str>, scale: f64) -> Result<DMat4> {
     let Some(text) = text else { return Ok(DMat4::IDENTITY) };
     let numbers: Option<Vec<f64>> = text.split_whitespace().map(coordinate).collect();

@@ -1,4 +1,4 @@
-//! The archive that a 3MF file is.
+//! The ZIP archive of a 3MF file.
 
 use super::{Result, inflate, malformed};
 use crate::read::raw::excerpt;
@@ -11,7 +11,7 @@ use zip::result::ZipError;
 pub struct Package<'a> {
     archive: ZipArchive<Cursor<&'a [u8]>>,
     compressed: usize,
-    /// Bytes that its files may still become, all together.
+    /// Bytes that all its files together may still decompress to.
     room: u64,
 }
 
@@ -44,7 +44,7 @@ impl<'a> Package<'a> {
         })
     }
 
-    /// The number and the path of each file, without the slash before it.
+    /// The index and the path of each file, without a leading slash.
     fn paths(&self) -> impl Iterator<Item = (usize, String)> {
         (0..self.archive.len()).filter_map(|number| {
             let name = self.archive.name_for_index(number)?.ok()?;
@@ -74,7 +74,7 @@ fn fail(error: &ZipError) -> crate::ReadErrorKind {
     malformed(error.to_string())
 }
 
-/// Each element's start.
+/// Calls `each` with the start tag of every element.
 pub fn tags(text: &str, mut each: impl FnMut(&BytesStart<'_>) -> Result<()>) -> Result<()> {
     let mut xml = Reader::from_str(text);
     loop {

@@ -1,15 +1,15 @@
-//! The positions, and the triangles, in the content of a message.
+//! The positions and the triangles in a message's content.
 
 use super::message::{take, u16_of, u32_of};
 
-/// Bytes of an element of POINT, and those before its position.
+/// Size of an element of POINT, and the bytes before its position.
 const POINT: (usize, usize) = (136, 100);
 
-/// Scalars of an array that positions may be.
+/// Scalar types allowed for an array of positions.
 const FLOAT32: u8 = 10;
 const FLOAT64: u8 = 11;
 
-/// Types of messages that have positions.
+/// Types of messages that contain positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     PolyData,
@@ -21,11 +21,11 @@ pub enum Kind {
 #[derive(Debug, PartialEq)]
 pub struct Content<'a> {
     pub positions: Vec<[f64; 3]>,
-    /// What joins them, of POLYDATA.
+    /// The cells that connect them, for POLYDATA.
     pub cells: Option<Cells<'a>>,
 }
 
-/// Cells of POLYDATA as they are sent: runs of a count and so many points.
+/// Cells of POLYDATA as they are sent: for each a count and so many points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cells<'a> {
     pub polygons: &'a [u8],
@@ -42,7 +42,7 @@ impl Kind {
         }
     }
 
-    /// `None` if the content is not as the protocol has it. Nothing is allocated but for bytes that are there.
+    /// `None` if the content violates the protocol. Memory is only allocated for bytes that were received.
     pub fn read(self, content: &[u8]) -> Option<Content<'_>> {
         match self {
             Self::PolyData => poly_data(content),
@@ -54,7 +54,7 @@ impl Kind {
 
 fn poly_data(mut rest: &[u8]) -> Option<Content<'_>> {
     let points = u32_of(&mut rest)?;
-    // A number of cells and their bytes, four times; the number says nothing that the bytes do not.
+    // A number of cells and their size in bytes, four times; the number is redundant.
     let mut sizes = [0; 4];
     for size in &mut sizes {
         u32_of(&mut rest)?;
@@ -83,7 +83,7 @@ fn array(mut rest: &[u8]) -> Option<Content<'_>> {
     let [scalar, dimensions] = *take(&mut rest, 2)? else { return None };
     let sizes: Option<Vec<usize>> =
         (0..dimensions).map(|_| u16_of(&mut rest).map(usize::from)).collect();
-    // Points by coordinates, or more of the same: frames of one, points by one.
+    // Dimensions points x 3, or frames x points x 3, where a dimension of one is ignored.
     let sizes: Vec<usize> = sizes?.into_iter().filter(|&size| size != 1).collect();
     let points = match sizes[..] {
         [points, 3] => points,
@@ -109,8 +109,8 @@ fn floats(bytes: &[u8]) -> Vec<[f64; 3]> {
 }
 
 impl Cells<'_> {
-    /// The faces, strips as their triangles. `None` if a cell ends early, or has a point that is not there, and for more than
-    /// `most` faces.
+    /// The faces, with strips cut into triangles. `None` if a cell ends early, or refers to a missing point, or if
+    /// there are more than `most` faces.
     pub fn faces(&self, points: usize, most: usize) -> Option<Vec<Vec<u32>>> {
         let mut faces = Vec::new();
         each_cell(self.polygons, points, |cell| {
@@ -119,7 +119,7 @@ impl Cells<'_> {
         })?;
         each_cell(self.strips, points, |strip| {
             let triangles = strip.windows(3).enumerate();
-            // Every other triangle of a strip turns the other way.
+            // Every other triangle of a strip is wound the other way.
             let triangles = triangles.map(|(number, corners)| match (number % 2, corners) {
                 (1, &[a, b, c]) => vec![b, a, c],
                 _ => corners.to_vec(),
@@ -134,7 +134,7 @@ impl Cells<'_> {
     }
 }
 
-/// Gives each cell that has a face, until `take_cell` refuses one.
+/// Calls `take_cell` for each cell that has a face, until it returns false.
 fn each_cell(
     mut rest: &[u8],
     points: usize,
@@ -205,7 +205,7 @@ mod tests {
     }
 
     proptest! {
-        /// No content makes a reader reach outside of it, or panic.
+        /// No content makes a reader exceed its bounds, or panic.
         #[test]
         fn any_bytes_are_read_or_refused(
             start in prop::collection::vec(0_u32..40, 10),

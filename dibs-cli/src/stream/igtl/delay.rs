@@ -1,18 +1,18 @@
-//! How late a message is, by the time in its header.
+//! How late a message is, measured by the time in its header.
 //!
-//! The two clocks need not agree: the fastest message so far counts as not late at all, and the others as late as they are
-//! behind it. So the part of the delay that all messages have is not seen. Clocks run apart, so the fastest message's lead is
-//! let go at a rate that is faster than they do: a delay that lasts is seen for an hour. A clock that the peer sets back makes
-//! its messages old until the peer connects anew.
+//! The two clocks need not agree: the delay of the fastest message so far counts as zero, and that of the others is
+//! relative to it. So a delay that all messages have is not measured. Because the clocks drift, the fastest message's
+//! lead decays, at a rate above that of any quartz: a lasting delay is measured for an hour. A clock that the peer sets
+//! back makes its messages old until the peer reconnects.
 
 use std::time::{Duration, Instant};
 
-/// Seconds by which two clocks run apart in a second, at most: ten times as many as quartz.
+/// Upper bound on the drift between the two clocks, in seconds a second: ten times that of quartz.
 const DRIFT: f64 = 5e-4;
 
 pub struct Delay {
     start: Instant,
-    /// The least difference, in seconds, and when it was so.
+    /// The least difference, in seconds, and the time when it was last updated.
     least: Option<(f64, f64)>,
 }
 
@@ -21,7 +21,7 @@ impl Delay {
         Self { start: Instant::now(), least: None }
     }
 
-    /// The lateness of a message, by when it came and by the time in its header; zero where the header has none.
+    /// The delay of a message, from its arrival and the time in its header; zero if the header has no time.
     pub fn of(&mut self, came: Instant, time: f64) -> Duration {
         let now = came.saturating_duration_since(self.start).as_secs_f64();
         if time > 0.0 { self.at(now, time) } else { Duration::ZERO }
@@ -44,17 +44,17 @@ mod tests {
     fn a_message_is_as_late_as_it_is_behind_the_fastest() {
         let mut delay = Delay::new();
         let mut late = |now: f64, time: f64| delay.at(now, time).as_secs_f64();
-        // The peer's clock is 1,000 s behind.
+        // The peer's clock is behind by 1,000 s.
         assert_eq!(late(2000.0, 999.0), 0.0);
         assert_eq!(late(2001.0, 1000.5), 0.0, "faster than the first");
         assert!((late(2002.0, 1000.5) - 1.0).abs() < 1e-3);
-        // A clock that loses 100 parts in a million does not make frames older and older.
+        // A clock that loses 100 parts in a million does not make frames ever older.
         let slow = |hour: f64| late(2003.0 + 3600.0 * hour, 1002.5 + 3600.0 * (1.0 - 1e-4) * hour);
         let latest = (0..100).map(f64::from).map(slow).fold(0.0, f64::max);
         assert!(latest < 1e-3, "{latest}");
     }
 
-    /// Two seconds that stay are still seen a quarter of an hour later.
+    /// A lasting delay of two seconds is still measured a quarter of an hour later.
     #[test]
     fn a_delay_that_lasts_is_not_forgotten() {
         let mut delay = Delay::new();

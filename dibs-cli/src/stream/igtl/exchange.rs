@@ -1,4 +1,4 @@
-//! The state that two threads share: the one that reads a peer, and the one that sends to the receiver.
+//! The state shared by two threads: one reads a peer, the other sends to the receiver.
 
 use super::message;
 use serde_json::{Value, json};
@@ -6,20 +6,20 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Between two statuses that say the same, and between any two.
+/// Time between two equal statuses; and between any two.
 const STATUS: Duration = Duration::from_secs(1);
 const BETWEEN: Duration = Duration::from_millis(100);
 
-/// Notes that wait.
+/// Largest number of queued notes.
 const NOTES: usize = 8;
 
 /// Least time between two notes.
 const NOTE: Duration = Duration::from_secs(1);
 
-/// The name of this device in messages to the peer.
+/// The device name in messages to the peer.
 const DEVICE: &str = "dibs";
 
-/// Codes of STATUS.
+/// Codes of STATUS messages.
 const OK: u16 = 1;
 const CHECKSUM: u16 = 9;
 const CONFIGURATION: u16 = 10;
@@ -29,13 +29,13 @@ const NOT_READY: u16 = 13;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     Checksum,
-    /// Its content is not as the protocol has it, or larger than any of this surface.
+    /// Its content violates the protocol, or is larger than any of this surface.
     Layout,
-    /// Its triangles are not the tree's.
+    /// Its triangles are not those of the tree.
     Topology,
-    /// Its positions are no frame of the tree's surface.
+    /// Its positions are not a frame of the tree's surface.
     Frame,
-    /// Its pose is none, or its frame has none.
+    /// Its pose is not a rigid one, or its frame has no pose.
     Pose,
 }
 
@@ -56,7 +56,7 @@ impl Cause {
 /// What the receiver reports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
-    /// Whether it has a surface, and acts on it.
+    /// Whether it has a published surface that is not too old to act on.
     pub is_ready: bool,
     pub text: String,
 }
@@ -68,19 +68,19 @@ pub struct Exchange(Mutex<State>);
 struct State {
     connections: u64,
     messages: u64,
-    /// Those with a pose that was taken.
+    /// Number of messages whose pose was accepted.
     poses: u64,
-    /// Messages of other types and devices.
+    /// Number of messages of other types or devices.
     passed: u64,
-    /// Whether a note tells of another device with positions.
+    /// Whether a note has reported another device with positions.
     has_other: bool,
-    /// Messages with a frame and without a time.
+    /// Number of messages with a frame and without a time.
     timeless: u64,
     refused: [u64; Cause::ALL.len()],
     broken: u64,
-    /// Why the last message was refused.
+    /// Cause of the last message's refusal; `None` if it was accepted.
     last: Option<Cause>,
-    /// The refusal that the peer is told, and whether it was.
+    /// The refusal to report to the peer, and whether it was reported.
     refusal: Option<(Cause, String)>,
     is_told: bool,
     notes: VecDeque<String>,
@@ -98,18 +98,18 @@ impl Exchange {
     pub fn connected(&self) {
         let mut state = self.state();
         state.connections += 1;
-        // A new peer is told how things stand.
+        // A new peer gets a status at once.
         state.reported = None;
     }
 
-    /// The connection broke inside of a message.
+    /// Records that the connection broke within a message.
     pub fn broken(&self, note: String) {
         let mut state = self.state();
         state.broken += 1;
         state.tell(note);
     }
 
-    /// Counts a message of another type or device, and leaves a note once.
+    /// Counts a message of another type or device; the first time a note reports it.
     pub fn passed(&self, note: Option<String>) {
         let mut state = self.state();
         state.messages += 1;
@@ -119,7 +119,7 @@ impl Exchange {
         }
     }
 
-    /// Counts a message whose frame is taken.
+    /// Counts a message whose frame is accepted.
     pub fn accepted(&self, has_time: bool) {
         let mut state = self.state();
         state.messages += 1;
@@ -135,19 +135,19 @@ impl Exchange {
         }
     }
 
-    /// Counts a message whose pose is taken.
+    /// Counts a message whose pose is accepted.
     pub fn posed(&self) {
         let mut state = self.state();
         state.messages += 1;
         state.poses += 1;
     }
 
-    /// Leaves a note.
+    /// Queues a note.
     pub fn tell(&self, note: String) {
         self.state().tell(note);
     }
 
-    /// Counts a message that is refused, and tells of it if the last one was not for the same cause.
+    /// Counts a refused message; a note reports it unless the last message was refused for the same cause.
     pub fn refused(&self, cause: Cause, text: String) {
         let mut state = self.state();
         state.messages += 1;
@@ -156,13 +156,13 @@ impl Exchange {
             state.tell(text.clone());
         }
         state.last = Some(cause);
-        // The first of many that come between two statuses: the others follow from it, or come again.
+        // Of several refusals between two statuses the first is reported: the others follow from it, or recur.
         if state.refusal.is_none() || state.is_told {
             (state.refusal, state.is_told) = (Some((cause, text)), false);
         }
     }
 
-    /// Takes the next note, once it is due.
+    /// Removes the next note from the queue, once it is due.
     pub fn note(&self) -> Option<String> {
         let mut state = self.state();
         if state.noted.is_some_and(|at| at.elapsed() < NOTE) {
@@ -173,7 +173,7 @@ impl Exchange {
         Some(note)
     }
 
-    /// Takes the notes that are left at the end.
+    /// Removes the notes that are left at the end.
     pub fn notes(&self) -> VecDeque<String> {
         std::mem::take(&mut self.state().notes)
     }
@@ -265,7 +265,7 @@ impl State {
 mod tests {
     use super::Exchange;
 
-    /// Notes that come faster than they are shown wait, each once.
+    /// Notes that arrive faster than they are shown are queued, each once.
     #[test]
     fn notes_wait_for_their_turn() {
         let exchange = Exchange::default();

@@ -1,34 +1,32 @@
-//! The one way in which two lists of triangles are the same, if there is one.
+//! Finds the one isomorphism between two lists of triangles, if it is unique.
 //!
-//! Vertices get colours that tell their surroundings apart, farther in each round (Weisfeiler and Leman). Once every vertex
-//! has a colour of its own, any two numberings of the mesh pair vertices of one colour: there is one at most. The pairs are
-//! compared triangle by triangle, so a colour that two surroundings share by chance gives no wrong pair.
+//! Vertices get colours that describe their neighbourhoods, larger ones in each round (Weisfeiler and Leman). Once
+//! every vertex has its own colour, an isomorphism can only pair vertices of equal colour, so there is at most one. The
+//! pairs are then compared triangle by triangle, so a hash collision of two colours never gives a wrong pair.
 
 // Requirement: B-10
 
-/// Rounds in which colours must have told all vertices apart: organs take fewer than ten, a regular grid as many as it is
-/// long.
+/// Rounds until colours must distinguish all vertices: organs take fewer than ten, a regular grid up to its length.
 const ROUNDS: usize = 64;
 
-/// Whether lists of triangles are the same.
+/// The result of comparing two lists of triangles.
 #[derive(Debug, PartialEq)]
 pub enum Matched {
-    /// In one way: pairs of a vertex of the first list and the vertex of the second that takes its place.
+    /// Isomorphic in one way: pairs of a vertex of the first list and the corresponding vertex of the second.
     One(Vec<[u32; 2]>),
-    /// In several ways, or in one that colours do not find.
+    /// Isomorphic in several ways, or in one that the colours do not distinguish.
     Several,
     None,
 }
 
-/// Compares with the triangles turned as they are, and if they are not the same so, however they are turned: a builder
-/// turns triangles outwards.
+/// Compares with the triangles' winding, and if that fails without it: a builder may have flipped triangles outwards.
 pub fn matched(ours: &[[u32; 3]], theirs: &[[u32; 3]]) -> Matched {
     if ours.len() != theirs.len() {
         return Matched::None;
     }
     let any = turned(ours, theirs, false);
     match turned(ours, theirs, true) {
-        // A mesh that mirrors itself, from a source that may turn all its triangles.
+        // A mesh that is its own mirror image, from a source that may flip all triangles.
         Matched::One(_) if any == Matched::Several => Matched::Several,
         Matched::None => any,
         found => found,
@@ -62,7 +60,7 @@ fn turned(ours: &[[u32; 3]], theirs: &[[u32; 3]], is_oriented: bool) -> Matched 
 struct Colours<'a> {
     triangles: &'a [[u32; 3]],
     is_oriented: bool,
-    /// Vertices that a triangle has.
+    /// Vertices that a triangle uses.
     used: Vec<u32>,
     of: Vec<u64>,
 }
@@ -76,7 +74,7 @@ impl<'a> Colours<'a> {
         Self { triangles, is_oriented, used, of: vec![0; count] }
     }
 
-    /// Colours with their vertices, in the order of the colours.
+    /// Colours with their vertices, sorted by colour.
     fn sorted(&self) -> Vec<(u64, u32)> {
         let mut sorted: Vec<_> =
             self.used.iter().map(|&vertex| (self.of[vertex as usize], vertex)).collect();
@@ -84,7 +82,7 @@ impl<'a> Colours<'a> {
         sorted
     }
 
-    /// Gives each vertex a new colour, made of its old one and its neighbours', whatever the order of the triangles.
+    /// Gives each vertex a new colour from its old one and its neighbours', whatever the order of the triangles.
     fn refine(&mut self) {
         let mut next: Vec<u64> = self.of.iter().map(|&colour| mixed(colour)).collect();
         for &[a, b, c] in self.triangles {

@@ -5,27 +5,27 @@ use crc::{CRC_64_ECMA_182, Crc, Table};
 /// Bytes of a header.
 pub const HEADER: usize = 58;
 
-/// The body's checksum.
+/// The checksum of the body.
 const CRC: Crc<u64, Table<16>> = Crc::<u64, Table<16>>::new(&CRC_64_ECMA_182);
 
 /// Bytes of an extended header, from version 2 on.
 const EXTENDED: usize = 12;
 
-/// What a header says.
+/// The fields of a header.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
     version: u16,
     /// The type of the message.
     pub kind: String,
     pub device: String,
-    /// When it was made, in seconds of the sender's clock; 0 where it does not say.
+    /// Its time in seconds of the sender's clock; 0 if the header does not state it.
     pub time: f64,
     /// Bytes of the body.
     pub size: u64,
     crc: u64,
 }
 
-/// Why a message has no content.
+/// Why a message's content cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BodyError {
     Checksum,
@@ -33,7 +33,7 @@ pub enum BodyError {
 }
 
 impl Header {
-    /// `None` for bytes that are no header.
+    /// `None` for bytes that are not a header.
     pub fn parse(bytes: &[u8; HEADER]) -> Option<Self> {
         let mut rest = &bytes[..];
         let header = Self {
@@ -47,12 +47,12 @@ impl Header {
             size: u64_of(&mut rest)?,
             crc: u64_of(&mut rest)?,
         };
-        // Today's versions are 1 and 2. The type is all that tells a header from other bytes.
+        // The versions in use are 1 and 2. Besides these only the type tells a header from other bytes.
         let is_one = (1..=3).contains(&header.version) && !header.kind.is_empty();
         is_one.then_some(header)
     }
 
-    /// The content of a whole body: without the extended header and the metadata that version 2 has.
+    /// The content of a complete body: without the extended header and the metadata of version 2.
     pub fn content<'a>(&self, body: &'a [u8]) -> Result<&'a [u8], BodyError> {
         if CRC.checksum(body) != self.crc {
             return Err(BodyError::Checksum);
@@ -72,7 +72,7 @@ impl Header {
     }
 }
 
-/// A message of version 1. `seconds` is the time since 1970.
+/// Encodes a message of version 1. `seconds` is the time since 1970.
 pub fn pack(kind: &str, device: &str, seconds: f64, body: &[u8]) -> Vec<u8> {
     let mut message = Vec::with_capacity(HEADER + body.len());
     message.extend(1_u16.to_be_bytes());
@@ -87,7 +87,7 @@ pub fn pack(kind: &str, device: &str, seconds: f64, body: &[u8]) -> Vec<u8> {
     message
 }
 
-/// The first bytes, which are taken off.
+/// Splits the first bytes off.
 pub fn take<'a>(rest: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
     let (first, others) = rest.split_at_checked(count)?;
     *rest = others;
@@ -110,7 +110,7 @@ fn u64_of(rest: &mut &[u8]) -> Option<u64> {
     array(rest).map(u64::from_be_bytes)
 }
 
-/// Text up to the first zero, without control characters; in whatever encoding.
+/// Text up to the first zero, without control characters, in any encoding.
 fn text(bytes: &[u8]) -> Option<String> {
     let text = bytes.split(|&byte| byte == 0).next()?.trim_ascii();
     let is_text = text.iter().all(|byte| !byte.is_ascii_control());
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The checksum of "123456789" that the catalogue of CRC algorithms has.
+    /// The check value for "123456789" from the catalogue of CRC algorithms.
     #[test]
     fn a_message_is_read_as_it_was_packed() {
         let message = pack("STATUS", "dibs", 1_700_000_000.25, b"123456789");
@@ -139,7 +139,7 @@ mod tests {
     }
 
     proptest! {
-        /// No body makes an extended header reach outside of it.
+        /// No body makes the extended header exceed its bounds.
         #[test]
         fn sizes_in_a_body_stay_in_it(body in prop::collection::vec(any::<u8>(), 0..64)) {
             let header = Header { version: 2, crc: CRC.checksum(&body), ..Header::default() };

@@ -1,7 +1,7 @@
-//! `--from igtl:HOST:PORT`: positions out of OpenIGTLink messages, and the receiver's status back.
+//! `--from igtl:HOST:PORT`: reads positions from OpenIGTLink messages, and returns the receiver's status.
 //!
-//! A message that cannot be used is counted and passed over, and a connection that ends is made again: the receiver's
-//! surface ages meanwhile.
+//! A message that cannot be used is counted and skipped, and a connection that ends is made again; meanwhile the
+//! receiver's surface ages.
 
 mod content;
 mod delay;
@@ -36,9 +36,9 @@ pub struct Igtl {
     name: String,
     door: Door,
     peer: Option<Peer>,
-    /// The only device whose positions are taken.
+    /// If given, only this device's positions are accepted.
     device: Option<String>,
-    /// The device whose pose every frame has, and the last one.
+    /// If given, the device whose pose every frame gets, and its last pose.
     pose_device: Option<String>,
     pose: Option<Known>,
     place: Place,
@@ -46,22 +46,22 @@ pub struct Igtl {
     exchange: Arc<Exchange>,
     delay: Delay,
     body: Vec<u8>,
-    /// Of the next message with positions, from 0.
+    /// Number of the next message with positions, from 0.
     number: usize,
-    /// When the last whole message came, or the source was started.
+    /// Time of the last complete message, or of the start.
     heard: Instant,
-    /// Whether this connection has brought one.
+    /// Whether a message has arrived on this connection.
     has_message: bool,
 }
 
-/// A pose, when it came, and how late it was then.
+/// A pose, its arrival time, and its delay then.
 struct Known {
     pose: RigidPose,
     came: Instant,
     delay: Duration,
 }
 
-/// Bytes of the largest message with poses: of more than a thousand instruments.
+/// Largest size of a message with poses: of more than a thousand instruments.
 const MOST_POSES: u64 = 1 << 17;
 
 /// A message that is refused.
@@ -69,7 +69,7 @@ type Refusal = (Cause, String);
 
 impl Igtl {
     /// # Errors
-    /// If nobody can connect here.
+    /// If the address cannot be bound.
     pub fn new(
         address: &Address,
         [device, pose_device]: [Option<String>; 2],
@@ -101,7 +101,7 @@ impl Igtl {
     /// The next frame that fits the tree.
     ///
     /// # Errors
-    /// If the server cannot be reached, or brings no message, within the time that the user allows.
+    /// If the server cannot be reached, or sends no message, within the time that the user allows.
     pub fn next(&mut self) -> Result<Option<Parsed>> {
         loop {
             let mut peer = match self.peer.take() {
@@ -138,7 +138,7 @@ impl Igtl {
         }
     }
 
-    /// Reads one message. `None` if it has no frame, or none that fits.
+    /// Reads one message. `None` if it contains no frame that fits.
     fn message(&mut self, peer: &mut Peer) -> Result<Option<Parsed>, Ended> {
         let header = peer.header(&mut self.door, &self.exchange)?;
         if let Some(kind) = self.pose_of(&header) {
@@ -185,7 +185,7 @@ impl Igtl {
         }
     }
 
-    /// Reads a body of at most so many bytes, as `what` needs them, and what is in it.
+    /// Reads a body of at most `most` bytes, needed for `what`, and parses its content.
     fn body<T>(
         &mut self,
         peer: &mut Peer,
@@ -212,14 +212,14 @@ impl Igtl {
         peer.report(&self.exchange);
     }
 
-    /// The type of a message that may have the pose that is wanted.
+    /// The message's type, if it may contain the requested pose.
     fn pose_of(&self, header: &Header) -> Option<pose::Kind> {
         let wanted = self.pose_device.as_ref()?;
         let kind = pose::Kind::of(&header.kind)?;
         (!kind.is_of_device() || header.device == *wanted).then_some(kind)
     }
 
-    /// Takes the pose of a message. Returns whether it has the one that is wanted.
+    /// Reads the pose of a message. Returns whether it contains the requested one.
     fn read_pose(
         &mut self,
         header: &Header,
@@ -231,7 +231,7 @@ impl Igtl {
         let device = self.pose_device.as_deref().unwrap_or_default();
         let read = kind.read(content, device).map_err(|error| match error {
             PoseError::Layout => {
-                (Cause::Layout, "has not the bytes that its type has".to_owned())
+                (Cause::Layout, "its size is not that of its type".to_owned())
             }
             PoseError::NoRotation => {
                 let why =
@@ -246,7 +246,7 @@ impl Igtl {
         Ok(true)
     }
 
-    /// Bytes of the largest message of this surface: 256 for a point, with its attributes, and 64 for a triangle.
+    /// Largest size of a message of this surface: 256 bytes for a point, with its attributes, and 64 for a triangle.
     fn most(&self) -> u64 {
         let order = &self.place.order;
         (1 << 20) + 256 * order.positions() as u64 + 64 * order.triangles().len() as u64
@@ -286,7 +286,7 @@ impl Igtl {
             let why = format!("no pose of device \"{device}\" has come before it");
             return Err((Cause::Pose, why));
         };
-        // A frame is as old as what came first of its two parts.
+        // A frame is as old as the older of its two parts.
         let pose_age = came.saturating_duration_since(known.came) + known.delay;
         let age = Age::Delay(delay.max(pose_age));
         Ok(Parsed { positions, pose: Some(known.pose), came, age })

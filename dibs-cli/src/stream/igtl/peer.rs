@@ -10,25 +10,25 @@ use std::str::FromStr;
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Between two looks at the line, and two attempts to connect.
+/// Interval of polling the line, and of attempts to connect.
 const GLANCE: Duration = Duration::from_millis(20);
 
-/// Between two connections, where the one before brought no message.
+/// Pause between two connections if the first brought no message.
 const PAUSE: Duration = Duration::from_millis(200);
 
-/// Longest time to connect.
+/// Timeout of a connection attempt.
 const CONNECT: Duration = Duration::from_secs(5);
 
-/// A peer that is silent for so long between two messages gives way to the next one.
+/// A peer that is silent for this long between two messages may be replaced by the next one.
 const IDLE: Duration = Duration::from_secs(1);
 
-/// And one whose message takes longer than this, and a second for each megabyte, is given up.
+/// A connection is closed if a message takes longer than this, plus a second for each megabyte.
 const STALLED: Duration = Duration::from_secs(5);
 
-/// Bytes that are read at once.
+/// Bytes per read.
 const CHUNK: usize = 1 << 16;
 
-/// The largest body that is passed over: of an image.
+/// The largest body that is skipped: an image.
 const LARGEST: u64 = 1 << 30;
 
 /// Where OpenIGTLink messages come from.
@@ -36,7 +36,7 @@ const LARGEST: u64 = 1 << 30;
 pub enum Address {
     /// A server, `igtl:HOST:PORT`.
     Server(String),
-    /// Whoever connects, `igtl-listen:PORT` on this computer alone, or `igtl-listen:HOST:PORT`.
+    /// Any client that connects: `igtl-listen:PORT` from this computer only, or `igtl-listen:HOST:PORT`.
     Listen(String),
 }
 
@@ -75,13 +75,13 @@ pub enum Door {
         at: String,
         patience: Duration,
     },
-    /// With a peer that takes the place of one that was silent.
+    /// With a peer that replaces a silent one.
     Listen(TcpListener, Option<TcpStream>),
 }
 
 impl Door {
     /// # Errors
-    /// If nobody can connect here.
+    /// If the address cannot be bound.
     pub fn new(address: Address, patience: Duration) -> Result<Self> {
         match &address {
             Address::Server(at) => {
@@ -100,7 +100,7 @@ impl Door {
         }
     }
 
-    /// The next connection: of a server within the time that the user allows from `since` on, of others whenever one comes.
+    /// The next connection: to a server within the user's time limit from `since` on; from a client at any time.
     pub fn next(&mut self, since: Instant) -> Result<Peer> {
         loop {
             let made = match self {
@@ -125,10 +125,10 @@ impl Door {
         }
     }
 
-    /// After a connection that brought no message: a pause before the next one.
+    /// Pauses after a connection that brought no message.
     ///
     /// # Errors
-    /// If the server has brought none for as long as the user allows.
+    /// If the server has sent no message for as long as the user allows.
     pub fn pause(&self, since: Instant) -> Result<()> {
         match self {
             Self::Server { address, patience, .. } if since.elapsed() >= *patience => bail!(
@@ -141,7 +141,7 @@ impl Door {
         Ok(())
     }
 
-    /// Takes the connection that came last of those that wait. Returns whether there is one.
+    /// Accepts the latest of the waiting connections. Returns whether there is one.
     fn is_wanted(&mut self) -> bool {
         if let Self::Listen(listener, waiting) = self {
             while let Ok((socket, _)) = listener.accept() {
@@ -153,7 +153,7 @@ impl Door {
     }
 }
 
-/// Connects to the first of a name's addresses that answers.
+/// Connects to the first address of a name that answers.
 fn connect(at: impl ToSocketAddrs) -> std::io::Result<TcpStream> {
     let mut last = ErrorKind::NotFound.into();
     for address in at.to_socket_addrs()? {
@@ -170,15 +170,15 @@ fn connect(at: impl ToSocketAddrs) -> std::io::Result<TcpStream> {
 pub enum Ended {
     /// Between two messages.
     Closed,
-    /// Inside of one, or where none is.
+    /// Within a message, or at bytes that are not a message.
     Broken(&'static str),
-    /// It was silent, and another one waits.
+    /// It was silent, and another peer waits.
     Replaced,
 }
 
 pub struct Peer {
     socket: TcpStream,
-    /// Bytes of a status that the peer has not taken yet.
+    /// Bytes of a status that the peer has not accepted yet.
     unsent: Vec<u8>,
 }
 
@@ -187,12 +187,12 @@ impl Peer {
         socket.set_nonblocking(false)?;
         socket.set_nodelay(true)?;
         socket.set_read_timeout(Some(GLANCE))?;
-        // A peer that reads nothing holds nobody up.
+        // A peer that does not read must not block this thread.
         socket.set_write_timeout(Some(Duration::from_millis(1)))?;
         Ok(Self { socket, unsent: Vec::new() })
     }
 
-    /// Waits for a header, and sends statuses meanwhile.
+    /// Waits for a header, and sends statuses in the meantime.
     pub fn header(&mut self, door: &mut Door, exchange: &Exchange) -> Result<Header, Ended> {
         let mut header = [0; HEADER];
         let start = Instant::now();
@@ -213,13 +213,13 @@ impl Peer {
         parsed.ok_or(Ended::Broken("no message begins where the one before it ends"))
     }
 
-    /// Reads a body. The memory grows as its bytes come: a size in a header is only a claim.
+    /// Reads a body. Memory grows with the received bytes, because the size in a header is only a claim.
     pub fn body(&mut self, size: u64, body: &mut Vec<u8>) -> Result<(), Ended> {
         body.clear();
         self.chunks(size, |chunk| body.extend_from_slice(chunk))
     }
 
-    /// Passes a body over.
+    /// Skips a body.
     pub fn skip(&mut self, size: u64) -> Result<(), Ended> {
         self.chunks(size, |_| ())
     }
@@ -239,7 +239,7 @@ impl Peer {
         Ok(())
     }
 
-    /// Reads all these bytes until `end`.
+    /// Reads exactly these bytes, until `end` at the latest.
     fn fill(&mut self, mut bytes: &mut [u8], end: Instant) -> Result<(), Ended> {
         while !bytes.is_empty() {
             match self.socket.read(bytes) {
@@ -257,7 +257,7 @@ impl Peer {
         Ok(())
     }
 
-    /// Sends the status that is due, as far as the peer takes it. A connection that is gone shows when it is read.
+    /// Sends the status that is due, as far as the peer accepts it. A lost connection is noticed when it is read.
     pub fn report(&mut self, exchange: &Exchange) {
         if self.unsent.is_empty() {
             self.unsent = exchange.status_due().unwrap_or_default();
@@ -294,7 +294,7 @@ mod tests {
         drop(open);
     }
 
-    /// Neither a peer that stops within a message nor one that sends a byte now and then is waited for beyond the end.
+    /// Neither a peer that stops within a message nor one that sends a byte now and then blocks beyond the time limit.
     #[test]
     fn a_message_has_a_time_to_come() {
         let (listener, at) = listener();

@@ -1,39 +1,39 @@
-//! The pose of a surface, in the content of TRANSFORM, TDATA and QTDATA.
+//! The pose of a surface, from messages of the types TRANSFORM, TDATA and QTDATA.
 
 use super::message::take;
 use dibs_build::glam::{DMat3, DQuat, DVec3};
 
-/// Bytes of a name, and of an element of TDATA and QTDATA behind it: type and a reserved byte come first.
+/// Size of a name, and of an element of TDATA and QTDATA after it, which starts with a type and a reserved byte.
 const NAME: usize = 20;
 const MATRIX: usize = 2 + 48;
 const QUATERNION: usize = 2 + 28;
 
-/// How far a rotation's numbers may be from those of a rotation, which sources round.
+/// Tolerance for the numbers of a rotation, which sources round.
 const OFF: f64 = 1e-3;
 
-/// Types of messages that have poses.
+/// Types of messages that contain poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Of the message's own device.
+    /// One pose, of the message's own device.
     Transform,
-    /// Of several instruments, by their names: matrices, or quaternions.
+    /// Poses of several instruments with names: matrices, or quaternions.
     Tracks,
     Quaternions,
 }
 
-/// A rotation, and the shift after it, in the source's unit and axes.
+/// A rotation, followed by a translation, in the source's unit and axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     pub rotation: DQuat,
     pub shift: DVec3,
 }
 
-/// Why a content has no pose.
+/// Why a content has no valid pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseError {
-    /// It is not as the protocol has it.
+    /// It violates the protocol.
     Layout,
-    /// Its numbers are no rotation's: it scales, mirrors or shears.
+    /// Its matrix or quaternion is not a rotation: it scales, mirrors or shears.
     NoRotation,
 }
 
@@ -47,12 +47,12 @@ impl Kind {
         }
     }
 
-    /// Whether the message's device has the pose, not an element of its content.
+    /// Whether the pose is that of the message's device, and not of an element of its content.
     pub const fn is_of_device(self) -> bool {
         matches!(self, Self::Transform)
     }
 
-    /// The pose of a device; `None` if the content has others alone.
+    /// The pose of a device; `None` if the content only has other devices' poses.
     pub fn read(self, content: &[u8], device: &str) -> Result<Option<Pose>, PoseError> {
         match self {
             Self::Transform if content.len() != 48 => Err(PoseError::Layout),
@@ -87,7 +87,7 @@ fn numbers<const N: usize>(mut bytes: &[u8]) -> Result<[f64; N], PoseError> {
     Ok(numbers)
 }
 
-/// Three columns, and the shift.
+/// From three columns of the rotation, then the translation.
 fn of_matrix(bytes: &[u8]) -> Result<Pose, PoseError> {
     let numbers: [f64; 12] = numbers(bytes)?;
     let [first, second, third, shift] =
@@ -97,12 +97,12 @@ fn of_matrix(bytes: &[u8]) -> Result<Pose, PoseError> {
         return Err(PoseError::NoRotation);
     }
     let rotation = DQuat::from_mat3(&matrix).normalize();
-    // False for what is not finite.
+    // False for numbers that are not finite.
     let is_one = DMat3::from_quat(rotation).abs_diff_eq(matrix, OFF);
     is_one.then_some(Pose { rotation, shift }).ok_or(PoseError::NoRotation)
 }
 
-/// The shift, and x, y, z and w.
+/// From the translation, then x, y, z and w.
 fn of_quaternion(bytes: &[u8]) -> Result<Pose, PoseError> {
     let [a, b, c, x, y, z, w] = numbers(bytes)?;
     let (shift, rotation) = (DVec3::new(a, b, c), DQuat::from_xyzw(x, y, z, w));
@@ -156,7 +156,7 @@ mod tests {
             numbers[at] = value;
             Kind::Transform.read(&bytes(&numbers), "")
         };
-        // A mirror, a scale, a shear, and numbers that are none.
+        // A reflection, a scaling, a shear, and numbers that are not finite.
         for (at, value) in
             [(8, -1.0), (8, 1.01), (0, 0.01), (1, f32::NAN), (4, f32::INFINITY), (9, f32::NAN)]
         {

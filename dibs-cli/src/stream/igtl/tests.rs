@@ -1,4 +1,4 @@
-//! No message puts a vertex where another one is. `DIBS_FRAMES` gives the number of messages.
+//! No message assigns a position to the wrong vertex. `DIBS_FRAMES` sets the number of messages.
 
 // Requirement: B-10
 
@@ -12,7 +12,7 @@ use dibs_build::{Builder, Mesh};
 use dibs_stream::SurfaceOrder;
 use fastrand::Rng;
 
-/// Messages between two topologies.
+/// Messages between two changes of the topology.
 const RUN: u64 = 50;
 
 fn order(mesh: &Mesh) -> SurfaceOrder {
@@ -20,8 +20,8 @@ fn order(mesh: &Mesh) -> SurfaceOrder {
     SurfaceOrder::of(&built.tree::<u16>().expect("a tree"))
 }
 
-/// Faces with their points in another order, turned and listed otherwise, some triangles in strips. Returns the polygons, the
-/// strips, and the point of each vertex.
+/// Faces with their points in random order, and randomly rotated and listed, some triangles in strips. Returns the
+/// polygons, the strips, and the point of each vertex.
 fn renumbered(
     faces: &[Vec<u32>],
     vertices: usize,
@@ -45,11 +45,11 @@ fn renumbered(
     (polygons, strips, point_of)
 }
 
-/// Another mesh of as many points.
+/// Another mesh with the same number of points.
 fn changed(triangles: &[[u32; 3]], vertices: usize, random: &mut Rng) -> Vec<Vec<u32>> {
     let mut changed = triangles.to_vec();
     match random.u8(..4) {
-        // Another diagonal of two triangles.
+        // The other diagonal of two triangles.
         0 => {
             let at = random.usize(..changed.len());
             let [a, b, c] = changed[at];
@@ -60,16 +60,16 @@ fn changed(triangles: &[[u32; 3]], vertices: usize, random: &mut Rng) -> Vec<Vec
             let far = far.expect("a third corner");
             (changed[at], changed[other]) = ([far, b, c], [a, far, c]);
         }
-        // A corner that is elsewhere.
+        // One corner replaced by a vertex elsewhere.
         1 => {
             let at = random.usize(..changed.len());
             let elsewhere =
                 (changed[at][0] + 1 + random.u32(..vertices as u32 - 1)) % vertices as u32;
             changed[at][0] = elsewhere;
         }
-        // All points in one polygon, which has the corners of every triangle.
+        // One polygon of all points, which contains the corners of every triangle.
         2 => return vec![(0..vertices as u32).collect()],
-        // One for another.
+        // One vertex in place of another.
         _ => {
             let (from, to) = (random.usize(..changed.len()), random.usize(1..changed.len()));
             changed[from] = changed[(from + to) % triangles.len()];
@@ -92,8 +92,8 @@ fn poly_data(positions: &[[f32; 3]], polygons: &[u32], strips: &[u32]) -> Vec<u8
     head.chain(positions).chain(words.iter().flat_map(|word| word.to_be_bytes())).collect()
 }
 
-/// Messages of one mesh, each of whose points says which vertex it is and in which message: with its points in the file's
-/// order and others, and of other meshes among them.
+/// Sends messages of one mesh, whose positions encode the vertex and the message, with points in the file's order and
+/// in others, and messages of other meshes among them.
 fn wrong_correspondences(mesh: &Mesh, messages: u64, seed: u64) -> (u64, u64) {
     let (order, vertices) = (order(mesh), mesh.positions.len());
     let triangles = order.triangles();
@@ -155,8 +155,8 @@ fn no_vertex_is_taken_for_another() {
     }
 }
 
-/// Where the triangles are symmetric they do not tell the points, and no guess is made. In the order of the mesh's file they
-/// need not.
+/// Where the triangles are symmetric they do not determine the points, and no guess is made. In the order of the mesh's
+/// file this does not matter.
 #[test]
 fn symmetric_meshes_are_not_guessed() {
     const CORNERS: [[u32; 3]; 8] =
@@ -180,16 +180,16 @@ fn symmetric_meshes_are_not_guessed() {
             .map_err(|why| why.contains("symmetric"))
     };
     assert_eq!([0, 1, 0, 1].map(&mut answer), [Ok(()), Err(true), Ok(()), Err(true)]);
-    // Two parts that are the same.
+    // Two equal parts.
     let one = [[0, 1, 2], [0, 2, 3], [0, 3, 4]];
     let two = [&one[..], &one.map(|corners| corners.map(|corner| corner + 5))].concat();
     assert_eq!(matched(&two, &two), Matched::Several);
-    // A strip that mirrors itself, told by its turn alone, which a source may turn.
+    // A strip that is its own mirror image: only the winding tells its sides apart, and a source may flip that.
     assert_eq!(matched(&one[..2], &[[4, 5, 6], [4, 6, 7]]), Matched::Several);
     assert!(matches!(matched(&one[..2], &one[..1]), Matched::None));
 }
 
-/// A quad has two triangles of the tree. A polygon of all points has room for half of them, and its mesh is refused.
+/// A quad covers two triangles of the tree. A polygon of all points has room for half of them, and its mesh is refused.
 #[test]
 fn faces_have_no_more_triangles_than_their_corners_make() {
     let mesh = heart(1000).expect("a size").mesh;
@@ -210,7 +210,7 @@ fn faces_have_no_more_triangles_than_their_corners_make() {
     assert!(order.check_faces(&quads).is_err(), "three corners, one of two triangles");
 }
 
-/// A source may send as many faces again as the tree has, and a thousand: every face beyond is memory for nothing.
+/// A source may send twice as many faces as the tree has, and a thousand more; beyond that no memory is used.
 #[test]
 fn there_is_a_most_of_faces() {
     let mesh = heart(1000).expect("a size").mesh;
@@ -238,7 +238,7 @@ fn there_is_a_most_of_faces() {
     }
 }
 
-/// Triangles that a builder turned are still those of the source.
+/// Triangles that a builder flipped still match those of the source.
 #[test]
 fn turned_triangles_are_the_same() {
     let mesh = heart(1000).expect("a size").mesh;

@@ -1,4 +1,4 @@
-//! Which vertex of the mesh each point of a POLYDATA is: by the triangles alone, once for each way to number them.
+//! Finds which vertex of the mesh each point of a POLYDATA is: by the triangles alone, once for each numbering.
 
 use super::content::Cells;
 use super::matching::{Matched, matched};
@@ -6,18 +6,18 @@ use dibs_stream::SurfaceOrder;
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, RandomState};
 
-/// Topologies whose refusal is remembered.
+/// Number of refused topologies that are remembered.
 const REFUSED: usize = 8;
 
-/// Faces that any source may send beside those of the tree's mesh.
+/// Faces that any source may send in addition to those of the tree's mesh.
 pub const FEW: usize = 1000;
 
-/// The points of the last topology, and those that were refused.
+/// The numbering of the last topology, and the refused topologies.
 pub struct Topology {
     order: SurfaceOrder,
     hasher: RandomState,
     known: Option<(Key, Numbering)>,
-    /// By a hash: what another one has in common with one of these is refused, too.
+    /// By hash: another topology with the same hash is refused as well.
     refused: VecDeque<(u64, String)>,
 }
 
@@ -26,11 +26,11 @@ pub struct Topology {
 pub enum Numbering {
     /// As the mesh's file does.
     Own,
-    /// The point of each vertex; a vertex that no triangle has may have none.
+    /// The point of each vertex; `None` is possible for a vertex that no triangle uses.
     Other(Vec<Option<u32>>),
 }
 
-/// A topology, of which no other one has the same key: a hash may.
+/// Identifies a topology exactly, which a hash does not.
 #[derive(PartialEq)]
 struct Key {
     points: usize,
@@ -49,20 +49,20 @@ impl Topology {
         Self { order, hasher: RandomState::new(), known: None, refused: VecDeque::new() }
     }
 
-    /// Forgets how the last source numbers its points.
+    /// Forgets the last source's numbering.
     pub fn forget(&mut self) {
         self.known = None;
     }
 
-    /// Whether the source numbers its points otherwise than the mesh's file.
+    /// Whether the source's numbering differs from that of the mesh's file.
     pub fn is_other(&self) -> bool {
         self.known.as_ref().is_some_and(|(_, numbering)| *numbering != Numbering::Own)
     }
 
-    /// The numbering of so many points that these cells join.
+    /// The numbering of this many points that these cells connect.
     ///
     /// # Errors
-    /// A sentence, where they are not the tree's mesh or may be it in several ways.
+    /// A sentence, if they are not the tree's mesh, or match it in several ways.
     pub fn numbering(&mut self, points: usize, cells: Cells<'_>) -> Result<&Numbering, String> {
         let is_known = self.known.as_ref().is_some_and(|(key, _)| key.is_of(points, cells));
         if !is_known {
@@ -137,14 +137,14 @@ impl Numbering {
             Self::Own => positions,
             Self::Other(point_of) => {
                 let at = |point: &Option<u32>| positions.get((*point)? as usize).copied();
-                // A vertex without a point is of no triangle, and is not sent.
+                // A vertex without a point is in no triangle, and is not sent.
                 point_of.iter().map(|point| at(point).unwrap_or_default()).collect()
             }
         }
     }
 }
 
-/// A polygon's triangles, without those that have a point twice.
+/// A polygon's triangles, without those with a repeated point.
 fn fan(face: &[u32]) -> impl Iterator<Item = [u32; 3]> {
     let (first, rest) = face.split_first().map_or((0, face), |(&first, rest)| (first, rest));
     let triangles =

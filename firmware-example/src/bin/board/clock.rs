@@ -15,15 +15,15 @@ const VALUE: Register = unsafe { Register::at(BASE + 4) };
 // SAFETY: as above.
 const RELOAD: Register = unsafe { Register::at(BASE + 8) };
 
-/// Starts the timer; before, `now` stands still.
+/// Starts the timer; until then `now` is constant.
 pub fn start() {
     RELOAD.write(u32::MAX);
     VALUE.write(u32::MAX);
     CONTROL.write(1);
 }
 
-/// Counts since `start`, wrapping after 171 s. Under QEMU with `-icount shift=1` the processor
-/// executes 20 instructions a count: the clock of every instruction figure.
+/// Counts since `start`, wrapping after 171 s. Under QEMU with `-icount shift=1` the processor executes 20 instructions
+/// a count: all figures in instructions are measured by this clock.
 pub fn now() -> u32 {
     !VALUE.read()
 }

@@ -3,8 +3,8 @@
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// A value that at most one context uses at a time. A second one is refused instead of waiting: a handler that waited
-/// for one of lower priority would wait for ever.
+/// A value that at most one context uses at a time. A second one is refused instead of waiting: a handler that waits
+/// for a handler of lower priority would wait for ever.
 pub struct Exclusive<T> {
     busy: AtomicBool,
     value: UnsafeCell<T>,

@@ -1,7 +1,7 @@
-//! The board's Ethernet controller, an SMSC LAN9118: frames go through its two FIFOs, polled.
+//! The board's Ethernet controller, an SMSC LAN9118: frames pass through its two FIFOs, which are polled.
 //!
-//! Its receive FIFO holds seven of the largest frames, so nothing is lost while the idle loop is busy with something
-//! else, and no interrupt is needed.
+//! Its receive FIFO holds seven of the largest frames, so nothing is lost while the idle loop is busy, and no interrupt
+//! is needed.
 
 use controller::network::MAX_FRAME;
 
@@ -18,15 +18,15 @@ const TRANSMIT_LEVEL: Register = at(0x80);
 const MAC_COMMAND: Register = at(0xA4);
 const MAC_DATA: Register = at(0xA8);
 
-/// The value of `BYTE_ORDER` where bytes arrive as they were sent.
+/// The value of `BYTE_ORDER` if bytes arrive as they were sent.
 const LITTLE_ENDIAN: u32 = 0x8765_4321;
 
-/// `HARDWARE_CONFIG`: the reset, which clears itself; frames leave when they are complete; 5 KiB for sending.
+/// `HARDWARE_CONFIG`: the reset, which clears itself; store and forward; 5 KiB of the memory for sending.
 const RESET: u32 = 1 << 0;
 const STORE_AND_FORWARD: u32 = 1 << 20;
 const TRANSMIT_FIFO: u32 = 5 << 16;
 
-/// `TRANSMIT_CONFIG`: sending, and statuses of sent frames may overrun: nobody reads them.
+/// `TRANSMIT_CONFIG`: sending; statuses of sent frames may overrun, because they are not read.
 const TRANSMIT_ON: u32 = 1 << 1;
 const STATUS_OVERRUN: u32 = 1 << 2;
 
@@ -41,18 +41,17 @@ const MAC_RECEIVE: u32 = 1 << 2;
 /// `RECEIVE_STATUS`: the frame is damaged, or not for this address.
 const DAMAGED: u32 = 1 << 15 | 1 << 30;
 
-/// First words of a frame to send: it is the first and the last part of itself.
+/// First words of a frame to send: it is the first and the last segment.
 const WHOLE: u32 = 1 << 13 | 1 << 12;
 
 /// Bytes of the Ethernet checksum.
 const CHECKSUM: usize = 4;
 
-/// Most reads of a register while the chip executes a command.
+/// Most reads of a register while waiting for the chip.
 const PATIENCE: u32 = 100_000;
 
-/// A register by its offset.
 const fn at(offset: usize) -> Register {
-    // SAFETY: called with the offsets of the LAN9118's registers only, at the board's place for it.
+    // SAFETY: called only with offsets of the LAN9118's registers, which are at this address on the board.
     unsafe { Register::at(0xA000_0000 + offset) }
 }
 
@@ -60,7 +59,7 @@ const fn at(offset: usize) -> Register {
 pub struct Lan9118(());
 
 impl Lan9118 {
-    /// Resets the chip and starts both directions; `None` if it is not there.
+    /// Resets the chip and starts both directions; `None` if there is no chip.
     pub fn start([a, b, c, d, e, f]: [u8; 6]) -> Option<Self> {
         if BYTE_ORDER.read() != LITTLE_ENDIAN {
             return None;
@@ -93,7 +92,7 @@ impl Lan9118 {
         frame.filter(|_| status & DAMAGED == 0).or(Some(&[]))
     }
 
-    /// Sends a frame, or drops it where the FIFO has no room.
+    /// Sends a frame, or drops it if the FIFO has no room.
     pub fn send(&mut self, frame: &[u8]) {
         let length = frame.len() as u32;
         if TRANSMIT_LEVEL.read() & 0xFFFF < length.next_multiple_of(4) + 8 {

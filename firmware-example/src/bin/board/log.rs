@@ -1,7 +1,7 @@
-//! defmt over semihosting, for start-up and the end only: one frame costs more than a tick.
+//! defmt over semihosting, only for start-up and the end: one frame takes longer than a tick.
 //!
-//! The crate `defmt-semihosting` panics when it is entered twice. This logger drops the nested
-//! frame instead, because the firmware links only without panic paths.
+//! The crate `defmt-semihosting` panics when it is entered twice. This logger drops the nested frame instead, because
+//! the firmware links only without panic paths.
 
 use cortex_m_semihosting::hio;
 
@@ -12,8 +12,8 @@ static ENCODER: Exclusive<defmt::Encoder> = Exclusive::new(defmt::Encoder::new()
 #[defmt::global_logger]
 struct Logger;
 
-// SAFETY: only the idle priority logs, so frames do not interleave; an interrupt that logged all
-// the same would find `ENCODER` busy and lose its bytes.
+// SAFETY: only the idle priority logs, so frames do not interleave; if an interrupt logged, it would find `ENCODER`
+// busy and lose its bytes.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
         ENCODER.with(|encoder| encoder.start_frame(emit));
@@ -31,7 +31,7 @@ unsafe impl defmt::Logger for Logger {
 }
 
 fn emit(bytes: &[u8]) {
-    // Without a debugger the log is lost and the robot continues.
+    // Without a debugger the log is lost; the robot continues.
     if let Ok(mut out) = hio::hstdout() {
         let _ = out.write_all(bytes);
     }

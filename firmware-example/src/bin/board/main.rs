@@ -1,9 +1,9 @@
 //! The board: MPS2-AN500, a Cortex-M7 that QEMU emulates as `mps2-an500`.
 //!
-//! Three priorities share the core. The control tick (`SysTick`, 1 kHz) is the highest: only its previous run delays
-//! it. Reception over a serial line (UART 0) is one below. The idle loop takes Ethernet frames where the bus is
-//! Ethernet, checks complete frames and the tree in flash a slice at a time, and sends statuses over the bus and
-//! telemetry over UART 1.
+//! Three priorities share the core. The control tick (`SysTick`, 1 kHz) has the highest: it is only delayed by its
+//! previous run. Reception over a serial line (UART 0) is one below. The idle loop polls Ethernet frames if the bus is
+//! Ethernet, checks complete frames and the tree in flash in slices, and sends statuses over the bus and telemetry over
+//! UART 1.
 #![no_std]
 #![no_main]
 
@@ -28,10 +28,9 @@ use heapless::spsc::{Consumer, Queue};
 use network::Network;
 use semihosting::Arguments;
 
-/// Records that wait for the line.
+/// Records that can wait for the telemetry line.
 const QUEUE: usize = 64;
 
-/// The records of a tick.
 type Records = (Tick, Option<Push>);
 
 static SURFACE: surface::Surface = surface::Surface::new();
@@ -73,7 +72,7 @@ fn main() -> ! {
     idle(consumer, NETWORK.as_mut(), arguments.ticks)
 }
 
-/// Sends records and takes frames until the run is over; with a run length of 0 for ever.
+/// Sends records and polls frames until the run is over; a run length of 0 means for ever.
 fn idle(
     mut records: Consumer<'static, Records>,
     mut network: Option<&'static mut Network>,
@@ -91,15 +90,15 @@ fn idle(
     core::hint::black_box([0; 4][core::hint::black_box(0_usize)]);
     loop {
         // `heapless` divides by the queue's length, which the compiler does not know to be positive: without this check
-        // a panic path would survive.
+        // a panic path would remain.
         let record = if records.capacity() < QUEUE { records.dequeue() } else { None };
         match record {
             Some(records) => send_records(&records, &mut line),
             None if ticks != 0 && schedule::ticks() >= ticks => break,
             None => (),
         }
-        // There is always work, so the loop does not sleep. To save power, `wfi` after a round of the tree's check; but an
-        // emulated processor that sleeps loses its exact time.
+        // There is always work, so the loop does not sleep. To save power, execute `wfi` after each round of the tree's
+        // check; but an emulated processor that sleeps loses its exact time.
         if let Some(network) = &mut network {
             network.poll();
         }
@@ -139,7 +138,7 @@ fn overflow(depth: u8) -> u8 {
     overflow(depth | 1).wrapping_add(below.iter().fold(0, |sum, byte| sum ^ byte))
 }
 
-/// A wide query, to show that it has no panic path either.
+/// A wide query, to prove that it has no panic path either.
 #[cfg(feature = "wide")]
 fn wide() -> Option<f32> {
     let tree = surface::TREE.validate().ok()?;
@@ -149,7 +148,7 @@ fn wide() -> Option<f32> {
     Some(query.closest_wide(&rows[..], &tool, &dibs_nostd::Options::new()).ok()?.separation)
 }
 
-/// A tick of a filter with rows of the caller, to show that it has no panic path either.
+/// A filter's tick with rows of the caller, to prove that it has no panic path either.
 #[cfg(feature = "filter")]
 fn filtered() -> Option<f32> {
     use core::hint::black_box;

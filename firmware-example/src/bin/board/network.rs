@@ -1,4 +1,4 @@
-//! The bus over Ethernet, polled by the idle loop: the control tick is above it, and interrupts it anywhere.
+//! The bus over Ethernet, polled by the idle loop: the control tick has higher priority, and may interrupt it anywhere.
 
 use controller::network::{
     Content, HARDWARE, MAX_FRAME, MAX_REPLY, Peer, announcement, read, seal,
@@ -8,20 +8,20 @@ use controller::telemetry;
 use crate::lan9118::Lan9118;
 use crate::schedule;
 
-/// Frames taken in one round of the idle loop.
+/// Most frames received in one iteration of the idle loop.
 const FRAMES: u32 = 4;
 
-/// The network, and its share of the run.
+/// The network, and its counters.
 pub struct Network {
     chip: Lan9118,
-    /// Sender of the last good packet: statuses go there, and not to whoever floods the port.
+    /// Sender of the last good packet: statuses are sent to it, and not to others that flood the port.
     peer: Option<Peer>,
     frame: [u8; MAX_FRAME],
     so_far: telemetry::Network,
 }
 
 impl Network {
-    /// Starts the chip; `None` if it is not there.
+    /// Starts the chip; `None` if there is no chip.
     pub fn start() -> Option<Self> {
         let so_far = telemetry::Network { kind: telemetry::Network::KIND, ..Default::default() };
         let mut chip = Lan9118::start(HARDWARE)?;
@@ -29,7 +29,7 @@ impl Network {
         Some(Self { chip, peer: None, frame: [0; MAX_FRAME], so_far })
     }
 
-    /// Takes a few frames at most: a flood slows the idle loop's other work down, and does not stop it.
+    /// Receives only a few frames: a flood slows the idle loop's other work down, but does not stop it.
     pub fn poll(&mut self) {
         for _ in 0..FRAMES {
             self.take();
@@ -62,7 +62,7 @@ impl Network {
         }
     }
 
-    /// Sends a status, once there is a sender.
+    /// Sends a status, if a sender is known.
     pub fn send(&mut self, status: &[u8]) {
         let start = schedule::own_time();
         let mut frame = [0; MAX_REPLY];
@@ -72,7 +72,7 @@ impl Network {
         self.so_far.driver_counts = self.so_far.driver_counts.wrapping_add(schedule::since(start));
     }
 
-    /// The network so far.
+    /// The counters so far.
     pub fn record(&self) -> &telemetry::Network {
         &self.so_far
     }

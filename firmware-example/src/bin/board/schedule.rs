@@ -1,4 +1,4 @@
-//! The interrupts, and the watch over the first one's deadline.
+//! The interrupts, and the monitoring of the control tick's deadline.
 
 // Requirement: P-03
 
@@ -26,7 +26,7 @@ static TIMELINE: Exclusive<Option<Timeline>> = Exclusive::new(None);
 static RECEIVER: Exclusive<Option<Receiver>> = Exclusive::new(None);
 /// Control ticks run so far.
 static TICKS: AtomicU32 = AtomicU32::new(0);
-/// Clock counts that they took.
+/// Clock counts of these ticks.
 static CONTROL_COUNTS: AtomicU32 = AtomicU32::new(0);
 /// Longest section with all interrupts disabled, in clock counts; the only one is at start-up.
 static MASKED: AtomicU32 = AtomicU32::new(0);
@@ -37,7 +37,7 @@ static BUS_MASKED: AtomicU32 = AtomicU32::new(0);
 struct Timeline {
     control: Control<Either>,
     records: Producer<'static, Records>,
-    /// When the running tick was due, on the clock; `None` before the first.
+    /// When the running tick was due, on the clock; `None` before the first tick.
     due: Option<u32>,
     deadline_misses: u32,
     latency: u32,
@@ -53,7 +53,7 @@ pub fn start(
     is_serial: bool,
 ) {
     clock::start();
-    // The one place where this program disables interrupts: inside `take`.
+    // The one place where this program disables all interrupts: inside `take`.
     let before = clock::now();
     let core = Peripherals::take();
     MASKED.store(clock::now().wrapping_sub(before), Ordering::Relaxed);
@@ -73,7 +73,7 @@ pub fn start(
     if is_serial {
         uart::BUS.start_receiving();
     }
-    // SAFETY: no critical section relies on priorities, and the handlers' state is in place.
+    // SAFETY: no critical section relies on priorities, and the handlers' state is initialised.
     unsafe {
         core.SCB.set_priority(SystemHandler::SysTick, CONTROL_PRIORITY);
         core.NVIC.set_priority(BusInterrupt, BUS_PRIORITY);
@@ -87,7 +87,7 @@ pub fn start(
 }
 
 /// Does a slice of work on complete frames. Returns the status to send, if one is due. It masks the bus interrupt: for
-/// some microseconds no byte is taken.
+/// some microseconds no byte is received.
 pub fn background(packet: &mut [u8; STATUS_MTU]) -> Option<&[u8]> {
     NVIC::mask(BusInterrupt);
     let before = own_time();
@@ -99,23 +99,23 @@ pub fn background(packet: &mut [u8; STATUS_MTU]) -> Option<&[u8]> {
     if let (Some(before), Some(after)) = (before, own_time()) {
         BUS_MASKED.fetch_max(after.wrapping_sub(before), Ordering::Relaxed);
     }
-    // SAFETY: the handler's state is in place and free again.
+    // SAFETY: the handler's state is initialised and not in use.
     unsafe { NVIC::unmask(BusInterrupt) };
     status.flatten()
 }
 
-/// Takes a packet that the idle loop found in a frame. Returns whether it was a good one.
+/// Receives a packet from the network, in the idle loop. Returns whether it was a good packet.
 pub fn take(packet: &[u8]) -> bool {
     let taken = RECEIVER.with(|receiver| Some(receiver.as_mut()?.packet(packet, now())));
     taken.flatten().unwrap_or(false)
 }
 
-/// Clock counts since a time, without the control ticks; 0 if a tick came during one of the two readings.
+/// Clock counts since a time, without the control ticks; 0 if a tick occurred during one of the two readings.
 pub fn since(start: Option<u32>) -> u32 {
     start.and_then(|start| Some(own_time()?.wrapping_sub(start))).unwrap_or(0)
 }
 
-/// The clock less the control ticks, which delay the bus anyway; `None` if a tick came during the reading.
+/// The clock minus the control ticks, which delay the bus anyway; `None` if a tick occurred during the reading.
 pub fn own_time() -> Option<u32> {
     let control = CONTROL_COUNTS.load(Ordering::Relaxed);
     let now = clock::now();
@@ -129,7 +129,7 @@ pub fn stop() {
     unsafe { (*SYST::PTR).csr.write(0) };
 }
 
-/// The time: that of the control ticks run so far.
+/// The receiver's clock: the number of control ticks so far.
 fn now() -> Millis {
     controller::time_of(Ticks(ticks().into()))
 }
@@ -139,7 +139,7 @@ pub fn ticks() -> u32 {
     TICKS.load(Ordering::Relaxed)
 }
 
-/// The run so far; after `stop`, all of it.
+/// The summary so far; after `stop`, of the whole run.
 pub fn summary(stack_bytes: u32) -> Summary {
     let mut summary = Summary {
         kind: Summary::KIND,
@@ -176,7 +176,7 @@ pub fn summary(stack_bytes: u32) -> Summary {
 #[exception]
 fn SysTick() {
     let now = clock::now();
-    // This tick's delay: counts since SysTick reached 0 and requested this interrupt.
+    // The latency of this tick: counts since SysTick reached 0 and requested this interrupt.
     let late = clock::TICK.wrapping_sub(SYST::get_current()) % clock::TICK;
     TIMELINE.with(|timeline| {
         if let Some(timeline) = timeline {
@@ -189,7 +189,7 @@ fn SysTick() {
 
 impl Timeline {
     fn run(&mut self, now: u32, late: u32) {
-        // Later due times follow from the first one, so that a tick that never ran is noticed.
+        // Later due times are computed from the first one, so that a tick that never ran is noticed.
         let due = match self.due {
             None => now.wrapping_sub(late),
             Some(before) => {
@@ -204,8 +204,8 @@ impl Timeline {
 
         let tick = self.control.tick(clock::now);
         let records = (tick, self.control.push());
-        // The check tells the optimiser that the queue's length, by which `heapless` divides, is positive; otherwise a
-        // panic path would survive.
+        // This check tells the optimiser that the queue's length, by which `heapless` divides, is positive; otherwise a
+        // panic path would remain.
         if self.records.capacity() >= QUEUE || self.records.enqueue(records).is_err() {
             self.dropped = self.dropped.saturating_add(1);
         }

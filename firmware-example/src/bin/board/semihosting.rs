@@ -1,5 +1,5 @@
-//! The debugger's services: the arguments of a run, and its end. Without a debugger a `bkpt` is a fault, so leave this
-//! module out on silicon.
+//! The debugger's services: a run's arguments and its end. Without a debugger a `bkpt` is a fault, so remove this
+//! module on real hardware.
 
 use cortex_m_semihosting::{debug, nr, syscall};
 
@@ -13,21 +13,21 @@ pub fn exit(success: bool) -> ! {
 
 /// The command line: `-semihosting-config ...,arg=board,arg=hand,arg=ethernet,arg=5000`.
 pub struct Arguments {
-    /// Ticks to run: the last word; 0, for ever, if that is not a number.
+    /// Ticks to run: the last word; 0 (for ever) if it is not a number.
     pub ticks: u32,
-    /// Whether the bus is Ethernet, by the word before; a serial line otherwise.
+    /// Whether the bus is Ethernet, by the word before the last; otherwise it is a serial line.
     pub is_ethernet: bool,
     /// Whether a simulated hand pushes the instrument, by the word before that.
     pub is_pushed: bool,
 }
 
 impl Arguments {
-    /// Asks the debugger.
+    /// Reads them from the debugger.
     pub fn read() -> Self {
         let mut line = [0_u8; 80];
         let place = [line.as_mut_ptr().expose_provenance(), line.len()];
-        // SAFETY: SYS_GET_CMDLINE takes the address and the size of a buffer, and writes a string that
-        // fits, ended by a zero.
+        // SAFETY: SYS_GET_CMDLINE takes the address and the size of a buffer, and writes a zero-terminated string that
+        // fits.
         if unsafe { syscall(nr::GET_CMDLINE, &place) } != 0 {
             return Self { ticks: 0, is_ethernet: false, is_pushed: false };
         }

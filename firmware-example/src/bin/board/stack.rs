@@ -18,7 +18,7 @@ pub fn high_water() -> u32 {
     let start = addr_of!(_stack_start);
     let words = (start.addr() - end.addr()) / size_of::<u32>();
     let untouched = (0..words)
-        // SAFETY: reads words of the stack's own memory, between the linker's two marks.
+        // SAFETY: reads words of the stack's own memory, between two symbols of the linker.
         .take_while(|&word| unsafe { end.add(word).read_volatile() } == STACK_PAINT_VALUE)
         .count();
     u32::try_from((words - untouched) * size_of::<u32>()).unwrap_or(u32::MAX)

@@ -9,10 +9,9 @@ const TRANSMIT_ENABLE: u32 = 1 << 0;
 const RECEIVE_ENABLE: u32 = 1 << 1;
 const RECEIVE_INTERRUPT_ENABLE: u32 = 1 << 3;
 const RECEIVE_INTERRUPT: u32 = 1 << 1;
-/// 25 MHz / 16, the fastest rate. An emulated UART ignores it.
+/// 25 MHz / 16, the highest rate. An emulated UART ignores it.
 const DIVISOR: u32 = 16;
 
-/// One of the board's UARTs.
 pub struct Uart {
     data: Register,
     state: Register,
@@ -51,12 +50,12 @@ impl Uart {
         self.control.write(TRANSMIT_ENABLE);
     }
 
-    /// Acknowledges the receive interrupt. Call it before `read`: the other order loses interrupts.
+    /// Acknowledges the receive interrupt. Call it before `read`: otherwise interrupts are lost.
     pub fn acknowledge(&self) {
         self.interrupt.write(RECEIVE_INTERRUPT);
     }
 
-    /// The byte that has arrived, if any.
+    /// The received byte, if any.
     pub fn read(&self) -> Option<u8> {
         if self.state.read() & RECEIVE_FULL == 0 {
             return None;
@@ -65,12 +64,12 @@ impl Uart {
         Some(byte)
     }
 
-    /// Whether a byte was ever lost because the one before was not read in time.
+    /// Whether a byte was ever lost because the previous one was not read in time.
     pub fn has_overrun(&self) -> bool {
         self.state.read() & RECEIVE_OVERRUN != 0
     }
 
-    /// Sends one byte, and waits until it has left: an emulator that ends would take a waiting byte along.
+    /// Sends one byte, and waits until it is sent: an emulator that ends would lose a waiting byte.
     pub fn write(&self, byte: u8) {
         self.data.write(u32::from(byte));
         while self.state.read() & TRANSMIT_FULL != 0 {}

@@ -13,7 +13,7 @@ unsafe impl cortex_m::interrupt::InterruptNumber for BusInterrupt {
     }
 }
 
-/// Follows the exceptions in the vector table; only interrupts listed here are ever enabled.
+/// Placed after the exceptions in the vector table; only interrupts listed here are ever enabled.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [unsafe extern "C" fn(); 1] = [bus_interrupt];

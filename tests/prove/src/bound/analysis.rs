@@ -1,4 +1,4 @@
-//! A program read for a proof: its graph, its debug information, and the facts found in it.
+//! A program prepared for a proof: its graph, its debug information, and the facts found in it.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -21,7 +21,7 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Of the function whose own name contains `root`, and all below it. `source` is the repository.
+    /// Analyses the function whose own name contains `root`, and all functions below it. `source` is the repository.
     pub fn new(elf: &Path, source: &Path, root: &str, facts: &Facts) -> Result<Self> {
         let bytes = fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
         let image = Image::read(&bytes)?;
@@ -43,7 +43,7 @@ impl Analysis {
     }
 }
 
-/// Places of the calls that are never made.
+/// Addresses of the calls that are never made.
 fn never(program: &Program, all: &[Never]) -> Result<BTreeSet<u32>> {
     let mut places = BTreeSet::new();
     let mut is_found = vec![false; all.len()];

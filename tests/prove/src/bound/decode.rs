@@ -1,37 +1,35 @@
-//! One instruction of ARMv7-M: its size, and where it leads. Encodings are those of the ARMv7-M Architecture Reference
-//! Manual, A5 and A7.
+//! Decodes one instruction of ARMv7-M: its size, and its successors. Encodings are those of the ARMv7-M Architecture
+//! Reference Manual, A5 and A7.
 
-/// Where an instruction leads.
+/// The successors of an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
-    /// To the one after it.
+    /// The next instruction.
     Next,
-    /// To another place, always.
+    /// Always another address.
     Jump(u32),
-    /// To another place, or to the one after it.
+    /// Another address, or the next instruction.
     Branch(u32),
-    /// To a function, and back to the one after it.
+    /// A function, and then the next instruction.
     Call(u32),
-    /// To the caller.
+    /// The caller.
     Return,
-    /// To one of the places in the table after it, whose entries have so many bytes.
+    /// One of the addresses in the jump table that follows, whose entries have this many bytes.
     Table(u32),
-    /// To a fault.
+    /// A fault.
     Trap,
-    /// To an address in a register or in memory, which cannot be followed.
+    /// An address in a register or in memory, which cannot be followed.
     Indirect,
-    /// To the one after it; so many after it depend on a condition.
+    /// The next instruction; this many instructions after it are conditional.
     Conditions(u32),
 }
 
-/// An instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instruction {
     pub bytes: u32,
     pub flow: Flow,
 }
 
-/// Reads the instruction at an address.
 pub fn decode(at: u32, first: u32, second: u32) -> Instruction {
     if first >> 11 >= 0b11101 {
         Instruction { bytes: 4, flow: wide(at, first, second) }
@@ -46,7 +44,7 @@ fn narrow(at: u32, first: u32) -> Flow {
         // B (T2), under a condition (T1), UDF.
         _ if first >> 11 == 0b11100 => Flow::Jump(after.wrapping_add(signed(first << 1, 12))),
         _ if first >> 8 == 0xDE => Flow::Trap,
-        // SVC: an exception, not a path of this program.
+        // SVC: an exception, which this program does not use.
         _ if first >> 8 == 0xDF => Flow::Indirect,
         _ if first >> 12 == 0b1101 => {
             Flow::Branch(after.wrapping_add(signed((first & 0xFF) << 1, 9)))
@@ -83,7 +81,7 @@ fn wide(at: u32, first: u32, second: u32) -> Flow {
     if first & 0xFFF0 == 0xE8D0 && second & 0xFFE0 == 0xF000 {
         return if first & 15 == 15 { Flow::Table(1 + (second >> 4 & 1)) } else { Flow::Indirect };
     }
-    // LDM with pc, LDR pc: from the stack it is a return.
+    // LDM with pc, LDR pc: from the stack they are returns.
     let is_load = first & 0xFFD0 == 0xE890 || first & 0xFFD0 == 0xE910;
     if is_load && second >> 15 == 1 || first & 0xFF70 == 0xF850 && second >> 12 == 15 {
         return if is_stack { Flow::Return } else { Flow::Indirect };
@@ -91,19 +89,19 @@ fn wide(at: u32, first: u32, second: u32) -> Flow {
     Flow::Next
 }
 
-/// Whether an instruction may write a register of the lower eight: where its code has that number in any field for one. Some
-/// that only read the register count too.
+/// Whether an instruction may write this register, one of the lower eight: true if any register field of its encoding
+/// has that number. This includes some instructions that only read it.
 pub fn may_write(register: u32, first: u32, second: u32) -> bool {
     let is_field = |half: u32, from: u32| half >> from & 15 == register;
     if first >> 11 < 0b11101 {
         let is_list = matches!(first >> 8, 0xBC | 0xBD) || first >> 12 == 0b1100;
-        // Constants, and addresses from pc or sp, have a number of eight bits where others have registers.
+        // Immediates, and addresses relative to pc or sp, have an 8-bit number in place of registers.
         let has_number = matches!(first >> 11, 0b00100..=0b00111 | 0b01001 | 0b10010..=0b10101);
         return first & 7 == register && !has_number
             || first >> 8 & 7 == register
             || is_list && first >> register & 1 == 1;
     }
-    // Arithmetic, loads and stores of floats have none but the base that a load or store moves.
+    // Arithmetic, loads and stores of floats write no such register except the base that a load or store updates.
     let is_float = first >> 8 == 0xEE && second & 16 == 0
         || first >> 9 == 0b111_0110 && first & 0xFFE0 != 0xEC40;
     if is_float && second >> 9 & 7 == 0b101 {
@@ -138,7 +136,7 @@ pub fn signed(value: u32, bits: u32) -> u32 {
     ((value << shift).cast_signed() >> shift).cast_unsigned()
 }
 
-/// Target of a branch that the linker put in because it is far, from flash to the TCM: MOVW ip, MOVT ip, BX ip.
+/// Target of a long branch that the linker inserted, from flash to the TCM: MOVW ip, MOVT ip, BX ip.
 pub fn long_branch(halves: [u32; 5]) -> Option<u32> {
     let [first, second, third, fourth, last] = halves;
     let half = |first: u32, second: u32| {

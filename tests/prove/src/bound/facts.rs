@@ -1,32 +1,32 @@
-//! The flow facts: what the search's code promises about the numbers of executions of its parts, each with its reason. All
-//! else is read from the program.
+//! The flow facts: bounds on how often parts of the search's code are executed, each with its reason. All other
+//! information is read from the program.
 //!
-//! A fact is an inequality. Its places are calls, which a compiler does not move or invent, headers of loops, and the branches
-//! of a line, in the innermost loop that has any of the line: parts of it that are the same at each turn are moved out, the
-//! branch on what is not stays. A place that is there no more is an error; that a fact is true of the program as it was compiled is
-//! checked by traces, where one executes what the fact limits: the page names the others.
+//! A fact is an inequality. It counts calls, which a compiler does not move or invent, loop headers, and the branches
+//! of a line in the innermost loop that contains any part of the line: loop-invariant parts are moved out, but the
+//! branch on a loop-variant value stays. A part that no longer exists is an error. Traces check that a fact holds in
+//! the compiled program, if they execute what it limits; the page names the others.
 
 // Requirement: A-06
 
 use super::lines::Within::{self, Function, Line};
 
-/// A number of executions.
+/// Something whose executions are counted.
 #[derive(Clone, Copy, Debug)]
 pub enum Count {
-    /// Of the first blocks in these frames, in the innermost loop that has such.
+    /// The first blocks in these frames, in the innermost loop that contains any.
     Passes(&'static [Within]),
-    /// Of calls, in these frames, of a function whose name has this in it.
+    /// Calls, in these frames, of a function whose name contains this.
     Calls(&'static [Within], &'static str),
-    /// Of the headers of loops in these frames: one each turn. Of loops within such a loop, the edges back: the compiler makes
-    /// a loop of its own of the turns that end early.
+    /// Headers of loops in these frames: one for each iteration. For loops within such a loop, the back edges: the
+    /// compiler makes a separate loop of the iterations that end early.
     Heads(&'static [Within]),
-    /// Of entries to these loops.
+    /// Entries to these loops.
     Entries(&'static [Within]),
-    /// Of bytes, by the constant length of each call of a function that copies.
+    /// Bytes copied, by the constant length of each call of a copying function.
     Bytes(&'static str),
 }
 
-/// The right side: so many, and so many for each of a query's counts.
+/// The right side of an inequality: a constant, plus so much for each of a query's counts.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Most {
     pub base: i64,
@@ -43,7 +43,7 @@ impl Most {
         Self { base, roots: 0, nodes: 0, triangles: 0 }
     }
 
-    /// The right side for a query of so many further roots, node tests and triangle tests.
+    /// The right side for a query with this many further roots, node tests and triangle tests.
     pub const fn of(&self, [roots, nodes, triangles]: [i64; 3]) -> i64 {
         self.base + self.roots * roots + self.nodes * nodes + self.triangles * triangles
     }
@@ -53,7 +53,6 @@ impl Most {
     }
 }
 
-/// A fact.
 pub struct Fact {
     pub name: &'static str,
     pub terms: &'static [(i64, Count)],
@@ -61,7 +60,7 @@ pub struct Fact {
     pub because: &'static str,
 }
 
-/// A call that is never made: a part of the end of the calling function's name, a part of the callee's, and the reason.
+/// A call that is never made: the end of the caller's name, a part of the callee's name, and the reason.
 pub type Never = (&'static str, &'static str, &'static str);
 
 /// The facts of a kind of query.
@@ -83,24 +82,24 @@ const NO_TIES: Never = (
     "without a side `tie_squared` is not a number, and no triangle is collected",
 );
 
-/// Of a plain query: unsigned.
+/// For a plain query: unsigned.
 pub const PLAIN: Facts = Facts { groups: &[ROWS], never: &[NO_SIDE, NO_TIES] };
 
 /// The same on a surface between two frames.
 pub const MOVING: Facts = Facts { groups: &[ROWS, KEPT], never: &[NO_SIDE, NO_TIES] };
 
-/// The same on a surface that nodes carry.
+/// The same on a surface that nodes move.
 pub const EMBEDDED: Facts = Facts { groups: &[ROWS, KEPT, NAMED], never: &[NO_SIDE, NO_TIES] };
 
 /// The same on a surface that [`MODES`] modes move.
 pub const MODAL: Facts =
     Facts { groups: &[ROWS, KEPT, NAMED, BLENDED], never: &[NO_SIDE, NO_TIES] };
 
-/// The same with a wrong one, which a trace must find.
+/// The same with a wrong fact, which a trace must refute.
 pub const WITHOUT_EDGES: Facts =
     Facts { groups: &[ROWS], never: &[NO_SIDE, NO_TIES, ("", "edge::edge_to_segment", "wrong")] };
 
-/// Functions that a program must call from these alone, because the facts about them are of those calls.
+/// Functions that a program must only call from these callers, because the facts about them are about those calls.
 pub const ONLY_FROM: &[(&str, &str)] = &[("mem::memcpy", "__aeabi_memcpy4")];
 
 const NODE: &str = "dibs-nostd/src/query/search/node.rs";
@@ -246,7 +245,7 @@ const BLENDED: &[Fact] = &[Fact {
     because: "one turn for each mode, and one where they end",
 }];
 
-/// Where a position takes more than a load, the compiler keeps this loop, which it unrolls for a table.
+/// If a position takes more than a load, the compiler keeps this loop, which it otherwise unrolls.
 const KEPT: &[Fact] = &[Fact {
     name: "triangles of a plane",
     terms: &[(1, Count::Heads(SCAN)), (-8, Count::Entries(SCAN))],
@@ -254,7 +253,7 @@ const KEPT: &[Fact] = &[Fact {
     because: "a leaf has at most eight triangles, of which the first is before the loop; one turn where they end",
 }];
 
-/// And this one, unless the position is short.
+/// The same holds for this loop, unless computing the position is short.
 const NAMED: &[Fact] = &[Fact {
     name: "corners that are not finite",
     terms: &[(1, Count::Heads(&[Function("not_finite")])), (-4, Count::Calls(&[], "not_finite"))],

@@ -1,4 +1,5 @@
-//! Queries on the emulated board, followed instruction by instruction: the graph and the facts against what happens.
+//! Follows queries on the emulated board instruction by instruction, and compares the graph and the facts with the
+//! execution.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,27 +14,27 @@ use super::walk::UNIT;
 use crate::probe::script::Script;
 use crate::probe::{Answers, traced};
 
-/// Node tests that an answer may have beyond those that were made.
+/// Node tests of an answer that are counted in addition to the executed ones.
 const ROOT: i64 = 1;
 
-/// What traces have shown.
+/// Results of the traces.
 #[derive(Default)]
 pub struct Traced {
     pub queries: usize,
     pub instructions: u64,
-    /// Facts that some query broke, with the number of such queries.
+    /// Facts that some query violated, with the number of such queries.
     pub broken: Vec<(&'static str, usize)>,
-    /// Facts that hold with equality in some query that executes what they limit: they can be no tighter.
+    /// Facts that hold with equality in some query that executes what they limit, so they cannot be tighter.
     pub tight: Vec<&'static str>,
-    /// Facts of which no query executed what they limit: no trace says whether they hold.
+    /// Facts for which no query executed what they limit: no trace shows whether they hold.
     pub untried: Vec<&'static str>,
-    /// Blocks that some query executed, of all that the bound is over.
+    /// Number of blocks that some query executed.
     pub reached: usize,
     pub blocks: usize,
 }
 
-/// Follows every instruction of some queries along the graphs of their kinds, and compares them with the facts. A path that is
-/// not in the graph is an error.
+/// Follows every instruction of some queries along the graphs of their kinds, and compares them with the facts. A path
+/// that is not in the graph is an error.
 pub fn trace(proven: &[Proven], probe: &Path, scripts: &[Script]) -> Result<Vec<Traced>> {
     let mut ranges = BTreeMap::new();
     for Analysis { program, image, .. } in proven.iter().map(|one| &one.analysis) {
@@ -54,23 +55,23 @@ pub fn trace(proven: &[Proven], probe: &Path, scripts: &[Script]) -> Result<Vec<
     Ok(followed.into_iter().map(Followed::end).collect())
 }
 
-/// What queries say of a fact.
+/// What queries have shown about a fact.
 #[derive(Clone, Copy, Default)]
 struct Seen {
-    /// Queries that broke it.
+    /// Queries that violated it.
     broken: usize,
-    /// Whether one executed what it limits.
+    /// Whether a query executed what it limits.
     is_tried: bool,
-    /// Whether such a one met it with equality.
+    /// Whether such a query reached equality.
     is_tight: bool,
 }
 
-/// A kind of query as it is followed.
+/// A kind of query that is followed.
 struct Followed<'a> {
     proven: &'a Proven,
     follower: Follower<'a>,
     found: Traced,
-    /// What the queries say of each fact.
+    /// What the queries have shown about each fact.
     state: Vec<Seen>,
 }
 
@@ -122,7 +123,7 @@ fn compare(proven: &Proven, run: &Run, counts: [i64; 3], state: &mut [Seen]) -> 
         seen.is_tried |= run.is_of(row);
         seen.is_tight |= left == right && run.is_of(row);
     }
-    // What a query counted is what it did: no place of these facts is missed, and none is doubled.
+    // A query's own counts must equal the executed parts of these facts: no part is missed, and none is counted twice.
     for (name, counted, spare) in
         [("node tests", counts[1], ROOT), ("triangle tests", counts[2], 0)]
     {
@@ -139,7 +140,7 @@ fn compare(proven: &Proven, run: &Run, counts: [i64; 3], state: &mut [Seen]) -> 
     Ok(())
 }
 
-/// Errors that are planted, and whether a trace finds each: a wrong fact, and a path that the graph does not have.
+/// Tests whether a trace finds each of two planted errors: a wrong fact, and a path that the graph does not contain.
 pub fn planted(kind: &'static Kind, probe: &Path) -> Result<[bool; 2]> {
     let scripts = to_trace(40)?;
     let scripts = scripts.get(..1).context("no script")?;

@@ -1,4 +1,4 @@
-//! The control flow graph of a function, and of all that it calls.
+//! The control flow graph of a function, and of all functions that it calls.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +7,7 @@ use anyhow::{Result, bail, ensure};
 use super::decode::{Flow, Instruction, decode, long_branch};
 use super::image::Image;
 
-/// Instructions that follow each other, of which only the last may branch or call.
+/// A basic block: consecutive instructions, of which only the last may branch or call.
 pub struct Block {
     /// Addresses of its instructions.
     pub instructions: Vec<u32>,
@@ -15,20 +15,19 @@ pub struct Block {
     pub call: Option<u32>,
     /// Whether the call depends on a condition of an IT block.
     pub is_call_conditional: bool,
-    /// Edges out of it.
+    /// Its outgoing edges.
     pub out: Vec<usize>,
 }
 
-/// A way out of a block.
+/// An outgoing edge of a block.
 pub struct Edge {
     pub from: usize,
-    /// A block, or the function's end.
+    /// The target block; `None` for the function's end.
     pub to: Option<usize>,
-    /// The function that a branch out of the function leads to.
+    /// The function that a tail branch leads to.
     pub tail: Option<u32>,
 }
 
-/// A function.
 pub struct Function {
     pub start: u32,
     pub name: String,
@@ -50,25 +49,26 @@ impl Function {
         self.calls().map(|(_, callee)| callee)
     }
 
-    /// The blocks from which control comes to a block, with the edges.
+    /// The predecessors of a block.
     pub fn into(&self, block: usize) -> impl Iterator<Item = usize> {
         let all = self.edges.iter().enumerate();
         all.filter(move |(_, edge)| edge.to == Some(block)).map(|(number, _)| number)
     }
 }
 
-/// An instruction, and where control may be after it.
+/// An instruction, and its possible successors.
 struct Step {
     instruction: Instruction,
     is_conditional: bool,
     next: Vec<u32>,
-    /// It may end the function.
+    /// Whether the function may end here.
     is_end: bool,
     call: Option<u32>,
     tail: Option<u32>,
 }
 
-/// Reads a function: the instructions that its entry leads to. Control never comes to a place in `never`.
+/// Builds a function's graph from the instructions that are reachable from its entry. No control flow reaches an
+/// address in `never`.
 pub fn function(image: &Image, start: u32, never: &BTreeSet<u32>) -> Result<Function> {
     let symbol = image.symbol(start)?;
     let name = symbol.name.clone();
@@ -126,7 +126,7 @@ fn steps(
     let mut steps: BTreeMap<u32, Step> = BTreeMap::new();
     let halves = [0, 2, 4, 6, 8].map(|offset| image.code(start + offset).unwrap_or_default());
     let far = long_branch(halves);
-    // Places to read, with the instructions there that depend on a condition.
+    // Addresses to decode, each with the number of conditional instructions from there on.
     let mut places = vec![(start, 0)];
     while let Some((at, conditional)) = places.pop() {
         if steps.contains_key(&at) {
@@ -181,13 +181,13 @@ fn steps(
     Ok(steps)
 }
 
-/// The places that a jump table leads to.
+/// The targets in a jump table.
 fn table(image: &Image, at: u32, bytes: u32, function: std::ops::Range<u32>) -> Result<Vec<u32>> {
     let count = (image.end_of_data(at - 1).max(image.end_of_data(at)) - at) / bytes;
     let mut places = Vec::new();
     for entry in image.bytes(at, count * bytes)?.chunks_exact(bytes as usize) {
         let offset = entry.iter().rev().fold(0, |sum, &byte| sum << 8 | u32::from(byte));
-        // A table of bytes is filled up to half a word.
+        // A table of bytes is padded to a half word.
         let target = at + 2 * offset;
         if offset > 0 {
             ensure!(function.contains(&target), "a table at {at:#x} leads to {target:#x}");
@@ -197,7 +197,7 @@ fn table(image: &Image, at: u32, bytes: u32, function: std::ops::Range<u32>) -> 
     Ok(places)
 }
 
-/// A function and all that it calls, by address.
+/// A function and all functions that it calls, by address.
 pub struct Program {
     pub root: u32,
     pub functions: BTreeMap<u32, Function>,
@@ -211,7 +211,7 @@ impl Program {
         self.functions.values().map(|function| function.blocks.len()).sum()
     }
 
-    /// Reads the functions below `root`. Control never comes to a place in `never`.
+    /// Builds the graphs of the functions below `root`. No control flow reaches an address in `never`.
     pub fn read(image: &Image, root: u32, never: &BTreeSet<u32>) -> Result<Self> {
         let mut program = Self { root, functions: BTreeMap::new(), order: Vec::new() };
         program.add(image, root, never, &mut Vec::new())?;

@@ -1,4 +1,4 @@
-//! The linked program: its functions by address, and the bytes that are code.
+//! The linked program: its functions by address, and which bytes are code.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -6,7 +6,6 @@ use std::ops::Range;
 use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 
-/// A function's symbol.
 pub struct Symbol {
     /// Demangled, without its hash.
     pub name: String,
@@ -16,13 +15,12 @@ pub struct Symbol {
 /// The code of a linked program.
 pub struct Image {
     sections: Vec<(u32, Vec<u8>)>,
-    /// Starts of code and of data, by the linker's mapping symbols.
+    /// Starts of code and of data, from the linker's mapping symbols.
     marks: BTreeMap<u32, bool>,
     symbols: BTreeMap<u32, Symbol>,
 }
 
 impl Image {
-    /// Reads an ELF file.
     pub fn read(bytes: &[u8]) -> Result<Self> {
         let file = object::File::parse(bytes)?;
         let mut sections = Vec::new();
@@ -30,7 +28,7 @@ impl Image {
         for section in file.sections().filter(|section| section.address() > 0) {
             sections.push((section.address() as u32, section.data()?.to_vec()));
         }
-        // Not all sections start above zero: the vector table is at the start of flash.
+        // Not every section starts above zero: the vector table is at the start of flash.
         for section in file.sections().filter(|section| section.address() == 0) {
             if section.kind() == object::SectionKind::Text {
                 sections.push((0, section.data()?.to_vec()));
@@ -54,7 +52,7 @@ impl Image {
         Ok(Self { sections, marks, symbols })
     }
 
-    /// One function, from zero on: for tests of what reads it.
+    /// A single function at address zero, for tests.
     pub fn of_halves(halves: &[u16]) -> Self {
         let code: Vec<u8> = halves.iter().flat_map(|half| half.to_le_bytes()).collect();
         let symbol = Symbol { name: "function".to_owned(), end: code.len() as u32 };
@@ -65,7 +63,7 @@ impl Image {
         }
     }
 
-    /// The same with bytes that are no code.
+    /// The same, where these bytes are data.
     pub fn with_data(mut self, bytes: Range<u32>) -> Self {
         self.marks.extend([(bytes.start, false), (bytes.end, true)]);
         self
@@ -81,12 +79,12 @@ impl Image {
         self.symbols.get(&at).with_context(|| format!("no function starts at {at:#x}"))
     }
 
-    /// Where code ends that begins at or before an address.
+    /// The end of the region of code or data that contains an address.
     pub fn end_of_data(&self, at: u32) -> u32 {
         self.marks.range(at + 1..).next().map_or(u32::MAX, |(&mark, _)| mark)
     }
 
-    /// Half a word of code.
+    /// A half word of code.
     pub fn code(&self, at: u32) -> Result<u32> {
         let is_code = self.marks.range(..=at).next_back().is_some_and(|(_, &is_code)| is_code);
         ensure!(is_code, "a path leads to {at:#x}, which is data");

@@ -1,4 +1,4 @@
-//! Places in the source, found in the program by its debug information.
+//! Finds places of the source in the program, by its debug information.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use addr2line::Loader;
 use anyhow::{Context, Result, anyhow, ensure};
 
-/// A function that an instruction belongs to, by itself or by inlining.
+/// A function that an instruction belongs to, directly or by inlining.
 pub struct Frame {
     /// With its generic arguments, without its path.
     pub name: String,
@@ -16,7 +16,6 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// For people.
     pub fn describe(&self) -> String {
         let file = self.file.rsplit('/').next().unwrap_or_default();
         format!("{} {file}:{}", self.bare(), self.line)
@@ -29,23 +28,23 @@ impl Frame {
     }
 }
 
-/// A frame that an instruction must have.
+/// A condition on one of an instruction's frames.
 #[derive(Clone, Copy, Debug)]
 pub enum Within {
-    /// Of a function of this name.
+    /// A function with this name.
     Function(&'static str),
-    /// At the one line of a file that has this text: a line that moves stays found, one that changes does not.
+    /// The only line of a file that contains this text: the line is still found if it moves, but not if it changes.
     Line(&'static str, &'static str),
 }
 
-/// The debug information of a program, and the source that it is of.
+/// The debug information of a program, and its source.
 pub struct Lines {
     frames: BTreeMap<u32, Vec<Frame>>,
     source: PathBuf,
 }
 
 impl Lines {
-    /// Of these instructions. The lines of the facts are those of the files below `source`.
+    /// Reads the information for these instructions. The lines of the facts are those of the files below `source`.
     pub fn read(program: &Path, source: &Path, places: impl Iterator<Item = u32>) -> Result<Self> {
         let loader = Loader::new(program).map_err(wrong)?;
         let mut frames = BTreeMap::new();
@@ -60,13 +59,13 @@ impl Lines {
         self.frames.get(&at).map(Vec::as_slice).unwrap_or_default()
     }
 
-    /// A place, for people.
+    /// A description of an address, for messages.
     pub fn describe(&self, at: u32) -> String {
         let frames: Vec<String> = self.of(at).iter().rev().map(Frame::describe).collect();
         format!("{at:#x}: {}", frames.join(" > "))
     }
 
-    /// A test whether an instruction has all these frames.
+    /// A predicate that tells whether an instruction has all these frames.
     pub fn all(&self, wanted: &[Within]) -> Result<impl Fn(u32) -> bool> {
         let wanted: Vec<_> = wanted.iter().map(|one| self.number(one)).collect::<Result<_>>()?;
         Ok(move |at: u32| {
@@ -96,7 +95,7 @@ impl Lines {
     }
 }
 
-/// The function, among some, whose own name contains a text.
+/// The only function of a set whose own name contains a text.
 pub fn function_named(
     program: &Path,
     text: &str,

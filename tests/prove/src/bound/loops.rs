@@ -1,4 +1,4 @@
-//! The loops of a function: natural ones, each with one entry that all its blocks have behind them.
+//! The natural loops of a function: each has one entry, which dominates its blocks.
 
 use std::collections::BTreeSet;
 
@@ -6,9 +6,8 @@ use anyhow::{Result, ensure};
 
 use super::graph::Function;
 
-/// A loop.
 pub struct Loop {
-    /// The block by which control enters.
+    /// The block through which control enters.
     pub header: usize,
     pub blocks: BTreeSet<usize>,
     /// Edges back to the header.
@@ -17,7 +16,7 @@ pub struct Loop {
     pub enter: Vec<usize>,
 }
 
-/// All loops. An irreducible one is an error.
+/// All loops. An irreducible loop is an error.
 pub fn loops(function: &Function) -> Result<Vec<Loop>> {
     let dominators = dominators(function);
     let mut found: Vec<Loop> = Vec::new();
@@ -44,7 +43,7 @@ pub fn loops(function: &Function) -> Result<Vec<Loop>> {
     Ok(found)
 }
 
-/// The blocks that every path to a block passes, itself included.
+/// The dominators of each block, including itself.
 pub fn dominators(function: &Function) -> Vec<BTreeSet<usize>> {
     let all: BTreeSet<usize> = (0..function.blocks.len()).collect();
     let mut found = vec![all; function.blocks.len()];
@@ -69,7 +68,7 @@ pub fn dominators(function: &Function) -> Vec<BTreeSet<usize>> {
     }
 }
 
-/// Whether the function without some edges has no cycle.
+/// Whether the function's graph without these edges has no cycle.
 fn is_acyclic(function: &Function, without: &BTreeSet<usize>) -> bool {
     let mut left: Vec<usize> = vec![0; function.blocks.len()];
     let kept = || function.edges.iter().enumerate().filter(|(n, _)| !without.contains(n));

@@ -1,9 +1,10 @@
 //! A path bound: the most instructions that a query of a linked program can take.
 //!
-//! The program is read from its ELF file ([`image`], [`decode`]), as a control flow graph ([`graph`]) with its loops ([`loops`]).
-//! Flow facts ([`facts`]) are found in it by the debug information ([`lines`], [`system`]). A linear program prices them
-//! ([`prices`]), and an exact search of the longest walk checks that the prices give a bound ([`walk`]). [`queries`]
-//! are those that have a bound; [`trace`] and [`follow`] compare graph and facts with what an emulated processor executes.
+//! The program is read from its ELF file ([`image`], [`decode`]) as a control flow graph ([`graph`]) with its loops
+//! ([`loops`]). Flow facts ([`facts`]) are located in it by the debug information ([`lines`], [`system`]). A linear
+//! program computes their prices (dual values, [`prices`]), and an exact search for the longest walk checks that the
+//! prices give a bound ([`walk`]). [`queries`] lists the kinds of queries with a bound; [`trace`] and [`follow`]
+//! compare graph and facts with the execution on an emulated processor.
 
 // Requirement: A-06
 

@@ -1,5 +1,5 @@
-//! The prices of the facts, by a linear program that gets only the walks that matter: each time the check finds a longer walk
-//! or a cycle that gains, it is added. The solver is not trusted: the last check is exact.
+//! The prices of the facts, by a linear program with lazily generated constraints: each time the check finds a longer
+//! walk, or a cycle with a gain, it is added. The solver is not trusted: the last check is exact.
 
 use anyhow::{Result, anyhow, bail};
 use microlp::{ComparisonOp, OptimizationDirection, Problem, SolveOutcome};
@@ -11,24 +11,25 @@ use super::walk::{Longest, UNIT, Walk, longest};
 
 /// Most rounds.
 const ROUNDS: usize = 2_000;
-/// Instructions that a cycle must lose, so that rounded prices keep it from gaining.
+/// Loss, in instructions, that each cycle must have, so that rounding the prices does not turn it into a gain.
 const LOSS: f64 = 0.01;
-/// Instructions by which the longest walk may exceed the solver's.
+/// Instructions by which the longest walk may exceed the solver's result.
 const NEAR: f64 = 0.5;
 
 /// A bound that was checked.
 pub struct Bound {
-    /// Of each fact, in parts of [`UNIT`].
+    /// The price of each fact, in units of 1 / [`UNIT`].
     pub prices: Vec<i128>,
-    /// The longest walk at these prices, and what it gains.
+    /// The longest walk at these prices, and its gain.
     pub walk: Walk,
     pub gain: i128,
-    /// Rounds that it took.
+    /// Number of iterations.
     pub rounds: usize,
 }
 
 impl Bound {
-    /// The constants: instructions of every query, of each further root, of each node test and of each triangle test, in parts of [`UNIT`].
+    /// The constants: instructions of every query, of each further root, of each node test and of each triangle test,
+    /// in units of 1 / [`UNIT`].
     pub fn constants(&self, system: &System) -> [i128; 4] {
         let mut sum = [self.gain, 0, 0, 0];
         for (row, price) in system.rows.iter().zip(&self.prices) {
@@ -40,8 +41,8 @@ impl Bound {
     }
 }
 
-/// Searches the prices with the least bound of a query of so much, and checks it. A loop that no fact bounds is an error,
-/// which describes its place.
+/// Finds the prices that minimise the bound for a query with these counts, and checks them. A loop that no fact bounds
+/// is an error, which describes its place.
 pub fn least(
     program: &Program,
     system: &System,

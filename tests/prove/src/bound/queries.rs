@@ -1,4 +1,4 @@
-//! The queries that have a bound, their bounds, and what the emulated board says of them.
+//! The kinds of queries that have a bound, their bounds, and measurements on the emulated board.
 
 use std::path::Path;
 
@@ -21,16 +21,15 @@ use crate::probe::{Answer, on_board};
 
 /// A kind of query.
 pub struct Kind {
-    /// For people.
     pub name: &'static str,
-    /// In the names of figures.
+    /// Its name in the names of figures.
     pub id: &'static str,
-    /// A part of its function's own name in the probe.
+    /// A part of the name of its function in the probe.
     root: &'static str,
     pub is_capsule: bool,
     pub table: Table,
     pub facts: &'static Facts,
-    /// The typical constants.
+    /// The fitted constants for typical queries.
     pub fitted: Option<Cost>,
 }
 
@@ -118,7 +117,7 @@ pub const KINDS: [Kind; 8] = [
     },
 ];
 
-/// The query whose bound is to be the least: a budget of the firmware, of which a tenth goes to triangles.
+/// The query for which the bound is minimised: a budget of the firmware, of which a tenth is spent on triangles.
 const TYPICAL: Most = Most { base: 1, roots: 1, nodes: 1_200, triangles: 30 };
 
 /// A proven bound.
@@ -126,12 +125,12 @@ pub struct Proven {
     pub kind: &'static Kind,
     pub analysis: Analysis,
     pub bound: Bound,
-    /// Instructions of every query, of each further root, of each node test, of each triangle test: in parts of [`UNIT`].
+    /// Instructions of every query, each further root, each node test and each triangle test, in units of 1 / [`UNIT`].
     constants: [i128; 4],
 }
 
 impl Proven {
-    /// Of one kind, in the linked probe.
+    /// The bound for one kind, in the linked probe.
     pub fn new(kind: &'static Kind, probe: &Path, facts: &Facts) -> Result<Self> {
         let analysis = Analysis::new(probe, &workspace::root(), kind.root, facts)
             .with_context(|| format!("the query of a {}", kind.name))?;
@@ -147,7 +146,7 @@ impl Proven {
         self.constants.map(|constant| (constant + UNIT - 1).div_euclid(UNIT) as u32)
     }
 
-    /// Base, node test and triangle test, each divided by the typical one.
+    /// Base, node test and triangle test, each divided by the fitted constant.
     pub fn ratios(&self) -> Option<[f64; 3]> {
         let Cost { base, node_test, triangle_test } = self.kind.fitted?;
         let [own_base, _, own_node, own_triangle] = self.whole();
@@ -155,7 +154,7 @@ impl Proven {
         Some(pairs.map(|(own, typical)| f64::from(own) / f64::from(typical)))
     }
 
-    /// The bound on a query of so many further roots and tests, exactly, in parts of [`UNIT`].
+    /// The exact bound for a query with this many further roots and tests, in units of 1 / [`UNIT`].
     pub fn at(&self, counts: [i64; 3]) -> i128 {
         let [base, each @ ..] = self.constants;
         base + each
@@ -165,7 +164,7 @@ impl Proven {
             .sum::<i128>()
     }
 
-    /// The instructions that another decoder reads alike.
+    /// Number of instructions that another decoder decodes identically.
     pub fn decoded(&self, probe: &Path) -> Result<usize> {
         second::agree(&self.analysis, probe)
     }
@@ -181,8 +180,8 @@ pub fn counts(answer: &Answer<'_>) -> [i64; 3] {
     [roots, nodes, triangles].map(i64::from)
 }
 
-/// Queries whose instructions are counted: on surfaces that the typical constants have not seen, and on three surfaces at once;
-/// whole ones and such as are cut short, warm and cold.
+/// Queries whose instructions are counted: on surfaces that the constants were not fitted to, and on three surfaces in
+/// one tree; complete and cut short, warm and cold.
 fn counted(queries: usize) -> Result<Vec<Script>> {
     let one = unseen()?;
     let draws = [(Draw::Exhausting, 51), (Draw::Any, 52), (Draw::Short, 53)];
@@ -193,7 +192,6 @@ fn counted(queries: usize) -> Result<Vec<Script>> {
     Ok(scripts)
 }
 
-/// Queries that are traced.
 pub fn to_trace(queries: usize) -> Result<Vec<Script>> {
     let one = [
         Subject::new("heart", generate::heart(1_280)?.mesh, 8),
@@ -221,8 +219,8 @@ fn several(queries: usize, seed: u64) -> Script {
     Script::about_all(&subjects, true, queries, Draw::Any, seed)
 }
 
-/// Queries of a heart that modes, nodes and frames move, and of three hearts, whole and cut short, warm and cold. A third of
-/// those of modes have no memory of positions.
+/// Queries of a heart that modes, nodes and frames move, and of three hearts, complete and cut short, warm and cold. A
+/// third of those with modes have no cache of positions.
 fn moved(queries: usize, seed: u64) -> Result<Vec<Script>> {
     let of_frame = (queries / 32).max(2);
     let waves = MODES.div_ceil(2);
@@ -238,7 +236,7 @@ fn moved(queries: usize, seed: u64) -> Result<Vec<Script>> {
     Ok(scripts)
 }
 
-/// So many of a surface beside each other, in the same motion.
+/// Several copies of a surface beside each other, with the same motion.
 fn beside((mesh, motion): &(Mesh, Motion), count: u32) -> (Mesh, Motion) {
     let (mut all, mut moved) = (Mesh::default(), motion.clone());
     moved.frames.iter_mut().for_each(Vec::clear);
@@ -254,13 +252,13 @@ fn beside((mesh, motion): &(Mesh, Motion), count: u32) -> (Mesh, Motion) {
     (all, moved)
 }
 
-/// Queries on the board, counted.
+/// Results of counted queries.
 #[derive(Default)]
 pub struct Counted {
     pub queries: usize,
-    /// Above their bound.
+    /// Number of queries above their bound.
     pub above: usize,
-    /// The largest part of its bound that a query took.
+    /// The largest fraction of its bound that a query took.
     pub share: f64,
     pub mean_share: f64,
 }

@@ -27,22 +27,22 @@ pub struct Options {
     traces: usize,
 }
 
-/// A bound, and what the board says of it.
+/// A bound, and its measurements on the board.
 pub struct Row {
     pub proven: Proven,
     pub counted: Counted,
     pub traced: Traced,
-    /// Instructions that another decoder reads alike.
+    /// Instructions that another decoder decodes identically.
     pub decoded: usize,
 }
 
-/// The result of a whole run.
+/// The result of a complete run.
 pub struct Findings {
     pub rows: Vec<Row>,
-    /// Errors that were planted, and of them not found.
+    /// Number of planted errors, and of those that were not found.
     pub planted: usize,
     pub unnoticed: usize,
-    /// Seconds that the proof itself took.
+    /// Time of the proof itself, in seconds.
     pub seconds: f64,
 }
 
@@ -78,7 +78,7 @@ pub fn run(options: &Options) -> Result<()> {
     ensure!(broken.is_empty(), "facts that queries broke: {broken:?}");
     ensure!(findings.unnoticed == 0, "{} planted errors were not found", findings.unnoticed);
     if !run.is_whole() {
-        // Evidence is of a commit.
+        // Evidence must belong to a commit.
         println!("{page}\nbound.md is left as it is: commit the changes first");
         return Ok(());
     }
@@ -88,7 +88,7 @@ pub fn run(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// The facts that no trace tries, in a sentence.
+/// A sentence about the facts that no trace tests.
 fn untried(rows: &[Row]) -> String {
     let all = rows.iter().filter(|row| !row.traced.untried.is_empty());
     let all = all.map(|Row { proven, traced, .. }| {

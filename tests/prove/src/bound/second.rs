@@ -1,4 +1,4 @@
-//! A second decoder, of another house: GNU's `objdump` must read each instruction of the graph as ours does.
+//! An independent decoder: GNU's `objdump` must decode each instruction of the graph as ours does.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 const CONDITIONS: [&str; 14] =
     ["eq", "ne", "cs", "cc", "mi", "pl", "vs", "vc", "hi", "ls", "ge", "lt", "gt", "le"];
 
-/// Compares the instructions of a graph with the other decoder's. Returns their number.
+/// Compares the instructions of a graph with those of the other decoder. Returns their number.
 pub fn agree(analysis: &Analysis, elf: &Path) -> Result<usize> {
     let version = || quiet(Command::new(PROGRAM).arg("--version"), PATIENCE);
     version().or_else(|_| apt::install(&[PACKAGE]).and_then(|()| version()))?;
@@ -37,7 +37,7 @@ pub fn agree(analysis: &Analysis, elf: &Path) -> Result<usize> {
             "{at:#x} is `{theirs}` for {PROGRAM}, and {:?} here",
             ours.flow
         );
-        // No instruction within another.
+        // No instruction may start within another.
         let inside = read.range(at + 1..at + ours.bytes).next();
         ensure!(inside.is_none(), "{at:#x} is shorter for {PROGRAM}");
         count += 1;
@@ -45,13 +45,13 @@ pub fn agree(analysis: &Analysis, elf: &Path) -> Result<usize> {
     Ok(count)
 }
 
-/// `   691a8:\tsubs\tr2, #16`
+/// Parses a line such as `   691a8:\tsubs\tr2, #16`.
 fn line(text: &str) -> Option<(u32, &str)> {
     let (at, rest) = text.split_once(":\t")?;
     Some((u32::from_str_radix(at.trim(), 16).ok()?, rest))
 }
 
-/// A branch that depends on the condition of an IT block has the code of one that does not.
+/// A conditional branch of an IT block has the encoding of an unconditional one.
 fn is_same(ours: Flow, theirs: Flow) -> bool {
     let ours = if let (Flow::Jump(to), Flow::Branch(_)) = (ours, theirs) {
         Flow::Branch(to)

@@ -1,4 +1,4 @@
-//! Flow facts as inequalities between numbers of executions.
+//! Flow facts as inequalities between execution counts.
 
 use std::collections::BTreeMap;
 
@@ -11,21 +11,21 @@ use super::image::Image;
 use super::lines::{Lines, Within};
 use super::loops::{Loop, dominators, loops};
 
-/// A part of the program, whose executions count.
+/// A part of the program whose executions are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Part {
     Block(u32, usize),
     Edge(u32, usize),
 }
 
-/// A fact: the sum of executions, each times its coefficient, is at most so much.
+/// A fact: a weighted sum of execution counts has an upper bound.
 pub struct Row {
     pub name: &'static str,
     pub coefficients: BTreeMap<Part, i64>,
     pub most: Most,
 }
 
-/// The facts of a program, by the parts that they count.
+/// The facts of a program, indexed by the parts that they count.
 #[derive(Default)]
 pub struct System {
     pub rows: Vec<Row>,
@@ -33,7 +33,7 @@ pub struct System {
 }
 
 impl System {
-    /// Finds the places of the facts. A fact that no place matches is an error.
+    /// Locates the facts. A fact without a matching part is an error.
     pub fn new<'a>(
         program: &Program,
         image: &Image,
@@ -64,20 +64,20 @@ impl System {
         self.rows.push(row);
     }
 
-    /// Takes away what a fact allows for each other execution: a wrong fact, to be found.
+    /// Lowers a fact's right side to a wrong one, which a trace must refute.
     pub fn narrow(&mut self, name: &str) {
         for row in self.rows.iter_mut().filter(|row| row.name == name) {
             row.coefficients.retain(|_, times| *times > 0);
         }
     }
 
-    /// The facts that count a part, with its coefficient.
+    /// The facts that count a part, each with its coefficient.
     pub fn of(&self, part: Part) -> &[(usize, i64)] {
         self.of_part.get(&part).map(Vec::as_slice).unwrap_or_default()
     }
 }
 
-/// Finds the parts that a fact counts.
+/// Locates the parts that a fact counts.
 pub struct Finder<'a> {
     program: &'a Program,
     image: &'a Image,
@@ -91,7 +91,7 @@ impl<'a> Finder<'a> {
         Ok(Self { program, image, lines, loops: all.collect::<Result<_>>()? })
     }
 
-    /// The parts, each with the number that one execution counts.
+    /// The parts, each with the count of one execution.
     fn parts(&self, count: &Count) -> Result<Vec<(Part, i64)>> {
         let found = match count {
             Count::Passes(within) => each(self.blocks(within)?),
@@ -99,7 +99,7 @@ impl<'a> Finder<'a> {
             Count::Heads(within) => {
                 let [outer, inner] = self.heads(within)?;
                 let heads = outer.into_iter().map(|(at, own)| Part::Block(at, own.header));
-                // Turns that the compiler made a loop of their own come besides.
+                // Iterations that the compiler made a separate loop are counted in addition.
                 let back = inner
                     .iter()
                     .flat_map(|(at, own)| own.back.iter().map(|&edge| Part::Edge(*at, edge)));
@@ -120,8 +120,8 @@ impl<'a> Finder<'a> {
         Ok(found)
     }
 
-    /// Blocks with an instruction in these frames, in the innermost loop that has such, that no other of them in the same
-    /// loop is always before.
+    /// Blocks with an instruction in these frames, in the innermost loop that contains any; blocks that another one of
+    /// the same loop dominates are left out.
     fn blocks(&self, within: &[Within]) -> Result<Vec<Part>> {
         let is_there = self.lines.all(within)?;
         let mut found = Vec::new();
@@ -148,7 +148,7 @@ impl<'a> Finder<'a> {
         Ok(found)
     }
 
-    /// Blocks that end in a call, in these frames, of a function whose name has this in it.
+    /// Blocks that end in a call, in these frames, of a function whose name contains this.
     pub fn calls(&self, within: &[Within], callee: &str) -> Result<Vec<Part>> {
         let is_there = self.lines.all(within)?;
         let is_it =
@@ -171,7 +171,7 @@ impl<'a> Finder<'a> {
         Ok(found)
     }
 
-    /// The loops whose header has an instruction in these frames: those that are within no other of them, and the others.
+    /// The loops whose header has an instruction in these frames: the outermost ones, and the others.
     fn heads(&self, within: &[Within]) -> Result<[Vec<(u32, &Loop)>; 2]> {
         let is_there = self.lines.all(within)?;
         let mut found = [Vec::new(), Vec::new()];
@@ -199,14 +199,14 @@ impl<'a> Finder<'a> {
     }
 }
 
-/// The constant in r2 at the end of these instructions, which end in a call.
+/// The constant in r2 after these instructions, which end in a call.
 ///
 /// # Errors
-/// If it is none that they load.
+/// If they do not load a constant.
 pub fn length(image: &Image, instructions: &[u32]) -> Result<i64> {
     let last = instructions.last().copied().unwrap_or_default();
     for (number, &place) in instructions.iter().enumerate().rev() {
-        // Under a condition a length may or may not be loaded.
+        // In an IT block the length may or may not be loaded.
         if is_under_it(image, &instructions[..number])? {
             break;
         }
@@ -214,12 +214,12 @@ pub fn length(image: &Image, instructions: &[u32]) -> Result<i64> {
         let is_wide = first >> 11 >= 0b11101;
         let second = if is_wide { image.code(place + 2)? } else { 0 };
         let byte = i64::from(second & 0xFF);
-        // MOVS r2, and MOV.W r2 of a byte, and MOVW r2.
+        // MOVS r2; MOV.W r2 with a byte; MOVW r2.
         match (first, second >> 8) {
             _ if first >> 8 == 0x22 => return Ok(i64::from(first & 0xFF)),
             (0xF04F, 2) => return Ok(byte),
             (0xF240, high) if high & 15 == 2 => return Ok(byte | i64::from(high >> 4 & 7) << 8),
-            // The call itself has no register.
+            // The call itself writes no register.
             _ if place != last && may_write(2, first, second) => break,
             _ => {}
         }
@@ -228,7 +228,7 @@ pub fn length(image: &Image, instructions: &[u32]) -> Result<i64> {
     anyhow::bail!("the length that is copied at {start:#x} is no constant")
 }
 
-/// Whether what follows these instructions is under IT, which one to four have behind it.
+/// Whether the instruction after these is in an IT block, which contains one to four instructions.
 fn is_under_it(image: &Image, before: &[u32]) -> Result<bool> {
     for (behind, &place) in (1..=4).zip(before.iter().rev()) {
         let code = image.code(place)?;

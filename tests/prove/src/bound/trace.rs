@@ -1,4 +1,4 @@
-//! What an emulated processor executes, against the graph and the facts.
+//! Compares the execution on an emulated processor with the graph and the facts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -9,7 +9,7 @@ use anyhow::Result;
 use super::graph::Program;
 use super::system::{Part, Row};
 
-/// An instruction to which no path of the graph leads.
+/// An executed instruction that no path of the graph leads to.
 #[derive(Debug)]
 pub struct OffGraph(String);
 
@@ -25,7 +25,7 @@ fn on_graph(is_on: bool, text: impl FnOnce() -> String) -> Result<(), OffGraph> 
     if is_on { Ok(()) } else { Err(OffGraph(text())) }
 }
 
-/// One run of the root.
+/// One run of the root function.
 #[derive(Default)]
 pub struct Run {
     pub instructions: u64,
@@ -39,7 +39,7 @@ impl Run {
         limited.any(|(part, _)| self.counts.contains_key(part))
     }
 
-    /// What the left side of a fact is in this run.
+    /// The left side of a fact in this run.
     pub fn left(&self, row: &Row) -> i64 {
         let terms = row.coefficients.iter();
         terms.map(|(part, times)| times * self.counts.get(part).copied().unwrap_or_default()).sum()
@@ -50,9 +50,9 @@ impl Run {
 struct Level {
     function: u32,
     block: usize,
-    /// Instructions of the block that were executed.
+    /// Number of executed instructions of the present block.
     done: usize,
-    /// The call at the block's end was made.
+    /// Whether the call at the block's end was made.
     has_called: bool,
 }
 
@@ -79,7 +79,7 @@ impl<'a> Follower<'a> {
         Self { program, levels, run: Run::default(), runs, reached: BTreeSet::new() }
     }
 
-    /// The runs since the last call, the last of which has ended too.
+    /// Ends the present run, and takes all runs since the last call.
     pub fn runs(&mut self) -> Vec<Run> {
         if !self.levels.is_empty() {
             self.levels.clear();
@@ -93,7 +93,7 @@ impl<'a> Follower<'a> {
         self.reached.iter().filter(|part| matches!(part, Part::Block(..))).count()
     }
 
-    /// The next executed instruction. One that no path of the graph leads to is an error.
+    /// Processes the next executed instruction. It is an error if no path of the graph leads to it.
     pub fn step(&mut self, at: u32) -> Result<()> {
         loop {
             let Some(level) = self.levels.last_mut() else {

@@ -1,9 +1,9 @@
-//! The longest walk through a program whose facts have a price, in whole numbers: the check of a bound.
+//! The longest walk through a program whose facts have prices, in integers: it proves a bound.
 //!
-//! Each execution of a part pays the prices of the facts that count it, and earns its instructions. Where no cycle gains, no
-//! walk gains more than the longest one without a cycle, `W`. So any run of the program takes at most `W` and the sum of the
-//! facts' prices, each times its right side: a bound, whoever chose the prices. (In the words of linear programming the prices
-//! are a solution of the dual, and this walk proves that it is one.)
+//! Each execution of a part gains its instructions and pays the prices of the facts that count it. If no cycle has a
+//! gain, no walk gains more than the longest walk without a cycle, `W`. So any run of the program takes at most `W`
+//! plus the sum over the facts of price times right side: this is a bound, however the prices were chosen. (In terms of
+//! linear programming the prices are a dual solution, and this walk proves that it is feasible.)
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,18 +12,18 @@ use anyhow::{Result, ensure};
 use super::graph::{Function, Program};
 use super::system::{Part, System};
 
-/// Parts of an instruction that the numbers below count.
+/// Fixed-point unit: the numbers below count fractions 1 / UNIT of an instruction.
 pub const UNIT: i128 = 1 << 20;
 
-/// What a walk earns and pays.
+/// Instructions and facts along a walk.
 #[derive(Clone, Default, Debug)]
 pub struct Walk {
     pub instructions: i64,
-    /// Of each fact, how often it is counted.
+    /// How often each fact is counted.
     pub counts: BTreeMap<usize, i64>,
     /// Instructions of each function.
     pub of: BTreeMap<u32, i64>,
-    /// A block on it, for messages.
+    /// A block on the walk, for messages.
     pub through: u32,
 }
 
@@ -44,28 +44,26 @@ impl Walk {
         }
     }
 
-    /// What is gained at these prices.
     fn gain(&self, prices: &[i128]) -> i128 {
         let paid = self.counts.iter().map(|(&fact, &count)| prices[fact] * i128::from(count));
         i128::from(self.instructions) * UNIT - paid.sum::<i128>()
     }
 }
 
-/// The longest walk, or cycles that gain.
+/// The longest walk, or cycles with a gain.
 pub enum Longest {
-    /// The walk, and what it gains.
     Walk(Walk, i128),
     Cycles(Vec<Walk>),
 }
 
-/// Searches the longest walk from the root's entry to its end.
+/// Finds the longest walk from the root's entry to its end.
 pub fn longest(program: &Program, system: &System, prices: &[i128]) -> Result<Longest> {
     ensure!(prices.iter().all(|&price| price >= 0), "a price below zero");
     let mut known: BTreeMap<u32, Option<(Walk, i128)>> = BTreeMap::new();
     let mut cycles = Vec::new();
     for at in &program.order {
         let function = &program.functions[at];
-        // A walk through a function is not known while a cycle in it gains.
+        // The longest walk through a callee is unknown as long as a cycle in it has a gain.
         if function.callees().any(|callee| known.get(&callee).is_none_or(Option::is_none)) {
             known.insert(*at, None);
             continue;
@@ -88,7 +86,7 @@ struct Search<'a> {
     function: &'a Function,
     system: &'a System,
     callees: &'a BTreeMap<u32, &'a (Walk, i128)>,
-    /// Of each edge: the gain of its block, the call at the block's end, and the edge itself.
+    /// For each edge: the gain of its block, of the call at the block's end, and of the edge itself.
     gains: Vec<i128>,
 }
 
@@ -105,7 +103,7 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// What the edge and the block before it earn and pay.
+    /// The instructions and facts of the edge and the block before it.
     fn walk(&self, number: usize) -> Walk {
         let edge = &self.function.edges[number];
         let block = &self.function.blocks[edge.from];
@@ -126,7 +124,7 @@ impl<'a> Search<'a> {
         walk
     }
 
-    /// The longest walk through the function, or the cycles that gain.
+    /// The longest walk through the function, or the cycles with a gain.
     fn run(&self) -> Result<Result<(Walk, i128), Vec<Walk>>> {
         let function = self.function;
         let mut best: Vec<Option<i128>> = vec![None; function.blocks.len()];
@@ -169,7 +167,7 @@ impl<'a> Search<'a> {
         Ok(Ok((walk, gain)))
     }
 
-    /// Cycles of the edges by which each block is best reached: each of them gains.
+    /// Cycles among the best incoming edges of the blocks: each of them has a gain.
     fn cycles(&self, by: &[Option<usize>]) -> Vec<Walk> {
         let mut seen = BTreeSet::new();
         let mut found = Vec::new();
@@ -194,7 +192,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The blocks, each after most of those that lead to it.
+/// The blocks, each after most of its predecessors.
 fn order(function: &Function) -> Vec<usize> {
     let (mut seen, mut order) = (vec![false; function.blocks.len()], Vec::new());
     let mut open = vec![(0, 0)];

@@ -1,5 +1,5 @@
-//! A query cut short by its budget: the interval holds the true separation and shrinks as the budget grows, and the
-//! force is that of its conservative end.
+//! A query cut short by its budget: the interval contains the true separation and shrinks as the budget grows, and the
+//! force is computed from its lower bound.
 
 // Requirements, C-02
 
@@ -80,7 +80,7 @@ pub const CHECK: Check = Check {
 
 /// Budgets tried on each pose, from none to unlimited.
 const BUDGETS: usize = 10;
-/// Ticks that continue under a short budget by warm start.
+/// Ticks that continue with a short budget and a warm start.
 const TICKS: usize = 4;
 const POSES: usize = 25;
 const CASES: usize = POSES * (BUDGETS + TICKS);
@@ -98,9 +98,9 @@ struct Tally {
     grown: u64,
     unfinished: u64,
     too_weak: u64,
-    /// The wall could only hold.
+    /// Number of answers for which the wall could only hold.
     held: u64,
-    /// Largest error of an end of an interval, in units of the stated accuracy.
+    /// Largest error of a bound of an interval, in units of the stated accuracy.
     worst: f64,
 }
 
@@ -194,7 +194,7 @@ fn on_one_frame(surface: &Surface, deformation: Deformation, rng: &mut Rng) -> T
     tally
 }
 
-/// Budgets that grow from zero to unlimited.
+/// Budgets that increase from zero to unlimited.
 fn ladder(triangles: u32, rng: &mut Rng) -> [Budget; BUDGETS] {
     let mut budgets = [Budget::new(0); BUDGETS];
     for i in 1..BUDGETS {
@@ -206,7 +206,7 @@ fn ladder(triangles: u32, rng: &mut Rng) -> [Budget; BUDGETS] {
     budgets
 }
 
-/// Checks that the interval holds the true separation, and that the force is at least the true one's.
+/// Checks that the interval contains the true separation, and that the force is at least that of the true separation.
 fn judge(answer: &Proximity, truth: &OraclePair, tally: &mut Tally) {
     let accuracy = f64::from(answer.accuracy);
     let below = f64::from(answer.lower) - truth.separation;

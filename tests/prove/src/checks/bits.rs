@@ -59,7 +59,7 @@ pub fn differences(ours: &Answers, theirs: &Answers, name: &str) -> usize {
     different.len()
 }
 
-/// FNV-1a over all bits of all answers, to compare by eye.
+/// FNV-1a over all bits of all answers, for a comparison by eye.
 fn hash(answers: &Answers) -> u64 {
     let bytes = answers.iter().flat_map(|answer| {
         answer.bits().iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>()

@@ -1,6 +1,6 @@
-//! The controller for boards that exist: it builds, and its parts are in the memories that docs/boards.md says.
+//! The controller for real boards: it builds, and its parts are in the memories that docs/boards.md states.
 //!
-//! One file, because what is measured and its limits belong together.
+//! One file, because the measurements and their limits belong together.
 
 // Requirements: P-01, P-02, P-10
 
@@ -93,13 +93,12 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// The crate.
 const FOLDER: &str = "examples/stm32h743";
 const PROGRAM: &str = "stm32h743";
 
 /// A memory of the part: RM0433, table 7.
 struct Memory {
-    /// In the figures.
+    /// Its name in the figures.
     id: &'static str,
     name: &'static str,
     range: Range<u64>,
@@ -139,10 +138,10 @@ const SRAM3: Memory = Memory {
 
 const MEMORIES: [&Memory; 5] = [&ITCM, &FLASH, &DTCM, &AXI, &SRAM3];
 
-/// A bus, by the feature that selects it, and the variables that must be in a memory.
+/// A bus, by the feature that selects it, and the variables that must be in certain memories.
 struct Variant {
     features: &'static [&'static str],
-    /// The figure of its drivers' panic paths.
+    /// The figure that counts its drivers' panic paths.
     panics: &'static str,
     /// The handlers of its interrupts.
     interrupts: &'static [&'static str],
@@ -173,10 +172,10 @@ const VARIANTS: [Variant; 2] = [
     },
 ];
 
-/// The program's files that call drivers. The compiler merges panic paths of a driver there, which then have no line.
+/// The program's files that call drivers. The compiler merges panic paths of a driver there, so that they have no line.
 const WRAPPERS: [&str; 3] = ["src/clocks.rs", "src/ethernet.rs", "src/fdcan.rs"];
 
-/// The name of such places.
+/// The name under which merged panic paths are counted.
 const MERGED: &str = "merged";
 
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
@@ -185,7 +184,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     for variant in &VARIANTS {
         found.add(variant, &build(&cross, variant)?).context(variant.panics)?;
     }
-    // The program that measures cycles on the board.
+    // Also builds the program that measures cycles on the board.
     let mut cycles = cross.cargo_apart(FOLDER, "build");
     run(cycles.args(["--quiet", "--release", "--bin", "cycles"]))?;
     for (id, figure) in &found.figures {
@@ -206,13 +205,13 @@ fn build(cross: &Cross, variant: &Variant) -> Result<PathBuf> {
     Ok(cross.program_apart(FOLDER, PROGRAM))
 }
 
-/// Figures of all variants: of sizes the largest, of faults the sum.
+/// Figures of all variants: the maximum of sizes, and the sum of faults.
 #[derive(Default)]
 struct Found {
     figures: BTreeMap<&'static str, u64>,
     /// Panic paths of the drivers, by crate.
     drivers: BTreeMap<String, u64>,
-    /// What is wrong, in words.
+    /// Violated promises, as text.
     faults: Vec<String>,
 }
 
@@ -221,7 +220,7 @@ impl Found {
         let binary = Binary::read(program)?;
         let bytes = fs::read(program)?;
         let file = object::File::parse(&*bytes)?;
-        // The linker's script selects them.
+        // The linker's script puts the rare functions there.
         let rare = place(&file, "__rare_start")?.start..place(&file, "__rare_end")?.start;
         self.add_tick(variant, &binary, &rare)?;
         self.add_panics(variant, program, &binary)?;
@@ -242,7 +241,7 @@ impl Found {
         *figure = (*figure).max(size);
     }
 
-    /// Every function below the vector of the control tick; the places of those that are not rare.
+    /// Adds every function below the vector of the control tick, and the addresses of those that are not rare.
     fn add_tick(&mut self, variant: &Variant, binary: &Binary, rare: &Range<u64>) -> Result<()> {
         let tick = binary.handler(15)?;
         ensure!(binary.name(tick) == Some("SysTick"), "the tick's vector leads elsewhere");
@@ -250,7 +249,7 @@ impl Found {
         ensure!(!panicking.is_empty(), "no panic function, though the drivers have panic paths");
         let is_query = |at: &u32| binary.name(*at).is_some_and(|n| n.contains("dibs_nostd::query"));
         ensure!(below.iter().any(is_query), "the tick asks no query");
-        // Idle loop, a bus's interrupt, the tick.
+        // Stack of the idle loop, a bus's interrupt, and the tick.
         let interrupts =
             variant.interrupts.iter().map(|name| binary.depth(binary.exception(name)?));
         let interrupt = interrupts.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(0);
@@ -271,7 +270,7 @@ impl Found {
         Ok(())
     }
 
-    /// Every branch to a function that panics, by the code that it is from.
+    /// Adds every branch to a function that panics, grouped by the code that contains it.
     fn add_panics(&mut self, variant: &Variant, program: &Path, binary: &Binary) -> Result<()> {
         let loader =
             Loader::new(program).map_err(|error| anyhow!("no debug information: {error}"))?;
@@ -310,7 +309,7 @@ impl Found {
         Ok(())
     }
 
-    /// Bytes in use of each memory but flash, which also holds what is copied from it.
+    /// Adds the used bytes of each memory except flash, which also contains what is copied from it.
     fn add_sizes(&mut self, file: &object::File<'_>) -> Result<()> {
         for memory in MEMORIES.iter().filter(|memory| memory.id != FLASH.id) {
             let sections = file.sections().filter(|s| memory.range.contains(&s.address()));
@@ -337,8 +336,8 @@ fn place(file: &object::File<'_>, name: &str) -> Result<Range<u64>> {
     Ok(symbol.address()..symbol.address() + symbol.size())
 }
 
-/// Whether the program's regions of the protection unit leave these addresses to a cache: fields TEX, C and B of the
-/// last region that has them are not those of normal memory without cache (ARMv7-M manual, B3.5.9).
+/// Whether the program's regions of the protection unit let these addresses be cached: fields TEX, C and B of the last
+/// region that contains them differ from those of normal memory without cache (ARMv7-M manual, B3.5.9).
 fn is_cached(file: &object::File<'_>, addresses: &Range<u64>) -> Result<bool> {
     let table = place(file, "stm32h743::memory::REGIONS")?;
     let bytes = file.sections().find_map(|section| {
@@ -353,11 +352,11 @@ fn is_cached(file: &object::File<'_>, addresses: &Range<u64>) -> Result<bool> {
     Ok(prevails.is_none_or(|[_, _, attributes]| attributes >> 16 & 0b11_1011 != 0b00_1000))
 }
 
-/// The innermost code at an address that is not the standard library's.
+/// The innermost code at an address that is not in the standard library.
 #[derive(Debug)]
 struct Source {
     file: String,
-    /// 0 where the compiler has merged branches of several lines.
+    /// 0 if the compiler has merged branches of several lines.
     line: u32,
 }
 
@@ -377,12 +376,12 @@ impl Source {
         Ok(found)
     }
 
-    /// The driver's crate; `None` for the controller's own code, and whatever is not known.
+    /// The driver's crate; `None` for the controller's own code, and for unknown code.
     fn driver(&self) -> Option<&str> {
         if self.line == 0 && WRAPPERS.iter().any(|wrapper| self.file.ends_with(wrapper)) {
             return Some(MERGED);
         }
-        // The registry's folder and a build script's output have the crate's name and version, or a number.
+        // The folders of the registry and of a build script's output contain the crate's name and version, or a number.
         let (_, rest) = match self.file.split_once("/registry/src/") {
             Some((_, rest)) => rest.split_once('/')?,
             None => self.file.split_once("/release/build/")?,
@@ -399,7 +398,7 @@ pub fn table() -> Result<String> {
     );
     for memory in MEMORIES {
         let used = figure(memory.id)?;
-        // The stack's half is no section.
+        // The stack's half of the memory is not a section.
         let used = if memory.id == DTCM.id { used + figure("stack.room")? } else { used };
         let Range { start, end } = memory.range;
         let (name, holds) = (memory.name, memory.holds);

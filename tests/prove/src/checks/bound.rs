@@ -1,4 +1,4 @@
-//! The path bound: proven constants of plain queries, against counted and traced ones.
+//! The path bound: proven constants of plain queries, compared with counted and traced ones.
 
 // Requirement: A-06
 
@@ -117,7 +117,7 @@ pub const CHECK: Check = Check {
     },
 };
 
-/// Of counted queries, one in so many is traced.
+/// One in this many counted queries is traced.
 const TRACED: usize = 50;
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {

@@ -1,5 +1,5 @@
-//! A tracker's ticks within a budget: an instrument that hovers over a beating heart, touches it, goes through its wall,
-//! lies along it and moves fast. What each tick knows is compared with whole queries.
+//! A tracker's ticks within a budget: an instrument that hovers over a beating heart, touches it, passes through its
+//! wall, lies along it and moves fast. Each tick's answer is compared with whole queries.
 
 // Requirement: T-02
 
@@ -22,7 +22,7 @@ use crate::harness::{Check, Effort};
 use crate::probe::ticks::{Script, read};
 use crate::probe::{COUNTING, board, build_for_board, run_on_board};
 
-/// The budgets in tests, and the ends of their figures' names: the instructions that no tick on the board may take more of.
+/// The budgets in tests, and the suffixes of their figures' names: the most instructions of a tick on the board.
 const BUDGETS: [(u32, &str); 4] = [(36, "20k"), (170, "40k"), (290, "60k"), (500, "100k")];
 
 /// Ticks for each frame of the heart's motion: 25 frames a second.
@@ -31,10 +31,10 @@ const TICKS_A_FRAME: usize = 40;
 /// Ticks that a cold start may take.
 const SETTLED: usize = 100;
 
-/// A motion (mm) in a tick from which on the start is cold.
+/// A motion (mm) in one tick from which on the next tick counts as a cold start.
 const LEAP: f32 = 1.5;
 
-/// Separation (mm) from which on a wall acts.
+/// Separation (mm) at which a wall begins.
 const MARGIN: f32 = 5.0;
 
 /// The instrument's radius and length (mm).
@@ -44,7 +44,7 @@ const LENGTH: f32 = 120.0;
 /// A point inside the generated heart.
 const MIDDLE: Vec3 = Vec3::new(12.0, -4.0, 38.0);
 
-/// What the instrument does, for a fifth of the path each.
+/// The instrument's motion, each for a fifth of the path.
 #[derive(Clone, Copy, PartialEq)]
 enum Phase {
     Hovers,
@@ -64,7 +64,7 @@ struct Scene {
     path: Vec<Capsule>,
 }
 
-/// What whole queries know of a tick.
+/// The result of whole queries for a tick.
 struct Truth {
     lower: f32,
     upper: f32,
@@ -89,7 +89,7 @@ impl Scene {
         Ok(Self { tree, frames, path })
     }
 
-    /// Asks about each tick's surface and pose.
+    /// Calls a function with each tick's surface and pose.
     fn each<T>(
         &self,
         tree: &Tree<'_, u16>,
@@ -117,12 +117,12 @@ impl Scene {
     }
 }
 
-/// A tick's frame, and how far it is on the way to the next one.
+/// A tick's frame, and the fraction of the interval to the next frame.
 fn place(tick: usize) -> (usize, f32) {
     (tick / TICKS_A_FRAME, (tick % TICKS_A_FRAME) as f32 / TICKS_A_FRAME as f32)
 }
 
-/// The poses of a path of so many ticks.
+/// The poses of a path with this many ticks.
 fn path(corners: &[[Vec3; 3]], ticks: usize) -> Vec<Capsule> {
     let (mut looked, mut wall) = (Vec3::ZERO, 0.0);
     let poses = (0..ticks).map(|tick| {
@@ -152,7 +152,7 @@ fn path(corners: &[[Vec3; 3]], ticks: usize) -> Vec<Capsule> {
     poses.collect()
 }
 
-/// How far from a point a ray leaves a surface for the last time.
+/// The farthest intersection of a ray with a surface: its distance from the ray's start.
 fn farthest(corners: &[[Vec3; 3]], from: Vec3, along: Vec3) -> f32 {
     let crossings = corners.iter().filter_map(|&[a, b, c]| {
         // Möller and Trumbore (1997).
@@ -168,7 +168,7 @@ fn farthest(corners: &[[Vec3; 3]], from: Vec3, along: Vec3) -> f32 {
     crossings.fold(0.0, f32::max)
 }
 
-/// What the ticks of a budget came to.
+/// Results of the ticks with one budget.
 #[derive(Default)]
 struct Tally {
     wrong: usize,
@@ -212,7 +212,7 @@ fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
     tally
 }
 
-/// Whether an answer's pair is the deepest or the closest one within half a millimetre.
+/// Whether an answer's pair is the deepest or the closest one, within half a millimetre.
 fn is_deepest(
     point: &mut Query<'_, u16, MAX_STACK>,
     surface: &dibs_nostd::SurfaceBlend<'_, [Vec3], [Vec3]>,
@@ -333,7 +333,7 @@ const fn width(id: &'static str, says: &'static str, unit: &'static str, bound: 
     Promise { id, says, criterion: TIMING, bound, unit, limits: "" }
 }
 
-/// The instructions of the ticks after the first, in order of their size, of a tracker on the board within a budget.
+/// The sorted instructions of all ticks except the first, of a tracker on the board within a budget.
 fn on_board(scene: &Scene, budget: Budget) -> Result<Vec<u32>> {
     let program = build_for_board(&board()?, "chain")?;
     let frames = &scene.frames;

@@ -1,4 +1,4 @@
-//! Bits that flip in a validated tree while it is in use: no panic, no hang, and the scrub finds all.
+//! Bit flips in a validated tree while it is in use: they cause no panic and no hang, and the scrub finds all of them.
 
 // Requirements: M-01, M-02
 
@@ -69,11 +69,11 @@ struct Tally {
     damages: u64,
     /// The query returned an error.
     errors: u64,
-    /// The answer was right, within its accuracy.
+    /// The answer was correct, within its accuracy.
     right: u64,
-    /// The answer was too near, which is safe.
+    /// The stated distance was too small, which is safe.
     cautious: u64,
-    /// The answer was too far, and the query could not detect it.
+    /// The stated distance was too large, and the query could not detect it.
     undetected: u64,
     /// The search made more tests than a sound tree needs.
     endless: u64,
@@ -120,7 +120,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
     let rows = built.to_rows(&surface.mesh.positions);
     let tool = pose(&rows, &triangles, rng);
     let truth = exhaustive(&rows, &triangles, &tool).expect("has triangles").separation;
-    // Most work on a sound tree, and the root's: an exact test of each triangle counts as eight.
+    // Upper bound on the work for a sound tree, with the root's test: an exact test of each triangle counts as eight.
     let most = 3 * sound.node_count() + 9 * (sound.triangle_count() + 1) + 1;
     let mut bytes = built.blob().to_vec();
     let mut tally = Tally::default();
@@ -152,7 +152,7 @@ fn on_one_pose(surface: &Surface, rng: &mut Rng) -> Tally {
     tally
 }
 
-/// The tree as the firmware has it: validated before, its sections read where they were.
+/// The tree as the firmware uses it: validated earlier, with the section offsets read then.
 fn damaged<'b>(sound: &Tree<'_, u16>, bytes: &'b [u8]) -> Option<Tree<'b, u16>> {
     sound.moved_to(bytes).ok()
 }

@@ -1,5 +1,5 @@
 //! The cost model: constants fitted above the instructions of adversarial queries, with a margin, and checked on
-//! surfaces and poses that the fit has not seen. A fitted bound, not a proof.
+//! surfaces and poses that were not used in the fit. A fitted bound, not a proof.
 
 // Requirement: A-05
 
@@ -130,8 +130,8 @@ pub const HOST: Check = Check {
     ],
 };
 
-/// Added to the fitted constants, in per cent: the fitted queries are a sample, and of 100,000 others about the same
-/// surfaces one was 13 per cent above their plane.
+/// Margin on the fitted constants, in per cent: the fitted queries are a sample. Of 100,000 other queries on the same
+/// surfaces one was 13 per cent above the fitted plane.
 const MARGIN: f64 = 20.0;
 
 /// A query's cost.
@@ -141,7 +141,7 @@ struct Sample {
     instructions: u32,
 }
 
-/// The machine on which instructions are counted.
+/// The machine whose instructions are counted.
 pub enum Machine<'a> {
     /// The emulated Cortex-M7.
     M7(&'a Cross),
@@ -157,7 +157,7 @@ impl Machine<'_> {
         }
     }
 
-    /// The answers to several scripts, counted side by side.
+    /// The answers to several scripts, executed in parallel.
     fn all(&self, scripts: &[Script]) -> Result<Vec<Answers>> {
         thread::scope(|scope| {
             let running: Vec<_> =
@@ -170,7 +170,7 @@ impl Machine<'_> {
         })
     }
 
-    /// The committed constants, of a sphere and a capsule.
+    /// The committed constants, for a sphere and a capsule.
     fn costs(&self) -> [Cost; 2] {
         match self {
             Self::M7(_) => [Cost::M7_SPHERE, Cost::M7_CAPSULE],
@@ -178,7 +178,7 @@ impl Machine<'_> {
         }
     }
 
-    /// The beginning of the figures' names.
+    /// The prefix of the figures' names.
     fn prefix(&self) -> &'static str {
         match self {
             Self::M7(_) => "cost",
@@ -195,7 +195,7 @@ fn on_host_check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     check(&Machine::Host, effort.host_costs, figures)
 }
 
-/// Fits the constants of both machines, or of the named one.
+/// Fits the constants for both machines, or for the named one.
 pub fn fit(only: Option<&str>) -> Result<()> {
     let wanted = |name: &str| only.is_none_or(|only| name.contains(only));
     if wanted("host") {
@@ -255,7 +255,7 @@ impl Cost {{
     Ok(())
 }
 
-/// Checks the constants on queries that they were not fitted to.
+/// Checks the constants on queries that were not used in the fit.
 fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result<Outcome> {
     let (prefix, costs) = (machine.prefix(), machine.costs());
     let (mut beyond, mut late, mut checked) = (0, 0, 0_usize);
@@ -263,7 +263,7 @@ fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result
     let subjects = unseen()?;
     let names: Vec<_> = subjects.iter().map(|subject| subject.name).collect();
     figures.text(&format!("{prefix}.surfaces"), names.join(", "));
-    // Half with the whole search, half with a budget made for a deadline.
+    // Half of the queries are complete searches, half have a budget made for a deadline.
     let scripts = [(Draw::Exhausting, 21), (Draw::Deadline(costs), 22)]
         .map(|(draw, seed)| Script::about_all(&subjects, true, queries / 2, draw, seed));
     for answers in machine.all(&scripts)? {
@@ -300,7 +300,7 @@ fn check(machine: &Machine<'_>, queries: usize, figures: &mut Figures) -> Result
     Ok(Outcome::Passed)
 }
 
-/// Surfaces that the constants are not fitted to: other sizes, shapes and leaves, and real anatomy if present.
+/// Surfaces that were not used in the fit: with other sizes, shapes and leaves, and real anatomy if present.
 pub fn unseen() -> Result<Vec<Subject>> {
     let mut subjects = vec![
         Subject::new("a generated heart of 2,562 triangles", generate::heart(2_562)?.mesh, 8),
@@ -320,7 +320,7 @@ pub fn unseen() -> Result<Vec<Subject>> {
     Ok(subjects)
 }
 
-/// The usual case, for comparison from commit to commit.
+/// The typical case, for comparison between commits.
 fn usual(answers: &Answers, figures: &mut Figures) {
     for (name, is_capsule) in [("sphere", false), ("capsule", true)] {
         let samples = samples(answers, is_capsule);
@@ -346,8 +346,8 @@ fn samples(answers: &Answers, capsules: bool) -> Vec<Sample> {
         .collect()
 }
 
-/// The lowest plane, on average, that no sample is above: a linear programme, in which the solver gets only the binding
-/// constraints.
+/// The plane above all samples that is lowest on average: a linear program, to which only the binding constraints are
+/// added.
 fn plane_above(samples: &[Sample]) -> Result<Cost> {
     let count = samples.len() as f64;
     let mean =

@@ -1,4 +1,4 @@
-//! The demo on the emulated board: deadlines, answers, and every published frame read back.
+//! The demo on the emulated board: deadlines, answers, and read-back of every published frame.
 
 // Requirements: A-01, B-01, P-03
 
@@ -115,7 +115,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Notes the figures of the demo's report.
+/// Records the figures of the demo's report.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let report = report_of(Run { seconds: effort.demo_seconds, ..Run::default() })?;
     for (name, field) in [
@@ -144,17 +144,17 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// A run of the demo.
+/// Options of a run of the demo.
 #[derive(Clone, Copy, Default)]
 pub struct Run {
     pub seconds: u32,
     /// Faults on the bus.
     pub faults: bool,
-    /// The controller in C.
+    /// Whether the controller is the one in C.
     pub c: bool,
-    /// A hand that pushes, instead of the script.
+    /// Whether a simulated hand pushes the instrument, instead of the script.
     pub hand: bool,
-    /// A heart that nodes carry.
+    /// Whether the nodes of a lattice move the heart.
     pub nodes: bool,
 }
 
@@ -183,7 +183,6 @@ pub fn report_of(Run { seconds, faults, c, hand, nodes }: Run) -> Result<Value> 
     written(&output)
 }
 
-/// The folder of a demo's report.
 pub fn folder(name: &str) -> PathBuf {
     workspace::target().join("guarantees").join(name)
 }

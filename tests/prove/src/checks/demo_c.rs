@@ -49,12 +49,12 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Seconds of the controller's time in a run of the tests: a frame takes one of them. That time does not wait for a busy
-/// computer to send, so a run without a frame is repeated with more.
+/// Durations of a test run, in seconds of the controller's time. A frame takes one second, but that time does not wait
+/// for a busy host to send, so a run without a frame is repeated with a longer duration.
 const SHORT: [u32; 3] = [2, 4, 8];
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    // Its compiler is of Debian's alone, which not every machine has.
+    // Its compiler is only in Debian, so not every machine has it.
     if let Err(error) = c_firmware::find() {
         return Ok(Outcome::Skipped(format!("{error:#}")));
     }

@@ -1,4 +1,4 @@
-//! The demo with faults on the bus, which also falls silent for a while.
+//! The demo with faults on the bus, which also stops for a while.
 
 // Requirements: B-01, C-01, P-03
 
@@ -54,7 +54,7 @@ pub const CHECK: Check = Check {
             id: "demo.faults.safe-after-packet",
             says: "A bus that falls silent makes the output safe in time",
             criterion: FAULTS,
-            // The limit of `Trust::ETHERNET`, and the tick that finds it exceeded.
+            // The limit of `Trust::ETHERNET`, plus the tick that detects it.
             bound: Bound::AtMost(81.0),
             unit: "ms after the last good packet, {demo.faults.safe-after-frame} ms after the last good frame; \
          nominal again {demo.faults.recovered-after} ms later",

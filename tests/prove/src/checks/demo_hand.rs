@@ -1,4 +1,4 @@
-//! The demo with a simulated hand, which pushes the instrument against the beating heart and does not get in.
+//! The demo with a simulated hand that pushes the instrument against the beating heart, and does not penetrate it.
 
 // Requirements: C-03, C-04, C-05, P-03
 
@@ -96,7 +96,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Notes the figures of the demo's report.
+/// Records the figures of the demo's report.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let report = report_of(Run { seconds: effort.demo_seconds, hand: true, ..Run::default() })?;
     let mut note = |name: &str, value: &serde_json::Value| -> Result<()> {

@@ -1,4 +1,4 @@
-//! The demo on a heart of 50,000 triangles that a lattice's nodes carry.
+//! The demo on a heart of 50,000 triangles that a lattice's nodes move.
 
 // Requirements: F-07, P-03
 
@@ -77,7 +77,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Notes the figures of the demo's report.
+/// Records the figures of the demo's report.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let report = report_of(Run { seconds: effort.demo_seconds, nodes: true, ..Run::default() })?;
     for (name, field) in [

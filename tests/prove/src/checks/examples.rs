@@ -45,16 +45,16 @@ pub const CHECK: Check = Check {
 
 const EXAMPLES: [&str; 2] = ["example-rtic", "example-embassy"];
 
-/// The frame sent: one that differs from the rest shape, so that it must have arrived.
+/// The sent frame: it differs from the rest shape, which proves that it was received.
 const FRAME: usize = 16;
 
-/// Time between two frames. The board checks one meanwhile.
+/// Time between two frames, in which the board checks one.
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// The examples' largest force, in N.
 const MAX_FORCE: f32 = 5.0;
 
-/// Longest time until an answer; the examples give up before.
+/// Longest time until an answer; the examples end earlier.
 const LIMIT: Duration = Duration::from_secs(60);
 
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
@@ -82,7 +82,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// Whether an example found the same separation, and a force that is no weaker: it counts with the surface's age.
+/// Whether an example found the same separation, and a force that is at least as large: the surface's age increases it.
 fn is_same(said: &str, expected: &str) -> Option<bool> {
     let [said, expected] = [said, expected].map(|line| line.split_once(" mm, "));
     let newtons = |force: &str| force.strip_suffix(" N")?.parse::<f32>().ok();
@@ -91,7 +91,7 @@ fn is_same(said: &str, expected: &str) -> Option<bool> {
     Some(here == there && range.contains(&newtons(force)?))
 }
 
-/// The line that an example prints of this frame at once, from the same calls.
+/// The line that an example would print for this frame at once, from the same calls.
 fn on_host(tree: &Tree<'_, u16>, order: &SurfaceOrder, positions: &[Vec3]) -> Result<String> {
     let rows = order.to_rows(positions)?;
     let stretch = measure_stretch(tree, rows.as_slice())?;
@@ -104,7 +104,7 @@ fn on_host(tree: &Tree<'_, u16>, order: &SurfaceOrder, positions: &[Vec3]) -> Re
     Ok(format!("{} mm, {} N", closest.separation, force.length()))
 }
 
-/// Boots an example, sends it the frame again and again, and returns the line that it prints.
+/// Boots an example, sends it the frame repeatedly, and returns the line that it prints.
 fn on_board(cross: &Cross, name: &str, order: &SurfaceOrder, positions: &[Vec3]) -> Result<String> {
     let folder = tempfile::tempdir()?;
     let (bus, said) = (folder.path().join("bus"), folder.path().join("said"));
@@ -117,13 +117,13 @@ fn on_board(cross: &Cross, name: &str, order: &SurfaceOrder, positions: &[Vec3])
         let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
         let hang_up = move || drop(handle.shutdown(Shutdown::Both));
         let line = Line::stream(socket, reader, hang_up);
-        // The host answers the positions as they are, so they must not be rounded on their way.
+        // The host uses unrounded positions, so they must not be quantised.
         let settings = Settings { quantised: false, ..Settings::default() };
         let mut sender = Sender::<_, 1024>::new(line, order.clone(), settings);
         send(&mut emulator, || sender.send(positions).map(drop))
     });
     if ended.is_err() {
-        // It may have ended by itself.
+        // It may have ended already.
         let _ = emulator.kill();
         emulator.wait()?;
     }
@@ -135,7 +135,7 @@ fn on_board(cross: &Cross, name: &str, order: &SurfaceOrder, positions: &[Vec3])
 fn send(board: &mut Child, mut frame: impl FnMut() -> Result<(), SendError>) -> Result<()> {
     let start = Instant::now();
     loop {
-        // An error is the line's, which breaks when the board ends.
+        // An error of the line: it breaks when the board ends.
         let _broken = frame();
         thread::sleep(PAUSE);
         if let Some(status) = board.try_wait()? {

@@ -1,4 +1,4 @@
-//! A filter of commands against adversarial walks, and beside other ways to hold an instrument.
+//! A filter of commands on adversarial walks, compared with other ways to hold an instrument.
 
 // Requirements: C-05, C-06
 

@@ -1,4 +1,4 @@
-//! A filter of commands on the emulated board: the walks of the computer, with the same bits, and their instructions.
+//! A filter of commands on the emulated board: the walks of the host, with the same bits, and their instructions.
 
 // Requirement: C-05
 
@@ -68,7 +68,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Ticks in which a glide's trackers start.
+/// Number of ticks in which the trackers of a glide start.
 const START: usize = 100;
 
 /// Triangles and stretch of the heart.
@@ -132,7 +132,7 @@ fn walks(effort: &Effort) -> Vec<Walked> {
         let mut walked =
             Walked { script: Script::new(&scene.tree, false), tally: Tally::default() };
         for walk in 0..each {
-            // Seeds that the check on this computer does not have.
+            // Seeds that the check on the host does not use.
             let seed = 1_000_000 + walk * scenes.len() as u64 + number as u64;
             let episode = Episode::any(&mut Rng::with_seed(seed));
             walked.tally += walk_told(scene, &episode, seed, &mut walked.script);

@@ -1,4 +1,4 @@
-//! A simulated hand that pushes against the constraint: all contacts hold it, the closest pair alone not always.
+//! A simulated hand pushes against the constraint: all contacts together hold it, the closest pair alone not always.
 
 // Requirements: C-03, C-04
 

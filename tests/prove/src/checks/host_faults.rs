@@ -43,7 +43,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     tell(&record, "faults", "faults.json", effort, figures)
 }
 
-/// Notes the figures of a matrix, and writes its record.
+/// Records the figures of a matrix, and writes its record.
 pub fn tell(
     record: &Record,
     prefix: &str,

@@ -42,7 +42,7 @@ pub const CHECK: Check = Check {
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     valgrind::install_runner()?;
     let mut cargo = Command::new("cargo");
-    // All packages, so that cargo reuses the tests' build.
+    // All packages, so that cargo reuses the build of the tests.
     cargo.args(["bench", "--quiet", "--bench", "instructions"]);
     cargo.args(["--", "--output-format=json"]).current_dir(workspace::root());
     let output = cargo.stderr(Stdio::inherit()).output()?;

@@ -1,4 +1,4 @@
-//! Every order of a writer's and a reader's steps, by loom.
+//! All interleavings of a writer's and a reader's steps, by loom.
 
 // Requirement: F-01
 

@@ -38,7 +38,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// A planted panic path must break the link, which shows that the link is a check.
+/// A planted panic path must break the link, which proves that the link is a check.
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let (cross, surface) = (board()?, Surface::default());
     let footprint = Footprint::read(&firmware::build(&cross, &surface)?)?;

@@ -1,4 +1,4 @@
-//! Each file has one check, with its promises. A new check is a new file, and a line here.
+//! Each file has one check with its promises. A new check is a new file, and a line here.
 
 // Requirement: E-03
 
@@ -89,8 +89,8 @@ pub const CHECKS: &[Check] = &[
     python::CHECK,
 ];
 
-/// Names of the checks that `cargo xtask test` runs with `--whole` only: each builds one more program, or takes half a
-/// minute besides checks of the same parts, or runs the tests once more under an instrument.
+/// Checks that `cargo xtask test` runs only with `--whole`: each builds one more program, or takes half a minute in
+/// addition to checks of the same parts, or runs the tests again under a sanitizer.
 pub const ON_REQUEST: [&str; 9] = [
     demo_nodes::CHECK.name,
     filter_board::CHECK.name,
@@ -103,8 +103,8 @@ pub const ON_REQUEST: [&str; 9] = [
     fuzz::CHECK.name,
 ];
 
-/// Names of the checks on the other core: most without an emulator, the demo in C, the other processors,
-/// and the boards.
+/// Checks that run in parallel on the other core: most need no emulator; also the demo in C, the other processors, and
+/// the boards.
 pub const BESIDE: [&str; 13] = [
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,

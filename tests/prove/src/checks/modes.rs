@@ -1,4 +1,4 @@
-//! Modal surfaces on the board: the host's bits, and instructions of a vertex, a bound and a query.
+//! Modal surfaces on the board: the same bits as on the host, and the instructions of a vertex, a bound and a query.
 
 // Requirement: F-06
 
@@ -83,7 +83,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Whether each query of a frame found the same separation in rows, weights and memory.
+/// Whether each query of a frame found the same separation with rows, weights and cached positions.
 fn agree(answers: &Answers) -> bool {
     let separations: Vec<u32> = answers
         .iter()

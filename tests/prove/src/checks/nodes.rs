@@ -1,5 +1,5 @@
-//! A controller's loop on the board where a volume's nodes carry a surface of 50,000 triangles: the host's bits, memory, and
-//! instructions of a tick, of an element's check and of a vertex.
+//! A controller's loop on the board in which a volume's nodes move a surface of 50,000 triangles: the same bits as on
+//! the host, memory, and the instructions of a tick, of an element's check and of a vertex.
 
 // Requirements: F-07, F-09
 
@@ -96,14 +96,14 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Time of the run in ms, and of its start, which is not counted.
+/// Duration of the run in ms, and of its start, which is not counted.
 const TICKS: u32 = 4_000;
 const START: u32 = 1_200;
 
-/// ms between two frames.
+/// Time between two frames, in ms.
 const PERIOD: u32 = 33;
 
-/// The script: words, and whether they are answered.
+/// The script as words, each with whether it has an answer.
 fn script(built: &BuiltTree, volume: &Volume, rest: &[Vec3]) -> Result<Vec<u8>> {
     let nodes: Vec<Vec3> = volume.nodes().iter().map(|node| node.as_vec3()).collect();
     let pulse = Pulse::new(&nodes, 41);
@@ -143,7 +143,7 @@ fn script(built: &BuiltTree, volume: &Volume, rest: &[Vec3]) -> Result<Vec<u8>> 
     Ok(bytes)
 }
 
-/// This computer, without a clock.
+/// The host, without a clock.
 struct Host<'s> {
     script: &'s [u8],
     answers: Vec<u8>,
@@ -220,7 +220,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("m7.nodes.bits", others as f64);
     ensure!(answers.frames.iter().all(|frame| frame[1] == 1), "a frame was refused");
 
-    // The board's clock counts 1.6 to each instruction.
+    // The board's clock counts 1.6 for each instruction.
     let instructions = |clock: u32| f64::from(clock) * 0.625;
     let elements = volume.tetrahedra().len() as f64;
     let vertices = mesh.positions.len() as f64;

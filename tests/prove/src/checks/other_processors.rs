@@ -1,4 +1,4 @@
-//! The same bits on an emulated Cortex-M55 and on an emulated RISC-V, and their instructions.
+//! The same bits on an emulated Cortex-M55 and an emulated RISC-V, and their instructions.
 
 // Requirement: A-11
 
@@ -46,12 +46,12 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Longest time of a look at the emulator.
+/// Timeout of asking the emulator for its version.
 const MOMENT: Duration = Duration::from_secs(20);
 
 /// An emulated machine that answers scripts.
 struct Machine {
-    /// In the figures.
+    /// Its name in the figures.
     name: &'static str,
     target: &'static str,
     feature: &'static str,
@@ -59,7 +59,7 @@ struct Machine {
     emulator: &'static str,
     package: &'static str,
     arguments: &'static [&'static str],
-    /// Instructions of a difference of its clock.
+    /// Converts a difference of its clock to instructions.
     instructions: fn(u32) -> f64,
 }
 
@@ -72,7 +72,7 @@ const MACHINES: [Machine; 2] = [
         emulator: "qemu-system-arm",
         package: "qemu-system-arm",
         arguments: &["-machine", "mps3-an547", "-icount", "shift=6"],
-        // The upper 24 bits count 32 MHz, and an instruction takes 64 ns.
+        // The upper 24 bits count at 32 MHz, and an instruction takes 64 ns.
         instructions: |clock| f64::from(clock >> 8) / (32e6 * 64e-9),
     },
     Machine {
@@ -115,7 +115,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// Ticks on the path, as many in every run, because their mean is a golden figure.
+/// Ticks on the path: the same number in every run, because their mean is a golden figure.
 const MOST_TICKS: u32 = Effort::TEST.ticks;
 
 impl Machine {
@@ -140,7 +140,7 @@ impl Machine {
         emulator
     }
 
-    /// Instructions of a query in the mean.
+    /// Mean instructions of a query.
     fn mean(&self, answers: &Answers) -> Result<f64> {
         let queries = answers.iter().filter(|answer| matches!(answer.record, Record::Query { .. }));
         let counts: Vec<f64> = queries.map(|answer| (self.instructions)(answer.words[0])).collect();

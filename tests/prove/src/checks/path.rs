@@ -63,8 +63,8 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Notes the instructions of queries on the generated heart (table 3's path and limit, another surface at every tick),
-/// warm with measured stretch and cold with the limit alone, and of poses.
+/// Records the instructions of queries on the generated heart (table 3's path and limit, another surface at every
+/// tick), warm with measured stretch and cold with only the limit, and of adversarial poses.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "probe")?;
     let ask = |script: Script| on_board(&program, &script, true);

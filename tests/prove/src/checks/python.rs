@@ -38,7 +38,7 @@ fn check(effort: &Effort, _: &mut Figures) -> Result<Outcome> {
     }
     tests.args(["-W", "ignore", "-m", "unittest", "discover", "-s"]).arg(source.join("tests"));
     tests.env("DIBS_PROGRAM", workspace::target().join("release/dibs"));
-    // Nothing is left beside the sources.
+    // No files may be created beside the sources.
     run(tests.env("PYTHONDONTWRITEBYTECODE", "1")).map(|()| Outcome::Passed)
 }
 

@@ -54,14 +54,14 @@ pub const CHECK: Check = Check {
 /// Frames of each kind, spread over the beat.
 const FRAMES: usize = 6;
 
-/// A way to send frames.
+/// A way of sending frames.
 #[derive(Clone, Copy)]
 struct Way {
     name: &'static str,
     mtu: usize,
     quantised: bool,
     is_tagged: bool,
-    /// Packets between two slices of the check: some hundred vertices.
+    /// Number of packets between two slices of the check, which is some hundred vertices.
     every: u32,
 }
 
@@ -87,7 +87,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     ensure!(answers.len() == FRAMES * WAYS.len(), "{} frames answered", answers.len());
     let mut a_packet = Vec::new();
     for (way, answers) in WAYS.iter().zip(answers.chunks(FRAMES)) {
-        // The clock counts 1.6 to an instruction.
+        // The clock counts 1.6 for each instruction.
         let sum = |word: usize| answers.iter().map(|answer| f64::from(answer[word])).sum::<f64>();
         let instructions = |word: usize| sum(word) * 0.625;
         let vertices = (FRAMES * VERTICES) as f64;
@@ -100,7 +100,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         note("sum", receive + check);
         a_packet.push(instructions(1) / sum(0));
     }
-    // The last two ways differ only by the tags.
+    // The last two ways differ only in the tags.
     if let [.., untagged, tagged] = a_packet[..] {
         figures.note("receive.tag", (tagged - untagged).round());
     }
@@ -119,9 +119,9 @@ impl Script {
         self.words.extend(padded(bytes));
     }
 
-    /// Frames of one way, in a separate session.
+    /// Frames sent in one way, in a separate session.
     fn frames(&mut self, way: Way, built: &BuiltTree, motion: &Motion) -> Result<()> {
-        // A later session than those before, since the receivers see all of them.
+        // The session must be later than the earlier ones, because the same receivers get all of them.
         let session = WAYS.iter().position(|other| other.name == way.name).unwrap_or(0) as u32 + 1;
         let step = motion.frames.len() / FRAMES;
         for (number, positions) in motion.frames.iter().step_by(step).take(FRAMES).enumerate() {

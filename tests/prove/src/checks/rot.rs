@@ -1,4 +1,4 @@
-//! A controller finds a tree that has changed in flash.
+//! A controller detects that its tree has changed in flash.
 
 // Requirements: C-01, M-02
 
@@ -68,7 +68,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     does_not_start(&image, middle, folder.path()).map(|()| Outcome::Passed)
 }
 
-/// The board's address of a place in the linked program.
+/// The board's address of an offset in the linked program's file.
 fn address(image: &[u8], place: usize) -> Result<u32> {
     let file = object::File::parse(image)?;
     let place = place as u64;
@@ -80,7 +80,7 @@ fn address(image: &[u8], place: usize) -> Result<u32> {
     Ok(u32::try_from(found.context("the tree is in no segment")?)?)
 }
 
-/// A controller whose tree is damaged from the start ends at once.
+/// Checks that a controller whose tree is damaged from the start ends at once.
 fn does_not_start(image: &[u8], place: usize, folder: &Path) -> Result<()> {
     let mut damaged = image.to_vec();
     damaged[place] ^= 1 << 4;

@@ -60,7 +60,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Number of poses of the golden figures: the same at every effort, so that each run compares with the record.
+/// Number of poses of the golden figures: the same at every effort, so that each run can be compared with the record.
 const SAMPLE: usize = 1_000;
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {

@@ -1,4 +1,4 @@
-//! The firmware's stack: a bound from the binary, and detection of an overflow.
+//! The firmware's stack: a bound from the binary, and the detection of an overflow.
 
 // Requirement: P-02
 

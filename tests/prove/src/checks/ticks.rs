@@ -1,4 +1,4 @@
-//! The longest control tick: the firmware's receiver and tick on the emulated board, on admitted frames that a search
+//! The longest control tick: the firmware's receiver and tick on the emulated board, with admitted frames that a search
 //! has chosen to make the tick long.
 
 // Requirement: P-03
@@ -52,17 +52,17 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Poses tried on each shape, and steps of hill climbing from the costliest of them.
+/// Poses tried on each shape, and hill climbing steps from the most expensive one.
 const TRIES: usize = 40;
 const STEPS: usize = 40;
 
-/// Ticks between two frames. They are far apart, beyond any recovery, so each is a registration.
+/// Ticks between two frames. The interval exceeds any recovery, so each frame is a registration.
 const PAUSE: u32 = 1 << 20;
 
-/// Ticks on each published frame, the first with a warm start from the frame before.
+/// Ticks on each published frame; the first starts from the last answer on the previous frame.
 const TICKS: u32 = 3;
 
-/// Limit on the coordinates, in sizes of the rest shape: less than the firmware allows.
+/// Limit on the coordinates, relative to the size of the rest shape: less than the firmware allows.
 const ROOM: f32 = 3.5;
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
@@ -95,15 +95,16 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let (mut sum, mut longest, mut cut_short) = (0.0, 0.0_f64, 0);
     for (number, ticks) in answers.chunks(1 + TICKS as usize).enumerate() {
         for (place, &[took, nodes, triangles, epoch]) in ticks.iter().enumerate() {
-            // The first tick comes between the frame's packets.
+            // The first tick runs between the frame's packets.
             let is_new = place > 0;
             let of = number as u32 + u32::from(is_new);
             ensure!(epoch == of, "a tick about frame {epoch}, not {of}: the firmware refused it");
-            // The clock counts 1.6 to an instruction.
+            // The clock counts 1.6 for each instruction.
             let instructions = f64::from(took) * 0.625;
             (sum, longest) = (sum + instructions, longest.max(instructions));
             let work = nodes + triangles * Budget::TRIANGLE;
-            // No more than a triangle's test and its plane's, or a node's children, can be left over.
+            // What is left of the budget must be less than a triangle's test and its plane's, or the tests of a node's
+            // children.
             cut_short += u32::from(work + 2 * Budget::TRIANGLE > BUDGET.tests());
         }
     }
@@ -119,16 +120,16 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// A frame, and the tick that it is for.
+/// A frame, and the tick that it is made for.
 struct Frame {
     rows: Vec<Vec3>,
-    /// Tick after its publication, from a multiple of [`PAUSE`] on.
+    /// Number of ticks after its publication, counted from a multiple of [`PAUSE`].
     tick: u32,
-    /// Instructions of the query then, by the cost model, without a budget.
+    /// Instructions of the query at that tick without a budget, by the cost model.
     cost: u64,
 }
 
-/// The costliest frame of one kind that a search finds.
+/// The most expensive frame of one kind that the search finds.
 fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Result<Frame> {
     let tree = built.tree::<surface::Index>()?;
     let monitor = StretchMonitor::new(&tree)?.limits(SurfaceLimits::reach_mm(f32::INFINITY));
@@ -157,7 +158,7 @@ fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Resu
         if rows.iter().any(|p| p.abs().max_element() > reach) {
             return None;
         }
-        // A rotation may take a shape at its limit beyond it.
+        // Rounding in a rotation may move a shape beyond its limit.
         let measured = admitted(&rows)?;
         let tool = instrument(base + placed.tick).ok()?;
         let found = query.closest(&rows[..], &tool, &Options::cold().stretch(measured)).ok()?;
@@ -178,7 +179,7 @@ fn dearest(mesh: &Mesh, built: &BuiltTree, number: usize, rng: &mut Rng) -> Resu
     best.map(|(_, frame)| frame).context("no place for a shape")
 }
 
-/// The surface drawn onto a sphere, as far as it is admitted: distances from its centre are equal.
+/// The surface deformed towards a sphere, as far as admitted: a sphere's points are equally far from its centre.
 fn round(mesh: &Mesh, is_fit: impl Fn(&[Vec3]) -> bool) -> Vec<Vec3> {
     let middle = mesh.positions.iter().sum::<Vec3>() / mesh.positions.len() as f32;
     let at = |share: f32, size: f32| -> Vec<Vec3> {
@@ -201,7 +202,7 @@ struct Placed {
 }
 
 impl Placed {
-    /// A random place at a tick's instrument: around it, on it or next to it.
+    /// A random placement at a tick's instrument: around it, on it or next to it.
     fn around(shape: &[Vec3], middle: Vec3, base: u32, rng: &mut Rng) -> Result<Self> {
         let tick = rng.u32(..PAUSE / 2);
         let tool = instrument(base + tick)?;
@@ -212,7 +213,7 @@ impl Placed {
         Ok(Self { turn, shift: on_tool - turn * anchor + away, tick })
     }
 
-    /// The same, moved and turned a little.
+    /// The same, with a small random displacement and rotation.
     fn nudged(&self, rng: &mut Rng) -> Self {
         let size = 0.3 * rng.f32().powi(3);
         let turn = Quat::from_axis_angle(unit(rng), size) * self.turn;
@@ -228,7 +229,7 @@ struct Script {
 }
 
 impl Script {
-    /// Adds a frame that is published right before its tick, and a tick between its packets.
+    /// Adds a frame that is published just before its tick, and a tick between its packets.
     fn frame(&mut self, id: FrameId, frame: &Frame) -> Result<()> {
         let begins = id.epoch * PAUSE + frame.tick - 1;
         self.words.extend([SKIP, begins - self.now, REGISTER]);

@@ -1,4 +1,4 @@
-//! Frames published during queries, on the emulated board.
+//! Frames that are published during queries, on the emulated board.
 
 // Requirement: F-01
 
@@ -46,7 +46,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     for (name, count) in names.into_iter().zip(&counts) {
         figures.note(&format!("torn.{name}"), f64::from(*count));
     }
-    // The check must detect torn reads without the protocol.
+    // Without the protocol the check must detect torn reads.
     ensure!(counts[4] > 0, "no query saw two epochs even without the protocol");
     Ok(Outcome::Passed)
 }

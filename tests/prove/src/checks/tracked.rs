@@ -98,10 +98,10 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// The tool goes once through the middle of the heart and back. The number is fixed, since golden figures are compared.
+/// The tool moves once through the middle of the heart and back. Fixed, because golden figures are compared.
 const TICKS: u32 = 7_000;
 
-/// A run over the path: the end of its figures' names, the bits of its ticks, and the probe's program.
+/// A run over the path: the suffix of its figures' names, the options of its ticks, and the probe's program.
 const RUNS: [(&str, u32, &str); 6] = [
     ("", tick::INTERPOLATED, "track"),
     (".held", 0, "track"),
@@ -144,7 +144,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
             figures.note("m7.track.places", OPENED as f64);
         }
         apart = ticks.iter().fold(apart, |apart, tick| apart.max(tick.apart));
-        // A capsule of a chain that was far for long may have moved too far.
+        // A tool of a chain that was far away for a long time may have moved too far.
         let counted = if bits & tick::CHAIN == 0 { &ticks[..] } else { &[] };
         fallbacks += counted.iter().filter(|tick| tick.is_fallback).count();
     }

@@ -1,4 +1,4 @@
-//! A tracker's instructions on the board where weights move the surface: the paper's moving tool around a heart whose
+//! A tracker's instructions on the board on a surface that weights move: the paper's moving tool around a heart whose
 //! modes move at every tick.
 
 // Requirements: F-06, T-01
@@ -99,7 +99,7 @@ fn script(modes: usize) -> Result<Vec<u8>> {
     let beat = Beat::new(&motion);
     let mut sent = 0;
     for tick in 0..TICKS {
-        // A frame comes at the tick that reaches its time.
+        // A frame is sent at the tick that reaches its time.
         while sent as f32 <= tick as f32 * frames_a_tick {
             put(&mut bytes, &[command::FRAME, (sent as f32 / frames_a_tick).ceil() as u32]);
             put_floats(&mut bytes, &recorded.weights[sent % recorded.weights.len()]);
@@ -123,7 +123,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         let (ticks, rest) = words.as_chunks::<ANSWER_WORDS>();
         ensure!(rest.is_empty() && ticks.len() == TICKS as usize, "not every tick is answered");
         let ticks = &ticks[1..];
-        // The board's clock counts 1.6 to each instruction.
+        // The board's clock counts 1.6 for each instruction.
         let instructions = |clock: u32| (u64::from(clock) * 5 / 8) as u32;
         let mut taken: Vec<u32> = ticks.iter().map(|tick| instructions(tick[0])).collect();
         taken.sort_unstable();

@@ -17,10 +17,10 @@ use super::flood::Wire;
 use super::sender::{Link, paced};
 use super::session::accept;
 
-/// Frames a second that a sender on Ethernet has at least: a slower recording gets frames between its own.
+/// Least frame rate of a sender on Ethernet (1/s): a slower recording is interpolated.
 const FRAME_RATE: f32 = 60.0;
 
-/// Bytes that may be on their way to the board's Ethernet controller, whose buffer holds seven large packets.
+/// Bytes in flight to the board's Ethernet controller, whose buffer holds seven large packets.
 const WINDOW: u32 = 5 * MTU as u32;
 
 /// The kind of bus.
@@ -39,8 +39,8 @@ impl Bus {
         }
     }
 
-    /// Ticks in which the controller acknowledges a frame, longer than any check: a frame not acknowledged by then was
-    /// lost.
+    /// Ticks in which the controller acknowledges a frame, longer than any check: a frame that is not acknowledged by
+    /// then was lost.
     pub const fn answer(self) -> u32 {
         match self {
             Self::Serial => TICK_RATE / 20,
@@ -48,7 +48,7 @@ impl Bus {
         }
     }
 
-    /// Frames to send and their rate: over Ethernet at least 60 a second, halfway frames put between the recorded ones.
+    /// Frames and their rate: over Ethernet at least 60 a second, with interpolated frames between the recorded ones.
     pub fn frames(self, motion: &Motion, rate: f32) -> (Vec<Vec<Vec3>>, f32) {
         let parts = match self {
             Self::Serial => 1,
@@ -64,7 +64,7 @@ impl Bus {
         (frames.collect(), rate * parts as f32)
     }
 
-    /// A place where the controller finds its sender.
+    /// Opens the bus on which the controller finds its sender.
     pub fn open(self, folder: &Path) -> Result<Opened> {
         match self {
             Self::Serial => {
@@ -84,10 +84,9 @@ impl Bus {
     }
 }
 
-/// A bus whose controller is about to start.
+/// A bus whose controller has not started yet.
 pub struct Opened {
     socket: Socket,
-    /// The controller's end.
     pub end: qemu::Bus,
 }
 
@@ -98,7 +97,7 @@ enum Socket {
 }
 
 impl Opened {
-    /// A network on which anybody may send raw frames, and a handle of it.
+    /// A network on which anybody may send raw frames, and a handle to it.
     pub fn wire() -> Result<(Self, Wire)> {
         let (wire, end) = Wire::new()?;
         let handle = wire.share()?;

@@ -15,30 +15,27 @@ use super::surface::rows;
 /// The result of checking one answer.
 #[derive(Clone, Copy, Debug)]
 pub struct Checked {
-    /// The tick.
     pub tick: u32,
-    /// Error of the answer in units of [`accuracy_of`] it, and of the rounding of vertices that nodes carry: at most 1 is
-    /// right.
+    /// Error of the answer in units of its [`accuracy_of`] plus the embedded vertices' rounding: at most 1 is correct.
     pub error: f64,
-    /// The true separation from the surface of the answer, in mm: the lower end, where it is not certain.
+    /// The true separation from the answer's surface, in mm; if the answer is an interval, its lower bound.
     pub separation: f64,
 }
 
 impl Checked {
-    /// Whether the answer is off by more than it states, or the error is NaN.
+    /// Whether the error exceeds the stated accuracy, or is NaN.
     pub fn is_wrong(&self) -> bool {
         self.error > 1.0 || self.error.is_nan()
     }
 }
 
-/// The accuracy of an answer on the vertices as they were decoded, which both sides use here: the stated one without
-/// the bus's quantisation.
+/// The accuracy of an answer on the decoded vertices that both sides use: that stated, without the bus's quantisation.
 pub fn accuracy_of(tick: &Tick) -> f64 {
     without(tick.accuracy, tick.position_error)
 }
 
-/// What was added to a position error, at most: the sum was rounded to f32. On a surface as small as a bus's step the
-/// difference alone is zero.
+/// Upper bound of what was added to a position error, because the sum was rounded to f32. On a surface as small as a
+/// step of the bus, the difference alone is zero.
 pub fn without(accuracy: f32, position_error: f32) -> f64 {
     let rounding = f64::from(accuracy) * f64::from(f32::EPSILON) / 2.0;
     f64::from(accuracy) - f64::from(position_error) + rounding
@@ -76,13 +73,12 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
 /// A published frame, compared as a whole with the frame sent.
 #[derive(Clone, Copy, Debug)]
 pub struct Compared {
-    /// Its epoch.
     pub epoch: u32,
-    /// Whether every vertex is the one sent, to the bit.
+    /// Whether every vertex equals the sent one, to the bit.
     pub is_same: bool,
 }
 
-/// Compares each frame that the controller has read in full, once.
+/// Compares each frame that the controller has read completely, once.
 pub fn compare(link: &Link, tick: &Tick, compared: &mut Vec<Compared>) {
     let epoch = tick.read_epoch;
     if epoch == 0 || compared.last().is_some_and(|last| last.epoch == epoch) {

@@ -1,5 +1,5 @@
-//! All contacts of every tick, and the force of a proxy that they hold outside: computed here after the run, because a
-//! tick of the board has no time for them.
+//! All contacts of every tick, and the force of a proxy that they keep outside: computed on the host after the run,
+//! because the board has no time for them in a tick.
 
 use anyhow::Result;
 use controller::telemetry::Tick;
@@ -36,15 +36,14 @@ pub struct Touches {
     pub all: Vec<Touch>,
     contacts_mean: f64,
     contacts_max: usize,
-    /// Ticks whose buffer of contacts was full.
+    /// Ticks with more contacts than the buffer holds.
     contacts_cut: usize,
     proxy_force_max_n: f32,
-    /// Largest change in the size of a force from one tick to the next, of the same frame: the controller's, and the
-    /// proxy's.
+    /// Largest change in a force's magnitude between two ticks on the same frame: the controller's, and the proxy's.
     force_step_max_n: f32,
     proxy_force_step_max_n: f32,
-    /// Ticks with the instrument in the surface, and those of them at which a force was below that of the wall's spring at
-    /// first contact, but for the damper's part: the controller's, and the proxy's.
+    /// Ticks with the instrument in the surface, and the number of these in which a force was below that of the wall's
+    /// spring at first contact, apart from the damper's part: the controller's, and the proxy's.
     pub ticks_inside: usize,
     pub ticks_too_weak: usize,
     pub ticks_proxy_too_weak: usize,
@@ -53,7 +52,7 @@ pub struct Touches {
 }
 
 impl Touches {
-    /// Of a run.
+    /// The contacts of a run.
     pub fn of(scene: &Scene, link: &Link, ticks: &[Tick]) -> Result<Self> {
         match scene.tree.index_bits() {
             16 => Self::on(&scene.tree.tree::<u16>()?, scene, link, ticks),
@@ -101,7 +100,7 @@ impl Touches {
         Ok(touches)
     }
 
-    /// Adds a tick with the proxy's force.
+    /// Adds a tick and the proxy's force.
     fn add<const N: usize>(
         &mut self,
         before: &Tick,

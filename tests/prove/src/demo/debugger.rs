@@ -1,5 +1,4 @@
-//! A debugger that changes one byte of the emulated board's memory while it runs, by GDB's remote protocol, which QEMU
-//! serves.
+//! A debugger that changes one byte of the emulated board's memory as it runs, by the GDB remote protocol of QEMU.
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
@@ -14,7 +13,7 @@ pub struct Bits {
     pub mask: u8,
 }
 
-/// Flips bits on the board whose emulator serves the socket; the board pauses meanwhile.
+/// Flips bits on the board whose emulator listens at the socket; the board is paused meanwhile.
 pub fn flip(socket: &Path, bits: Bits) -> Result<()> {
     let mut board = UnixStream::connect(socket)?;
     let Bits { address, mask } = bits;
@@ -25,7 +24,7 @@ pub fn flip(socket: &Path, bits: Bits) -> Result<()> {
     ensure!(done == "OK", "the emulator does not write to {address:#x}: {done}");
     let now = ask(&mut board, &format!("m{address:x},1"))?;
     ensure!(now == format!("{after:02x}"), "{address:#x} holds {now} after it was written");
-    // Detached, the board continues.
+    // The board continues when the debugger detaches.
     ask(&mut board, "D").map(drop)
 }
 

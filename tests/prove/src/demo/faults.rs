@@ -20,10 +20,10 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Probability that a packet meets a fault.
+    /// Probability of a fault in a packet.
     pub const RATE: f64 = 0.03;
 
-    /// The kinds of faults: all that a line of packets without tags can have.
+    /// The kinds of faults: all that a line with packets without tags can have.
     pub const KINDS: &[Fault] = &[
         Fault::FlipOne,
         Fault::FlipTwo,
@@ -47,13 +47,13 @@ impl Plan {
         Self { seed, seconds }
     }
 
-    /// Ticks for which the line is cut once: longer than the controller's limit.
+    /// Ticks during which the line is cut once: longer than the controller's limit.
     pub const fn silence(bus: Bus) -> u32 {
         bus.trust().silence.1 + TICK_RATE / 2
     }
 
-    /// The tick after which the line is cut, as soon as a frame has arrived. It is early, because an emulated serial
-    /// line brings a frame in about a second, and frames after the silence must fit too.
+    /// The tick after which the line is cut, as soon as a frame has been published. It is early, because an emulated
+    /// serial line takes about a second for a frame, and frames after the silence must fit in the run as well.
     pub const fn silence_at(&self) -> u32 {
         self.seconds * TICK_RATE / 4
     }
@@ -71,7 +71,7 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// The planned faults that have happened.
+    /// The planned faults that occurred.
     pub fn new(plan: &Plan, injected: Vec<(Fault, u64)>) -> Self {
         let happened = injected.into_iter().filter(|&(_, count)| count > 0);
         let injected = happened.map(|(fault, count)| (fault.name(), count)).collect();
@@ -89,13 +89,13 @@ impl Faults {
 pub struct Silence {
     /// Tick of the first safe output.
     pub safe_at: u32,
-    /// From the last good packet to the first safe output.
+    /// Time from the last good packet to the first safe output.
     pub since_packet: u32,
-    /// From the last publication of a frame.
+    /// Time from the last published frame.
     pub since_frame: u32,
-    /// Age of the surface then: since its first packet.
+    /// Age of the surface then, from its frame's first packet.
     pub age: u32,
-    /// From the first safe output to the next nominal one: the line was cut for part of it.
+    /// Time from the first safe output to the next nominal one; the line was cut for a part of it.
     pub recovered_after: Option<u32>,
 }
 
@@ -111,7 +111,7 @@ impl Silence {
         let place = ticks.array_windows().position(is_lost)?;
         let (before, [safe, after @ ..]) = ticks.split_at(place + 1) else { return None };
         let earlier = |tick: &&Tick| tick.frames_published < safe.frames_published;
-        // The record after the last with fewer frames is the first that has it.
+        // The record after the last one with fewer frames is the first one with this frame.
         let published = before.iter().rev().find(earlier).map_or(0, |tick| tick.tick + 1);
         let nominal = after.iter().find(|tick| tick.state == State::Nominal as u32);
         Some(Self {

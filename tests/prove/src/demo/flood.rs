@@ -1,7 +1,7 @@
-//! A network that floods the controller: the sender's packets among garbage, repeats, fragments, ARP and broadcasts.
+//! A network that floods the controller: the sender's packets in garbage, repetitions, fragments, ARP and broadcasts.
 //!
-//! The emulator's socket backend takes raw Ethernet frames, one a datagram, so that frames arrive which no network stack
-//! would send.
+//! The emulator's socket backend accepts raw Ethernet frames, one a datagram, so that frames arrive that no network
+//! stack would send.
 
 use std::io::{self, Write};
 use std::net::{Ipv4Addr, UdpSocket};
@@ -21,30 +21,29 @@ use xtask::qemu;
 
 use super::sender::Link;
 
-/// Packets that the sender sends in one control tick: with twice as many the buffer has no room for a flood.
+/// Packets that the sender sends in one control tick: with twice as many the buffer would have no room for a flood.
 const PACKETS_A_TICK: u32 = 3;
 
-/// Frames of the flood in a control tick: ten times the packets of 60 frames a second.
+/// Frames of the flood in a control tick: ten times as many as the packets of 60 frames a second.
 const FLOOD_A_TICK: usize = 20;
 
-/// Ticks between two storms, and their frames: more than the board's buffer holds.
+/// Ticks between two bursts, and frames of a burst: more than the board's buffer holds.
 const STORM_EVERY: u32 = 50;
 const STORM: usize = 150;
 
-/// Ticks between two calms, and their ticks: a frame needs all of its packets, and without calms it is a matter of luck,
-/// and of the computer's load, whether any comes through.
+/// Ticks between two pauses of the flood, and ticks of a pause: a frame needs all of its packets, so without pauses it
+/// depends on chance, and on the host's load, whether any arrives completely.
 pub const CALM_EVERY: u32 = 1_000;
 pub const CALM: u32 = 100;
 
-/// The sender's addresses.
 const SENDER: ([u8; 6], [u8; 4], u16) = ([2, 0, 0, 0, 0, 2], [10, 0, 2, 2], 5001);
 
 const BROADCAST: [u8; 6] = [0xFF; 6];
 
-/// Time between two looks at the controller's tick.
+/// Interval at which the controller's tick is polled.
 const PAUSE: Duration = Duration::from_micros(200);
 
-/// A network without a switch: both ends and the flood share it.
+/// A network without a switch, shared by both ends and the flood.
 pub struct Wire {
     socket: UdpSocket,
     /// Frames with packets of the sender, to be repeated.
@@ -83,12 +82,12 @@ impl Wire {
         }))
     }
 
-    /// Another handle of the same network.
+    /// Another handle to the same network.
     pub fn share(&self) -> io::Result<Self> {
         Ok(Self { socket: self.socket.try_clone()?, sent: Arc::clone(&self.sent) })
     }
 
-    /// Floods the controller until it ends, with calms. Returns the frames sent.
+    /// Floods the controller until it ends, with pauses. Returns the number of frames sent.
     pub fn flood(&self, link: &Link, seed: u64) -> Result<u64> {
         let mut rng = Rng::with_seed(seed);
         let (mut tick, mut count) = (0, 0);
@@ -120,7 +119,7 @@ impl Wire {
     }
 }
 
-/// Makes a frame of one kind; `None` if it needs one that was sent before.
+/// Makes a frame of one kind; `None` if it needs a frame that was sent before.
 type Kind = fn(&mut Rng, &Wire) -> Option<Vec<u8>>;
 
 /// The kinds of frames in the flood.
@@ -144,25 +143,25 @@ fn cut(rng: &mut Rng, wire: &Wire) -> Option<Vec<u8>> {
     Some(frame)
 }
 
-/// A packet of the sender, again.
+/// A repetition of one of the sender's packets.
 fn repeat(rng: &mut Rng, wire: &Wire) -> Option<Vec<u8>> {
     rng.choice(wire.lock().iter()).cloned()
 }
 
-/// A part of a packet.
+/// A fragment of a packet.
 fn fragment(rng: &mut Rng, wire: &Wire) -> Option<Vec<u8>> {
     let packet = bytes(rng, 8, 300);
     let mut ip = Ipv4Header::new(packet.len() as u16, 64, IpNumber::UDP, SENDER.1, ADDRESS).ok()?;
     ip.more_fragments = rng.bool();
     ip.fragment_offset = IpFragOffset::try_new(rng.u16(1..8_000)).ok()?;
     ip.header_checksum = ip.calc_header_checksum();
-    // Now and then a real packet that says it is one.
+    // Sometimes a complete packet that claims to be a fragment.
     let whole = repeat(rng, wire)?;
     let packet = if rng.bool() { &packet } else { whole.get(34..)? };
     Some([&head(HARDWARE, EtherType::IPV4)[..], &ip.to_bytes(), packet].concat())
 }
 
-/// A question for a hardware address, the controller's or another.
+/// An ARP request for the controller's hardware address, or for another.
 fn question(rng: &mut Rng, _: &Wire) -> Option<Vec<u8>> {
     let question = ArpEthIpv4Packet {
         operation: if rng.bool() { ArpOperation::REQUEST } else { ArpOperation(rng.u16(..)) },
@@ -174,12 +173,12 @@ fn question(rng: &mut Rng, _: &Wire) -> Option<Vec<u8>> {
     Some([&head(BROADCAST, EtherType::ARP)[..], &question.to_bytes()].concat())
 }
 
-/// A broadcast of anything.
+/// A broadcast with random content.
 fn broadcast(rng: &mut Rng, _: &Wire) -> Option<Vec<u8>> {
     Some([&head(BROADCAST, EtherType(rng.u16(..)))[..], &bytes(rng, 46, 600)].concat())
 }
 
-/// A packet in whose headers bits are wrong: versions, lengths, checksums, addresses, ports.
+/// A packet with wrong bits in its headers: versions, lengths, checksums, addresses, ports.
 fn lie(rng: &mut Rng, wire: &Wire) -> Option<Vec<u8>> {
     let mut frame = repeat(rng, wire)?;
     for _ in 0..rng.usize(1..4) {
@@ -208,7 +207,7 @@ fn frame(packet: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// The sender's packets, in frames, a few in each control tick.
+/// The sender's packets as Ethernet frames, a few in each control tick.
 struct Frames {
     wire: Wire,
     link: Arc<Link>,
@@ -242,7 +241,7 @@ impl Write for Frames {
     }
 }
 
-/// The emulator may not have bound its port yet, or have ended: a datagram that is lost.
+/// The emulator may not have bound its port yet, or have ended: then a datagram is lost.
 fn or_refused(result: io::Result<usize>) -> io::Result<usize> {
     match result {
         Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => Ok(0),

@@ -1,4 +1,4 @@
-//! The forces on an instrument that nothing stops.
+//! Checks the forces on an instrument that nothing stops.
 
 use serde::Serialize;
 
@@ -14,20 +14,19 @@ pub struct Forces {
     steps: Steps,
     #[serde(flatten)]
     touches: Touches,
-    /// Ticks whose force was compared with that of the wall, and those of them that were within its margin.
+    /// Ticks whose force was compared with that of the wall, and the number of these within its margin.
     forces_compared: usize,
     forces_pushing: usize,
-    /// Those whose search a budget ended, along the last tick's direction.
+    /// Ticks among these whose search a budget ended, so that the last tick's direction was used.
     forces_kept: usize,
-    /// Ticks with another force.
     forces_wrong: usize,
-    /// The first of them.
+    /// The first tick with a wrong force.
     #[serde(skip)]
     first_wrong_force: u32,
 }
 
 impl Forces {
-    /// Of a run with a script.
+    /// The forces of a run with a script.
     pub fn of(outcome: &Outcome) -> Option<Self> {
         let (steps, touches) = outcome.path.clone()?;
         let pushed = Pushed::of(&outcome.ticks);
@@ -42,7 +41,7 @@ impl Forces {
         })
     }
 
-    /// What the run broke, in words.
+    /// The promises that the run broke, as text.
     pub fn broken(&self) -> Vec<String> {
         let mut broken = Vec::new();
         let (wrong, first) = (self.forces_wrong, self.first_wrong_force);

@@ -1,4 +1,4 @@
-//! How fresh the surface is, and the cost of the network that brings it.
+//! How old the surface is, and the cost of the network.
 
 use controller::TICK_RATE;
 use controller::telemetry::Tick;
@@ -7,13 +7,13 @@ use serde::Serialize;
 
 use super::session::Outcome;
 
-/// Clock counts of a control tick's interval.
+/// Clock counts in a control tick's period.
 const COUNTS_A_TICK: f64 = 25e6 / TICK_RATE as f64;
 
-/// The rate of frames, the ages of the surface acted on, and the network's work.
+/// The frame rate, the ages of the surfaces that were acted on, and the network's cost.
 #[derive(Serialize)]
 pub struct Freshness {
-    /// Frames published a second of the controller's own time, from the first to the last.
+    /// Published frames a second of the controller's time, from the first to the last.
     frames_per_second: f64,
     surface_age_mean_ms: f64,
     surface_age_max_ms: u32,
@@ -21,16 +21,16 @@ pub struct Freshness {
     network: Option<Network>,
 }
 
-/// The network's work.
+/// The cost of the network.
 #[derive(Serialize)]
 pub struct Network {
-    /// Ethernet frames taken, those with a packet for the controller's port, and the good packets among them.
+    /// Received Ethernet frames, those with a packet for the controller's port, and the good packets among them.
     frames: u32,
     packets: u32,
     packets_good: u32,
-    /// Questions for the hardware address.
+    /// ARP requests for the hardware address.
     questions: u32,
-    /// Shares of all instructions: of the driver and of reading frames; of checking and decoding the packets.
+    /// Fractions of all instructions: for the driver and parsing frames; for checking and decoding the packets.
     driver_share: f64,
     packet_share: f64,
 }

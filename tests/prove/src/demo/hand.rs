@@ -1,4 +1,4 @@
-//! What the pushes of a simulated hand came to: against the wall's force, and by commands that a filter admits.
+//! Results of a simulated hand's pushes: against the wall's force, and by commands that a filter admits.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,22 +18,22 @@ use super::check::Checked;
 use super::scene::Scene;
 use super::sender::{Link, Sent};
 
-/// By how much (mm) a filter's admitted motion may come nearer than it should, besides the accuracy: its documentation says
-/// half of it.
+/// Tolerance (mm) on the separation after a filter's admitted motion, in addition to the accuracy: the documentation
+/// states half of it.
 const SLACK: f64 = 0.02;
 
-/// How deep (mm) the hand may get against the wall's force: the force ends at 5 N, so a wall that comes faster than 25 mm/s
-/// against a push of 4.5 N is not left fast enough.
+/// Largest penetration (mm) of the hand against the wall's force: the force is limited to 5 N, so a wall that moves
+/// faster than 25 mm/s towards a push of 4.5 N catches up with it.
 const YIELDS: f64 = 1.0;
 
-/// The energy (mJ) that the wall may give to the hand, and the largest step of its force (N): the controller's account.
+/// Largest energy (mJ) that the wall may give to the hand, and largest step of its force (N): the controller's limits.
 const TANK: f64 = 1.0;
 const STEP: f32 = 0.5;
 
-/// Rounding of sums over a run.
+/// Allowance for the rounding of sums over a run.
 const ROUNDING: f64 = 1e-3;
 
-/// The words of [`controller::telemetry::reason_code`].
+/// Names of the codes of [`controller::telemetry::reason_code`].
 const REASONS: [&str; 8] = [
     "",
     "commanded",
@@ -45,7 +45,7 @@ const REASONS: [&str; 8] = [
     "nothing admitted",
 ];
 
-/// The first of them that promises nothing.
+/// The first of these codes that promises nothing.
 const UNSAFE: u32 = 6;
 
 /// A tick in which the surface was trusted.
@@ -56,18 +56,17 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// Whether the hand commands; else the wall's force resists it.
+    /// Whether the hand commands a motion; otherwise the wall's force resists it.
     pub const fn is_commanded(&self) -> bool {
         self.push.outcome > 0
     }
 
-    /// What the filter made of the command.
     pub fn reason(&self) -> Option<&'static str> {
         let reason = REASONS.get(self.push.outcome as usize).copied();
         reason.filter(|_| self.is_commanded())
     }
 
-    /// Speeds (mm/s): where nothing resists, and the instrument's.
+    /// Speeds (mm/s): of the unresisted motion, and of the instrument.
     pub fn speeds(&self) -> [f32; 2] {
         [self.push.commanded, self.push.moved].map(|velocity| Vec3::from(velocity).length())
     }
@@ -81,7 +80,7 @@ impl Moment {
         }
     }
 
-    /// Instructions that the guard's answer took, the filter's part included.
+    /// Instructions of the guard's answer, including those of the filter.
     pub fn instructions(&self) -> u64 {
         u64::from(self.tick.query_counts) * u64::from(qemu::INSTRUCTIONS_A_COUNT)
     }
@@ -92,14 +91,15 @@ impl Moment {
 pub struct Hand {
     by_force: Way,
     by_commands: Way,
-    /// Of the wall, in N: its largest force, and the largest change from tick to tick.
+    /// Largest force of the wall, and its largest change from tick to tick, in N.
     push_force_max_n: f32,
     push_force_step_max_n: f32,
-    /// The most energy that the wall had given to the hand at any time, beyond what the hand gave before, in mJ.
+    /// Largest energy (mJ) that the wall had given to the hand at any time, minus what the hand had given before.
     energy_given_max_mj: f64,
-    /// Ticks by what the filter made of the command.
+    /// Number of ticks by the filter's reason.
     reasons: BTreeMap<&'static str, usize>,
-    /// Ticks after an admitted motion that came nearer than the stand-off, less 0.02 mm and the accuracy, without a word of it.
+    /// Ticks after an admitted motion that came closer than the stand-off minus 0.02 mm and the accuracy, although its
+    /// reason promises otherwise.
     admitted_too_near: usize,
     /// Instructions of a filter's queries by the cost model.
     filter_instructions_mean: f64,
@@ -108,7 +108,7 @@ pub struct Hand {
     pub moments: Vec<Moment>,
 }
 
-/// The pushes of one way.
+/// The pushes of one kind.
 #[derive(Clone, Copy, Default, Serialize)]
 pub struct Way {
     ticks: usize,
@@ -116,23 +116,22 @@ pub struct Way {
     ticks_held: usize,
     /// Least separation (mm) from the surface that the controller searched.
     separation_min_mm: f64,
-    /// Least separation (mm) from the heart itself, at the ticks at which a frame was captured, and their number.
+    /// Least separation (mm) from the heart itself, at the ticks in which a frame was captured, and their number.
     heart_separation_min_mm: f64,
     heart_instants: usize,
-    /// Deepest penetration (mm) of either.
+    /// Largest penetration (mm) of either surface.
     penetration_max_mm: f64,
-    /// Mean speeds (mm/s) while it was held: where nothing resisted, and the instrument's.
+    /// Mean speeds (mm/s) while it was held: of the unresisted motion, and of the instrument.
     speed_commanded_mean: f64,
     speed_moved_mean: f64,
-    /// Instructions of an answer.
     answer_instructions_mean: f64,
     answer_instructions_max: u64,
-    /// Most of the closest pair's budget that a tick used, as a share.
+    /// Largest fraction of the closest pair's budget that a tick used.
     budget_used_max: f64,
 }
 
 impl Hand {
-    /// Of a run.
+    /// The results of a run.
     pub fn new(
         scene: &Scene,
         link: &Link,
@@ -150,7 +149,7 @@ impl Hand {
             let place = moments.binary_search_by_key(&tick, |moment| moment.tick.tick).ok()?;
             Some(&moments[place])
         };
-        // The heart itself, at the ticks at which a frame was captured.
+        // The heart itself, at the ticks in which a frame was captured.
         let heart: Vec<(u32, f64)> = link
             .all()
             .par_iter()
@@ -161,7 +160,8 @@ impl Hand {
             .filter(|checked| at(checked.tick).is_some())
             .map(|checked| (checked.tick, checked.separation))
             .collect();
-        // A push by commands begins where one by force ended, maybe too near: it counts from the first safe motion on.
+        // A push by commands begins where a push by force ended, which may be too close: it is checked from its first
+        // safe motion on.
         let mut is_settled = false;
         let mut unsettled = BTreeSet::new();
         for moment in &moments {
@@ -191,7 +191,7 @@ impl Hand {
         let instructions = || commanded.iter().map(|moment| moment.push.instructions);
         let sum: f64 = instructions().map(f64::from).sum();
         let near = separations.iter().filter(|(tick, apart)| {
-            // The motion was admitted in the tick before.
+            // The motion was admitted in the previous tick.
             let Some(before) = tick.checked_sub(1).and_then(at) else { return false };
             let says = before.push.outcome >= UNSAFE;
             let least =
@@ -230,7 +230,7 @@ impl Hand {
         }
     }
 
-    /// What the run broke, in words.
+    /// The promises that the run broke, as text.
     pub fn broken(&self, seconds: u32) -> Vec<String> {
         let mut broken = Vec::new();
         let mut promise = |is_kept: bool, sentence: String| {
@@ -248,7 +248,7 @@ impl Hand {
         promise(given <= TANK + ROUNDING, format!("the wall gave {given:.3} mJ to the hand"));
         let step = self.push_force_step_max_n;
         promise(step <= STEP, format!("the wall's force made a step of {step:.3} N"));
-        // Longer than two pushes: one of each way.
+        // The run is longer than two pushes: one of each kind.
         let held = self.by_force.ticks_held.min(self.by_commands.ticks_held);
         promise(seconds < 3 || held > 0, "the hand never pushed against the surface".to_owned());
         broken
@@ -321,7 +321,7 @@ impl Way {
         let instructions = || moments.clone().map(Moment::instructions);
         let used = moments.clone().map(|moment| {
             let Tick { node_tests, triangle_tests, .. } = moment.tick;
-            // The root's test is free.
+            // The root's test is not counted in the budget.
             let tests = node_tests.saturating_sub(1) + triangle_tests * Budget::TRIANGLE;
             f64::from(tests) / f64::from(BUDGET.tests())
         });

@@ -47,7 +47,7 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
             ],
         ),
     ];
-    // They are counted in the emulator only.
+    // They are only counted in the emulator.
     if moments.iter().any(|moment| moment.instructions() > 0) {
         let curves = vec![
             of("of the closest pair", BLUE_INK, &pushed, |m| m.instructions() as f32),

@@ -1,4 +1,4 @@
-//! The controller's machine: the emulated board, or this computer.
+//! The controller's machine: the emulated board, or the host.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -20,24 +20,20 @@ pub enum Machine {
     Board {
         /// The firmware.
         program: PathBuf,
-        /// Its log's file.
         log: &'static str,
-        /// Its needs of the board.
+        /// Its use of the board's memory.
         footprint: Footprint,
         /// The toolchains that built it.
         toolchain: String,
-        /// The emulator's version.
         emulator: String,
-        /// Its bus.
         bus: Bus,
         /// What moves its instrument.
         robot: Robot,
     },
     /// The same control logic as a program.
     Host {
-        /// The program.
         program: PathBuf,
-        /// Why it is not the board.
+        /// Why it runs here and not on the board.
         reason: String,
         /// What moves its instrument.
         robot: Robot,
@@ -79,7 +75,7 @@ impl Machine {
         }
     }
 
-    /// The controller in C, for which nothing stands in where it cannot be had.
+    /// The controller in C. If it is unavailable, there is no replacement.
     fn in_c(scene: &Scene) -> Result<Self> {
         ensure!(scene.tree.index_bits() == 16, "the C interface takes at most 65,536 vertices");
         let (cross, emulator, compiler) = (Cross::find()?, qemu::find()?, c_firmware::find()?);
@@ -93,8 +89,8 @@ impl Machine {
     }
 
     fn host(scene: &Scene, reason: String, robot: Robot) -> Result<Self> {
-        // This program contains the controller's library too. A separate folder for another surface, and the same
-        // selection of packages for this one, keep cargo from building anything twice.
+        // This build also contains the controller's library. A separate folder for another surface, and the same
+        // selection of packages for the default one, keep cargo from building anything twice.
         let folder = if scene.surface.is_default() {
             workspace::target()
         } else {
@@ -109,7 +105,6 @@ impl Machine {
         Ok(Self::Host { program: folder.join("release").join("host"), reason, robot })
     }
 
-    /// The controller's bus.
     pub const fn bus(&self) -> Bus {
         match self {
             Self::Board { bus, .. } => *bus,
@@ -124,8 +119,8 @@ impl Machine {
         }
     }
 
-    /// The command that runs the controller for `ticks` ticks, with this end of its bus, and its telemetry on a socket
-    /// that it connects to.
+    /// The command that runs the controller for `ticks` ticks, with this end of its bus. It connects to the socket
+    /// `telemetry` for its telemetry.
     pub fn command(&self, bus: &qemu::Bus, telemetry: &Path, ticks: u32) -> Command {
         let mut command = match self {
             Self::Board { program, robot, .. } => {

@@ -40,11 +40,10 @@ use xtask::workspace;
 pub const LATTICE: &str = "lattice:9,8,7";
 
 /// Streams a beating heart to the firmware while a simulated hand pushes its instrument against it, by force and by
-/// commands, and does not get in. Every answer is checked against exhaustive search.
+/// commands, without penetrating it. Every answer is checked against an exhaustive search.
 #[derive(clap::Args, Default)]
 pub struct Options {
-    /// Mesh of the surface at rest, in any format that `dibs build` reads; the generated heart of 10,272 triangles
-    /// if absent.
+    /// The mesh at rest, in any format that `dibs build` reads; the generated heart of 10,272 triangles if absent.
     #[arg(long, requires = "motion")]
     pub mesh: Option<PathBuf>,
     /// Its motion: .pc2, .npy or a series (heart_%03d.vtp), with a position for each of the mesh's vertices in every frame.
@@ -53,17 +52,17 @@ pub struct Options {
     /// Frames a second of the motion; by default the number in its file, or 25 without one.
     #[arg(long, value_name = "HZ", requires = "motion", allow_negative_numbers = true)]
     pub motion_rate: Option<f32>,
-    /// Limit on stretch of every triangle. By default the generated heart has 1.5, and a mesh of your own has limits
-    /// learned from its motion, with a tenth to spare.
+    /// Stretch limit of every triangle. By default 1.5 for the generated heart; for a mesh of your own, limits learned
+    /// from its motion with a margin of a tenth.
     #[arg(long, allow_negative_numbers = true)]
     pub stretch: Option<f32>,
-    /// The nodes of a lattice, `lattice:NX,NY,NZ`, carry the surface, a generated heart of 50,000 triangles, and are what the
-    /// frames hold; 9 x 8 x 7 cells if none are given.
+    /// The nodes of a lattice, `lattice:NX,NY,NZ`, move the surface, a generated heart of 50,000 triangles, and frames
+    /// hold their positions; 9 x 8 x 7 cells if none are given.
     #[arg(long, value_name = "VOLUME", num_args = 0..=1, default_missing_value = LATTICE, value_parser = scene::cells)]
     #[arg(conflicts_with_all = ["mesh", "c"])]
     pub nodes: Option<Cells>,
     /// A script moves the instrument instead of the hand, around the surface and through it: nothing stops it, so every
-    /// force is seen. With `--c` and `--faults` it does, too.
+    /// force is tested. This is the default with `--c` and `--faults`.
     #[arg(long, alias = "path")]
     pub script: bool,
     /// Seconds of the controller's time to run.
@@ -75,11 +74,11 @@ pub struct Options {
     /// Runs the controller in C, `examples/c/firmware`, compiled by Debian's `arm-none-eabi-gcc`.
     #[arg(long, conflicts_with = "host")]
     pub c: bool,
-    /// Takes a serial line for the bus, and not Ethernet: the heart beats in slow motion. The controllers on this
-    /// computer and in C know no other.
+    /// Uses a serial line as the bus instead of Ethernet: the heart beats in slow motion. The controllers on this
+    /// computer and in C support no other bus.
     #[arg(long)]
     pub serial: bool,
-    /// Puts faults of every kind on the bus, and silences it once for a while.
+    /// Injects faults of every kind into the bus, and cuts it once for a while.
     #[arg(long)]
     pub faults: bool,
     /// The faults' seed.
@@ -88,7 +87,7 @@ pub struct Options {
     /// Folder for the report and the pictures; `demo` in Cargo's target folder if absent.
     #[arg(short, long)]
     pub output: Option<PathBuf>,
-    /// Whether the board may be replaced by this computer where it cannot be had.
+    /// Whether the host must not replace the board if the board is unavailable.
     #[arg(skip)]
     pub board_only: bool,
     /// Whether the host's controller has been built beside this program.
@@ -103,7 +102,7 @@ impl Options {
     }
 }
 
-/// Runs the demo and writes its report and pictures; an error names each promise that was broken.
+/// Runs the demo and writes its report and pictures; an error names each broken promise.
 pub fn run(options: &Options) -> Result<()> {
     let scene = Scene::load(options)?;
     println!("surface: {}", scene.describe());
@@ -120,7 +119,7 @@ pub fn run(options: &Options) -> Result<()> {
         Harm::Nothing
     };
     let outcome = session::run(&scene, &machine, options.seconds, &harm, &folder)?;
-    // Made before anything is written, since it names the commit, and whether it is clean.
+    // Made before anything is written, because it states the commit, and whether the checkout is clean.
     let report = Report::new(&scene, &machine, &outcome)?;
     plot::draw(&outcome, &folder)?;
     hand_plot::draw(&outcome, &folder)?;
@@ -133,7 +132,7 @@ pub fn run(options: &Options) -> Result<()> {
     report.verdict()
 }
 
-/// The demo of `cargo xtask test`, on this computer: the script.
+/// The demo of `cargo xtask test` on this computer, with the script.
 pub fn on_host(seconds: u32) -> Result<Outcome> {
     run(&Options { seconds, host: true, script: true, is_built: true, ..Options::default() })
         .map(|()| Outcome::Passed)

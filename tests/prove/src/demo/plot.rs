@@ -20,7 +20,7 @@ const POINTS: usize = 1_500;
 /// Seconds without a value that interrupt a curve.
 const GAP: f64 = 0.1;
 
-/// Room around a chart, and for the labels on its left, in pixels.
+/// Margin around a chart, and for the labels on its left, in pixels.
 const MARGIN: i32 = 12;
 const LABELS: i32 = 70;
 
@@ -32,12 +32,11 @@ pub const RED_INK: RGBColor = RGBColor(190, 50, 40);
 pub const GREEN_INK: RGBColor = RGBColor(0, 120, 90);
 pub const ORANGE_INK: RGBColor = RGBColor(230, 140, 0);
 
-/// Draws `separation.svg` (with contacts and forces below it) and, where instructions were counted,
-/// `instructions.svg`.
+/// Draws `separation.svg` (with contacts and forces below it) and, if instructions were counted, `instructions.svg`.
 pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let answered: Vec<&Tick> = outcome.ticks.iter().filter(|tick| tick.is_answered()).collect();
     let (Some(first), Some(last)) = (answered.first(), answered.last()) else { return Ok(()) };
-    // Longer than nothing, and the same for curves without a point: a chart of no length is never done.
+    // The duration is positive even without a point, because drawing a chart of length zero never ends.
     let time = at(first.tick, 0.0).0..at(last.tick + 1, 0.0).0;
     if let Some((_, touches)) = &outcome.path {
         separation(&answered, touches, &time, folder)?;
@@ -45,7 +44,6 @@ pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     instructions(&answered, &time, folder)
 }
 
-/// Draws `separation.svg`.
 fn separation(
     answered: &[&Tick],
     touches: &Touches,
@@ -57,7 +55,7 @@ fn separation(
     root.fill(&WHITE).map_err(failed)?;
     let (upper, rest) = root.split_vertically(280);
     let (middle, lower) = rest.split_vertically(200);
-    // They differ where the budget ended before a depth was known.
+    // They differ if the budget ended before a depth was known.
     let interval = [
         Curve::new("certainly at most", ORANGE_INK, answered, |tick| {
             at(tick.tick, tick.separation.into())
@@ -83,7 +81,6 @@ fn separation(
     root.present().map_err(failed)
 }
 
-/// Draws `instructions.svg`, where instructions were counted.
 fn instructions(answered: &[&Tick], time: &Range<f64>, folder: &Path) -> Result<()> {
     let instructions = |tick: &Tick| f64::from(tick.query_counts * qemu::INSTRUCTIONS_A_COUNT);
     if answered.iter().any(|tick| tick.query_counts > 0) {
@@ -105,7 +102,7 @@ pub fn at(tick: u32, value: f64) -> (f64, f64) {
     (f64::from(tick) / f64::from(TICK_RATE), value)
 }
 
-/// Values over time, thinned out so that every stretch of time keeps its least and largest.
+/// Values over time, thinned out such that the least and largest values of every interval are kept.
 fn extremes<T>(ticks: &[&T], point: impl Fn(&T) -> (f64, f64)) -> Vec<(f64, f64)> {
     let of_chunk = |chunk: &[&T]| {
         let by_value = |a: &(f64, f64), b: &(f64, f64)| a.1.total_cmp(&b.1);
@@ -167,7 +164,7 @@ pub fn curves(
         chart.draw_series(LineSeries::new(zero, RED_INK)).map_err(failed)?;
     }
     for &Curve { ink, ref points, .. } in curves {
-        // A time without a value is a gap.
+        // A period without a value is a gap.
         let runs = points.chunk_by(|before, after| after.0 - before.0 < GAP);
         let paths = runs.map(|run| PathElement::new(run, ink));
         chart.draw_series(paths).map_err(failed)?;
@@ -178,7 +175,7 @@ pub fn curves(
     Ok(())
 }
 
-/// The curves' names, in a row above their chart, where they hide none of it.
+/// The curves' names, in a row above their chart, so that they hide nothing.
 fn names(
     area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
     curves: &[Curve],

@@ -7,29 +7,29 @@ use glam::{DVec3, Vec3};
 
 use super::check::accuracy_of;
 
-/// Least distance (mm) of the axis from the surface: below, the direction between them is not exact enough, and a
-/// crossing axis has another.
+/// Least distance (mm) of the axis from the surface: for smaller distances the direction between them is not accurate
+/// enough, and a crossing axis has another direction.
 const CLEAR: f64 = 0.5;
 
-/// How far a force may be off, in N: along its direction, and across it the largest one.
+/// Tolerance of a force, in N: along its direction, and across it for the largest force.
 const TOLERANCE: f64 = 0.01;
 
 /// The forces of a run.
 #[derive(Clone, Copy, Default)]
 pub struct Pushed {
-    /// Ticks whose force was checked: the instrument's axis is outside.
+    /// Ticks whose force was checked: those with the instrument's axis outside.
     pub checked: usize,
-    /// Of these, the ones within the wall's margin.
+    /// Checked ticks within the wall's margin.
     pub pushing: usize,
-    /// And the ones whose search a budget ended, which push along the last tick's direction.
+    /// Checked ticks whose search a budget ended, so that they push along the last tick's direction.
     pub kept: usize,
-    /// Ticks with another force than the wall's, or along another direction than the pair's; and the first of them.
+    /// Ticks with a wrong force, or a direction that is not the pair's; and the first of them.
     pub wrong: usize,
     pub first: u32,
 }
 
 impl Pushed {
-    /// Checks every tick that can be.
+    /// Checks every tick whose record suffices.
     pub fn of(ticks: &[Tick]) -> Self {
         let mut pushed = Self::default();
         for pair in ticks.windows(2) {
@@ -42,7 +42,7 @@ impl Pushed {
                 && expected.farther <= accuracy_of(tick);
             let is_kept = !is_pair && is_cut(tick) && tick.direction == before.direction;
             pushed.kept += usize::from(is_kept);
-            // A NaN is wrong, too.
+            // NaN counts as wrong.
             let is_right = off <= TOLERANCE && (is_pair || is_kept);
             if !is_right {
                 if pushed.wrong == 0 {
@@ -60,19 +60,19 @@ fn is_cut(tick: &Tick) -> bool {
     f64::from(tick.separation) - f64::from(tick.lower) > 2.0 * accuracy_of(tick)
 }
 
-/// What a tick's record lets one expect.
+/// The force that is expected from a tick's record.
 struct Expected {
     /// The force of a spring and a damper along the recorded direction, in N.
     force: DVec3,
-    /// How far (radians) the recorded direction is from that between the recorded points.
+    /// Angle (radians) between the recorded direction and that of the recorded points.
     turned: f64,
-    /// How much farther (mm) the recorded point of the axis is than the axis' nearest. Where the axis runs along the
-    /// surface, many are nearest within rounding, and each has its own direction.
+    /// Distance (mm) of the axis' recorded point minus that of its nearest point. If the axis is parallel to the
+    /// surface, many points are nearest within rounding, and each has its own direction.
     farther: f64,
 }
 
 impl Expected {
-    /// `None` where the record does not tell.
+    /// `None` if the record does not suffice.
     fn of(before: &Tick, tick: &Tick) -> Option<Self> {
         if !tick.is_answered() || tick.state == State::Safe as u32 || before.tick + 1 != tick.tick {
             return None;

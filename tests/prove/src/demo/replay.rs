@@ -16,8 +16,8 @@ use xtask::workspace;
 use super::hand::Hand;
 use super::scene::Scene;
 
-/// Writes the page, with the instrument of every tick, what a hand's filter or wall made of it, and the files that it is made of. Without `dibs` or its page,
-/// says how to make them.
+/// Writes the page, with the instrument of every tick, the response of the filter or the wall, and its input files.
+/// Without `dibs` or its page, it prints how to make them.
 pub fn write(scene: &Scene, ticks: &[Tick], hand: Option<&Hand>, folder: &Path) -> Result<()> {
     let dibs = workspace::target().join("release/dibs");
     let page = workspace::target().join("viewer/dibs-viewer.html");
@@ -53,8 +53,8 @@ pub fn write(scene: &Scene, ticks: &[Tick], hand: Option<&Hand>, folder: &Path) 
     Ok(())
 }
 
-/// A line for each tick: of a push by commands the filter's reason and the separation that it keeps, of one by force the energy
-/// that the wall has left.
+/// A line for each tick: for a push by commands the filter's reason and the certified separation, for a push by force
+/// the wall's remaining energy.
 fn record(ticks: &[Tick], hand: &Hand) -> Result<String> {
     let mut moments = hand.moments.iter().peekable();
     let mut record = String::new();

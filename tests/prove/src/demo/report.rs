@@ -28,7 +28,7 @@ use crate::harness::run::Run;
 /// Instructions a second of the emulated processor's time.
 const INSTRUCTION_RATE: f64 = 25e6 * qemu::INSTRUCTIONS_A_COUNT as f64;
 
-/// The result of a run, for machines and people. Facts that a run on the host cannot show are `null`.
+/// The result of a run, for machines and people. Figures that a run on the host cannot measure are `null`.
 #[derive(Serialize)]
 pub struct Report {
     frames_sent: u32,
@@ -38,27 +38,27 @@ pub struct Report {
     freshness: Freshness,
     /// The faults on the bus.
     faults: Option<Faults>,
-    /// The states that a silent line led to.
+    /// The states caused by a silent line.
     silence: Option<Silence>,
     /// Events on the bus, by their names in the wire protocol.
     bus_events: BTreeMap<&'static str, u32>,
     ticks: u32,
     queries: usize,
-    /// Answers off by more than their stated accuracy.
+    /// Answers whose error exceeds their stated accuracy.
     mismatches: usize,
     /// Largest error of an answer, in units of its stated accuracy.
     largest_error: f64,
-    /// Largest stated accuracy but for the vertices' position error, in mm.
+    /// Largest stated accuracy without the vertices' position error, in mm.
     accuracy_mm: f32,
     /// Largest distance between a vertex and its quantised position on the bus, in mm.
     position_error_mm: f32,
     separation_min_mm: f32,
     separation_max_mm: f32,
     force_max_n: f32,
-    /// Of a scripted instrument.
+    /// Results of a scripted instrument.
     #[serde(flatten)]
     forces: Option<Forces>,
-    /// Of an instrument that a hand pushes.
+    /// Results of an instrument that a hand pushes.
     #[serde(flatten)]
     hand: Option<Hand>,
     /// Ticks before the first frame, when the output is safe.
@@ -70,24 +70,24 @@ pub struct Report {
     /// Every change of the fail-safe machine's state.
     transitions: Vec<Transition>,
     instructions_mean: Option<f64>,
-    /// Of answers whose axis is outside, so that no depth was searched.
+    /// For answers whose axis is outside, so that no depth was searched.
     instructions_outside_mean: Option<f64>,
     instructions_max: Option<u64>,
     node_tests_mean: f64,
     triangle_tests_mean: f64,
-    /// Most nodes that the tracker's front had open.
+    /// Largest number of nodes that the tracker had open.
     front_max: u32,
-    /// Answered ticks in which the front did not serve, the first among them.
+    /// Answered ticks that were whole queries, including the first one.
     fallbacks: usize,
-    /// Of these, those because the front has too few places.
+    /// Whole queries because the tracker was full.
     fallbacks_full: usize,
     deadline_misses: Option<u32>,
-    /// Longest time from a tick's due moment to its first instruction, in microseconds.
+    /// Longest time from a tick's due time to its first instruction, in microseconds.
     latency_max_us: Option<f64>,
-    /// Longest time from a tick's due moment to its end, in microseconds.
+    /// Longest time from a tick's due time to its end, in microseconds.
     tick_max_us: Option<f64>,
     flash_bytes: Option<u64>,
-    /// Flash of the tree alone.
+    /// Flash of the tree only.
     tree_bytes_per_triangle: f64,
     /// Variables and the deepest stack.
     ram_bytes: Option<u64>,
@@ -95,13 +95,13 @@ pub struct Report {
     /// Longest section with all interrupts disabled, in microseconds, rounded up to the clock's next
     /// count: 0.04 us.
     masked_max_us: Option<f64>,
-    /// Longest section with the bus interrupt disabled, without the control ticks in it.
+    /// Longest section with the bus interrupt disabled, without the control ticks during it.
     bus_masked_max_us: Option<f64>,
-    /// Rounds of the background check of the tree in flash.
+    /// Completed rounds of the background check of the tree in flash.
     scrub_rounds: Option<u32>,
     /// Frames whose vertices in the controller's memory were all compared with the sent ones after publication.
     frames_compared: usize,
-    /// Of these, the ones that differed.
+    /// Compared frames that differed.
     frames_published_wrong: usize,
     records_lost: u32,
     real_seconds: f64,
@@ -237,7 +237,7 @@ impl Report {
         );
         let wrong = self.frames_published_wrong;
         promise(wrong == 0, format!("{wrong} published frames differ from what was sent"));
-        // The last frame may have been published too late to be read in full.
+        // The last frame may have been published too late to be read completely.
         let (compared, published) = (self.frames_compared, self.frames_published);
         promise(
             compared + 1 >= published as usize,
@@ -255,10 +255,10 @@ impl Report {
             promise(recovered.is_some(), "it did not recover from the silence".to_owned());
         } else {
             promise(rejected == 0, format!("{rejected} packets or frames were rejected"));
-            // The last frame may have been on its way when the run ended.
+            // The last frame may have been in flight when the run ended.
             promise(published + 1 >= sent, format!("{published} of {sent} frames were published"));
         }
-        // The rate of frames depends on this computer; the promise is the behaviour without one.
+        // The frame rate depends on the host; the promise is that without frames the output is safe.
         let trust = outcome.bus.trust();
         let acting = || outcome.ticks.iter().filter(|tick| tick.state != State::Safe as u32);
         let too_old = acting().filter(|tick| tick.age > trust.age.1).count();
@@ -425,7 +425,7 @@ fn events(summary: &Summary) -> BTreeMap<&'static str, u32> {
     counted.filter(|&(_, count)| count > 0).map(|(event, count)| (event.name(), count)).collect()
 }
 
-/// Size of a tick's force, in N.
+/// Magnitude of a tick's force, in N.
 pub fn force(tick: &Tick) -> f32 {
     glam::Vec3::from(tick.force).length()
 }

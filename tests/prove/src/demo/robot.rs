@@ -3,14 +3,14 @@
 /// What moves the instrument.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Robot {
-    /// A simulated hand, that the wall or a filter stops.
+    /// A simulated hand, which the wall or a filter stops.
     Hand,
     /// A script that nothing stops.
     Script,
 }
 
 impl Robot {
-    /// The controller's word for it.
+    /// The controller's argument for it.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Hand => "hand",

@@ -15,11 +15,11 @@ use xtask::workspace;
 
 use super::Options;
 
-/// Triangles of the generated heart: those of the paper's.
+/// Triangles of the generated heart: the number in the paper.
 const HEART_TRIANGLES: u32 = 10_272;
-/// Triangles of the heart that nodes carry.
+/// Triangles of the heart that nodes move.
 const CARRIED_TRIANGLES: u32 = 50_000;
-/// Frames a second where a motion's file does not say it.
+/// Frames a second if a motion's file does not state it.
 const RATE: f32 = 25.0;
 /// Margin of the limits that are learned from a motion.
 const MARGIN: f32 = 0.1;
@@ -38,7 +38,6 @@ pub fn cells(text: &str) -> Result<Cells> {
 
 /// The moving surface, and the firmware's tree of it.
 pub struct Scene {
-    /// The surface's name.
     name: String,
     /// The input of the firmware's build script.
     pub surface: Surface,
@@ -46,7 +45,7 @@ pub struct Scene {
     pub tree: BuiltTree,
     /// The motion, in the mesh's order of vertices, or in that of the nodes.
     pub motion: Motion,
-    /// Of each row of the tree's vertices, the nodes that carry it and their weights; none where rows are vertices.
+    /// For each vertex row of the tree, the nodes that move it and their weights; empty if rows are vertices.
     carriers: Vec<[(u32, f64); 4]>,
     /// Frames a second at which the motion was recorded.
     pub rate: f32,
@@ -116,7 +115,7 @@ impl Scene {
         })
     }
 
-    /// A heart that the nodes of a lattice carry.
+    /// A heart that the nodes of a lattice move.
     fn carried(options: &Options, cells: [u32; 3]) -> Result<Self> {
         let mesh = generate::heart(CARRIED_TRIANGLES)?.mesh;
         let volume = Volume::lattice(&mesh, cells)?;
@@ -125,7 +124,8 @@ impl Scene {
         let stretch = options.stretch.unwrap_or(HEART_STRETCH);
         let builder = Builder::new().stretch(stretch).with_rest_shape(false);
         let tree = builder.nodes(&volume).build(&mesh)?;
-        // The firmware's build script makes the same tree of this file. An older one is left, so that nothing is built anew.
+        // The firmware's build script makes the same tree from this file. An unchanged file is not rewritten, so that
+        // nothing is rebuilt.
         let path =
             workspace::target().join(format!("demo-heart-{:08x}.ply", tree.summary().mesh_id));
         if !path.exists() {
@@ -149,7 +149,7 @@ impl Scene {
         })
     }
 
-    /// The surface's vertices at a frame's rows, in f64 and rounded once.
+    /// The surface's vertices for a frame's rows, computed in f64 and rounded once.
     pub fn vertices<'r>(&self, rows: &'r [Vec3]) -> Cow<'r, [Vec3]> {
         if self.carriers.is_empty() {
             return Cow::Borrowed(rows);
@@ -161,8 +161,8 @@ impl Scene {
         Cow::Owned(self.carriers.iter().map(vertex).collect())
     }
 
-    /// How far (mm) a vertex that the controller computes may be from that of [`vertices`](Self::vertices), by what it
-    /// states.
+    /// Largest distance (mm) of a vertex that the controller computes from that of [`vertices`](Self::vertices), as the
+    /// tree states it.
     pub fn rounding(&self, rows: &[Vec3]) -> Result<f64> {
         fn of<I: Index>(scene: &Scene, rows: &[Vec3]) -> Result<f64> {
             let nodes = Nodes::of(&scene.tree.tree::<I>()?)?;

@@ -25,18 +25,17 @@ const PAUSE: Duration = Duration::from_micros(300);
 /// Real time in which a byte arrives, unless it was lost.
 const ARRIVAL: Duration = Duration::from_millis(500);
 
-/// Messages between sender and listener.
+/// State shared by sender and listener.
 #[derive(Default)]
 pub struct Link {
-    /// Bytes that the controller has counted.
+    /// Number of bytes that the controller has counted.
     pub bytes: AtomicU32,
     /// The controller's tick.
     pub tick: AtomicU32,
-    /// Frames sent to the last byte.
+    /// Number of completely sent frames.
     pub frames_sent: AtomicU32,
     /// Set when the controller has ended.
     pub over: AtomicBool,
-    /// The frames by their epochs.
     frames: Mutex<HashMap<u32, Sent>>,
 }
 
@@ -45,7 +44,7 @@ pub struct Link {
 pub struct Sent {
     /// The vertices, or nodes, exactly as the controller decodes them.
     pub rows: Arc<Vec<Vec3>>,
-    /// The controller's tick at which the heart was so.
+    /// The controller's tick at which the frame was captured.
     pub captured: u32,
 }
 
@@ -75,12 +74,12 @@ impl Link {
     }
 }
 
-/// A writer that is flushed once most has arrived: an emulated serial line lets the computer run seconds ahead, and an
-/// Ethernet controller drops packets that do not fit its buffer.
+/// A writer that waits at a flush until most bytes have arrived: an emulated serial line lets the host run seconds
+/// ahead, and an Ethernet controller drops packets that do not fit in its buffer.
 pub struct Paced<W> {
     writer: W,
     link: Arc<Link>,
-    /// Bytes that may be on their way after a flush.
+    /// Bytes that may be in flight after a flush.
     window: u32,
     sent: u32,
 }
@@ -117,8 +116,8 @@ impl<W: Write> Write for Paced<W> {
     }
 }
 
-/// Sends the motion repeatedly until the controller ends: at the recorded rate, or as fast as the line allows and the
-/// controller acknowledges.
+/// Sends the motion repeatedly until the controller ends: at the recorded rate, or as fast as the line and the
+/// controller's acknowledgements allow.
 ///
 /// Returns the count of each fault.
 pub fn send(
@@ -137,7 +136,7 @@ pub fn send(
         Some(plan) => FaultyLine::new(line, plan.seed, Plan::KINDS, Plan::RATE),
         None => FaultyLine::new(line, 0, &[], 0.0),
     };
-    // The emulated board's time is slower than this computer's: a frame's age and heartbeats are in the board's.
+    // The emulated board's time is slower than the host's: a frame's age and the heartbeats use the board's time.
     let clock = Arc::clone(link);
     let sender = Sender::<_, MTU>::new(line, order, settings);
     let mut sender = sender.with_clock(move || Duration::from_millis(clock.now().into()));
@@ -157,14 +156,14 @@ fn send_all(
     let rate = if faults.is_some() { Plan::RATE } else { 0.0 };
     let mut silence = faults.map(Plan::silence_at);
     let mut is_recovering = false;
-    // A board that starts has no network yet: the emulator would report the first packet as one that it cannot deliver.
+    // A board that is starting has no network yet: the emulator would report that the first packet cannot be delivered.
     while link.now() == 0 {
         if link.is_over() {
             return Ok(());
         }
         thread::sleep(PAUSE);
     }
-    // Every frame must echo a status: the controller does not trust a frame of unknown delay.
+    // Every frame must echo a status: the controller does not trust a frame with unknown transit time.
     while sender.status().is_none() {
         if !rest(link, sender) {
             return Ok(());
@@ -172,8 +171,8 @@ fn send_all(
     }
     let mut start = link.now();
     for positions in frames.iter().cycle() {
-        // Before the silence and after it no frame has faults until the controller is nominal, so that only the silence
-        // is measured: faults keep the surface from being fresh for as long as that takes.
+        // Before the silence, and after it until the controller is nominal, no frame has faults, so that only the
+        // silence is measured: faults would delay a fresh surface.
         if silence.is_some_and(|at| link.now() >= at) {
             sender.transport().set_rate(0.0);
         }
@@ -184,13 +183,13 @@ fn send_all(
         }
         match sender.transmit(frame) {
             Ok(_) => (),
-            // The controller has ended its run; the listener decides whether rightly.
+            // The controller has ended its run; the listener decides whether that is correct.
             Err(SendError::Line(_)) => return Ok(()),
             Err(error) => return Err(error.into()),
         }
         link.frames_sent.fetch_add(1, Ordering::Relaxed);
         let sent = link.now();
-        // A frame that begins while the one before is being checked would be refused.
+        // A frame that begins while the previous one is being checked would be refused.
         let is_waiting = |in_flight: u32| {
             let now = link.now();
             now < start + interval || in_flight > 0 && now < sent + bus.answer()
@@ -200,7 +199,7 @@ fn send_all(
                 return Ok(());
             }
         }
-        // A frame that was late lets the next one start sooner, but by no more than one interval.
+        // After a late frame the next one may start earlier, but by at most one interval.
         start = (start + interval).max(link.now().saturating_sub(interval));
         if sender.in_flight() > 0 {
             start = link.now();

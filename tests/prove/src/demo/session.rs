@@ -30,52 +30,49 @@ use super::scene::Scene;
 use super::sender::{Link, send};
 use super::steps::Steps;
 
-/// Real time that a connected controller may stay silent.
+/// Real time that a connected controller may be silent.
 const SILENCE: Duration = Duration::from_secs(30);
 
-/// The harm done to a run.
+/// Disturbances of a run.
 #[derive(Clone, Copy)]
 pub enum Harm {
     Nothing,
     /// Faults on the bus.
     Bus(Plan),
-    /// Bits of the board's memory are flipped as soon as a frame is published.
+    /// Bits of the board's memory that are flipped as soon as a frame is published.
     Memory(Bits),
-    /// A flood of Ethernet frames, drawn from this seed.
+    /// A flood of Ethernet frames, generated from this seed.
     Flood(u64),
 }
 
 /// The results of a run.
 pub struct Outcome {
-    /// The controller's bus.
     pub bus: Bus,
     /// The record of every tick.
     pub ticks: Vec<Tick>,
-    /// The network's part of the run, if the bus is Ethernet.
+    /// The network's figures, if the bus is Ethernet.
     pub network: Option<Network>,
-    /// The controller's summary.
     pub summary: Summary,
     /// The check of every answer.
     pub checked: Vec<Checked>,
     /// The comparison of every published frame.
     pub compared: Vec<Compared>,
-    /// Of a scripted instrument: the force's steps at new frames, and all contacts of every tick.
+    /// For a scripted instrument: the force's steps at new frames, and all contacts of every tick.
     pub path: Option<(Steps, Touches)>,
-    /// Of an instrument that a hand pushes.
+    /// Results of an instrument that a hand pushes.
     pub hand: Option<Hand>,
     /// The faults on the bus, if any.
     pub faults: Option<Faults>,
-    /// Frames of a flood that were sent.
+    /// Number of frames sent by a flood.
     pub flood: u64,
-    /// The last tick that was known when memory was changed, if it was.
+    /// The last known tick when memory was changed, if it was.
     pub flipped_at: Option<u32>,
     /// Ticks requested.
     pub ticks_asked: u32,
-    /// Frames sent to the last byte.
+    /// Number of completely sent frames.
     pub frames_sent: u32,
     /// Whether the controller ended with success.
     pub exited_well: bool,
-    /// The controller's command.
     pub command: String,
     /// Real time that the run took.
     pub took: Duration,
@@ -179,7 +176,7 @@ pub fn run(
     })
 }
 
-/// Ends the controller when the run fails halfway.
+/// Ends the controller if the run fails.
 struct Guard(Child);
 
 impl Drop for Guard {
@@ -216,7 +213,7 @@ pub fn accept(socket: &UnixListener, child: &mut Child) -> Result<UnixStream> {
     }
 }
 
-/// A controller's telemetry.
+/// The telemetry of a controller.
 struct Heard {
     ticks: Vec<Tick>,
     pushes: Vec<Push>,
@@ -277,7 +274,6 @@ fn listen(
     }
 }
 
-/// The progress line of a tick.
 fn line(tick: &Tick) -> String {
     let instructions = u64::from(tick.query_counts) * u64::from(qemu::INSTRUCTIONS_A_COUNT);
     let epoch = tick.epoch;

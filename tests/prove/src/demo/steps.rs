@@ -1,4 +1,4 @@
-//! The steps of the force at new frames: on the surface that moves on between them, and on one that is held.
+//! The steps of the force at new frames: on the extrapolated surface, and on one that is held between frames.
 
 use anyhow::{Context, Result};
 use controller::telemetry::Tick;
@@ -14,28 +14,28 @@ use super::report::force;
 use super::scene::Scene;
 use super::sender::Link;
 
-/// The steps in the force's size from the last tick of a frame to the first of the next.
+/// The steps of the force's magnitude from the last tick of a frame to the first tick of the next.
 #[derive(Clone, Copy, Default, Serialize)]
 pub struct Steps {
-    /// New frames at which the output was not safe, and the instrument's axis outside the surface. Inside, the force is
-    /// at its largest.
+    /// New frames at which the output was not safe, and the instrument's axis was outside the surface. Inside, the
+    /// force is at its maximum.
     new_frames: usize,
-    /// Of the controller's force, in N.
+    /// Steps of the controller's force, in N.
     force_step_continuous_mean_n: f64,
     force_step_continuous_max_n: f64,
-    /// The tick of the largest.
+    /// The tick of the largest step.
     force_step_continuous_max_tick: u32,
-    /// Of the same wall's force with the same instrument and margin, were the surface held from frame to frame.
+    /// The same for the force of the same wall, instrument and margin on a surface that is held from frame to frame.
     force_step_held_mean_n: f64,
     force_step_held_max_n: f64,
-    /// Largest error of an extrapolation at the next frame, in mm.
+    /// Largest error of an extrapolation when the next frame arrives, in mm.
     extrapolation_error_max_mm: f32,
-    /// Share of the answered ticks on a surface that had moved on from its frame.
+    /// Fraction of the answered ticks on a surface that was extrapolated beyond its frame.
     moved_on: f64,
 }
 
 impl Steps {
-    /// Of a run.
+    /// The steps of a run.
     pub fn of(scene: &Scene, link: &Link, ticks: &[Tick]) -> Result<Self> {
         match scene.tree.index_bits() {
             16 => Self::on(&scene.tree.tree::<u16>()?, scene, link, ticks),

@@ -1,4 +1,4 @@
-//! The rows of the surface that a tick was asked on, on its way from one frame to the next.
+//! The rows of the surface that a tick searched, between or beyond two frames.
 
 use anyhow::{Context, Result};
 use controller::telemetry::Tick;
@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::sender::Link;
 
-/// The rows of the vertex table, or the nodes, at a tick, with the sums of `dibs_nostd::SurfaceBlend`.
+/// The vertex rows, or the nodes, at a tick, computed with the same sums as `dibs_nostd::SurfaceBlend`.
 pub fn rows(link: &Link, tick: &Tick) -> Result<Vec<Vec3>> {
     let frame = |epoch| {
         link.frame(epoch)

@@ -15,7 +15,7 @@ const DEGRADED: RGBColor = RGBColor(252, 226, 160);
 const SAFE: RGBColor = RGBColor(240, 170, 160);
 const NOMINAL: RGBColor = RGBColor(214, 236, 208);
 
-/// Draws `states.svg`: the surface's age over the states, with the rejections so far below.
+/// Draws `states.svg`: the surface's age over the states, and below it the number of rejections so far.
 pub fn draw(outcome: &Outcome, folder: &Path) -> Result<()> {
     let picture = folder.join("states.svg");
     let root = SVGBackend::new(&picture, (900, 560)).into_drawing_area();

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 use super::subject::{LIMIT, Log, Receiver, TREE};
 
-/// Longest time that the board may take for an operation.
+/// Timeout of an operation on the board.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A board that runs the probe `bus`.
@@ -34,7 +34,6 @@ pub struct Board {
 }
 
 impl Board {
-    /// Boots the probe with this MAC.
     pub fn boot<M: Mac>(program: &Path, mac: &M) -> Result<Self> {
         let folder = tempfile::tempdir()?;
         let blob = TREE.blob();
@@ -74,7 +73,7 @@ impl Board {
         Ok(board)
     }
 
-    /// Waits until all bytes sent are processed.
+    /// Waits until all sent bytes are processed.
     fn wait(&mut self, log: &Log) -> Result<()> {
         let mut buffer = [0; 512];
         while self.received != Some(self.sent) {

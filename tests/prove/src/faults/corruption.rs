@@ -23,15 +23,15 @@ const PROBABILITIES: [f64; 8] = [0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.3];
 /// One run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// `whole`, or `partial`: the moved vertices, and a whole frame when the receiver asks for one.
+    /// `whole`; or `partial`: only moved vertices, and a whole frame when the receiver requests one.
     pub frames: &'static str,
-    /// Share of the packets that are damaged.
+    /// Fraction of the packets that are damaged.
     pub packets_damaged: f64,
     pub frames_sent: u32,
     pub frames_published: u32,
     /// Published frames a second.
     pub throughput: f64,
-    /// Age of the published surface, at the moments when a frame has been sent, in ms.
+    /// Age of the published surface, at the times when a frame has been sent, in ms.
     pub age_mean_ms: f64,
     pub age_p99_ms: f64,
     pub age_max_ms: f64,
@@ -115,7 +115,7 @@ fn one(partial: bool, probability: f64, frames: u32, seed: u64) -> Result<Row> {
     })
 }
 
-/// Throughput and age against the share of damaged packets.
+/// Throughput and age by the fraction of damaged packets.
 pub fn figure(rows: &[Row]) -> Result<String> {
     let mut svg = String::new();
     {

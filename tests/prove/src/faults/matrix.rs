@@ -17,13 +17,13 @@ use super::subject::{
     Case, Controller, Log, N, Receiver, Source, TREE, framed, mac_under, noticed, source, surface,
 };
 
-/// Faults that one sender and one receiver see.
+/// Number of faults for one pair of sender and receiver.
 const CHUNK: u64 = 500;
 
-/// Undisturbed frames after which a receiver that still publishes nothing has failed.
+/// Undisturbed frames after which a receiver that publishes nothing has failed.
 const PATIENCE: u32 = 20;
 
-/// The place of the receivers.
+/// Where the receivers run.
 #[derive(Clone, Copy)]
 pub enum Place<'p> {
     /// In this process.
@@ -33,7 +33,7 @@ pub enum Place<'p> {
 }
 
 impl Place<'_> {
-    /// Starts a receiver, and runs `work` with it.
+    /// Starts a receiver, and calls `work` with it.
     fn with<M: Mac>(self, mac: M, work: impl FnOnce(&mut dyn Receiver)) {
         match self {
             Self::Here => {
@@ -50,7 +50,7 @@ impl Place<'_> {
 pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
     let of_one = match place {
         Place::Here => CHUNK,
-        // Covers every way to send, even with few faults.
+        // Enough for every way of sending, even with few faults.
         Place::Board(_) => per_fault.div_ceil(8),
     };
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} faults  {msg}")?;
@@ -77,11 +77,11 @@ pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Some faults of one kind: every way to send in turn.
+/// Some faults of one kind, with each way of sending in turn.
 fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Row {
     let case = Case { quantised: chunk & 1 == 0, partial: chunk & 2 == 0 };
-    // Tags would catch sealed faults before the layers that they test. So only forgeries have tags, and every second
-    // run of faults that are not sealed.
+    // Tags would reveal sealed faults before the layers that they are meant for. So tags are only used for forgeries,
+    // and in every second run of faults that are not sealed.
     let is_sealed = matches!(
         fault,
         Fault::StaleEpoch
@@ -99,7 +99,7 @@ fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Ro
     }
 }
 
-/// One sender, and the receivers that it sees.
+/// One sender, and its receivers.
 struct Life<'p, M> {
     place: Place<'p>,
     source: Source<M>,
@@ -159,12 +159,11 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         life.row
     }
 
-    /// The challenge that a receiver draws when it starts.
+    /// A challenge as a receiver would choose it at its start.
     fn any_mac(&mut self) -> M {
         (self.keyed_mac)(if M::TAGGED { u64::from(self.rng.u32(..)) } else { 0 })
     }
 
-    /// The next frame's packets.
     fn next_frame(&mut self, controller: &mut dyn Receiver) -> Vec<Vec<u8>> {
         // A hello is answered at once.
         for _ in 0..3 {
@@ -200,7 +199,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         while since.is_none() {
             (before, published) = (noticed(controller.counters()), controller.published());
             let packets = self.next_frame(controller);
-            // Some faults apply only to the begin.
+            // Some faults apply only to the begin packet.
             let first = if self.rng.bool() { 0 } else { self.rng.usize(..packets.len()) };
             for (place, packet) in packets.iter().enumerate() {
                 let is_due = since.is_none() && place >= first;
@@ -237,7 +236,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         self.judge(is_noticed, is_published, since.unwrap_or(0), controller);
     }
 
-    /// The sender starts anew in the middle of a frame.
+    /// Restarts the sender in the middle of a frame.
     fn restart_of_sender(&mut self, controller: &mut dyn Receiver) {
         let before = noticed(controller.counters());
         let packets = self.next_frame(controller);
@@ -257,7 +256,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         self.judge(is_noticed, is_published, packets.len() as u32, controller);
     }
 
-    /// The receiver starts anew in the middle of a frame.
+    /// Restarts the receiver in the middle of a frame.
     fn restart_of_receiver(&mut self) {
         let (place, mut missed) = (self.place, Vec::new());
         place.with(self.any_mac(), |controller| {

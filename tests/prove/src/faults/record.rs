@@ -35,8 +35,8 @@ pub const UNDETECTABLE: [&str; 4] = [
 ];
 
 impl Record {
-    /// Runs the matrix with this many faults of each kind; on this computer also frames on a bad line, and for a full
-    /// record the sizes of frames.
+    /// Runs the matrix with this many faults of each kind; on the host also frames on a bad line, and for a full record
+    /// the sizes of frames.
     pub fn measure(
         per_fault: u64,
         place: Place<'_>,
@@ -56,8 +56,8 @@ impl Record {
         Ok(Self { run, per_fault, seed: SEED, undetectable, matrix, corruption, sizes })
     }
 
-    /// An error if anything was published that was never sent, if a fault was neither noticed nor harmless,
-    /// or if the receiver did not recover.
+    /// Fails if anything was published that was never sent, if a fault was neither detected nor harmless, or if the
+    /// receiver did not recover.
     pub fn verdict(&self) -> Result<()> {
         let broken = self.broken();
         ensure!(broken.is_empty(), "broken promises:\n  {}", broken.join("\n  "));
@@ -96,7 +96,7 @@ impl Record {
         std::fs::create_dir_all(&figures)
             .with_context(|| format!("cannot make {}", figures.display()))?;
         let mut files = vec![(path.to_path_buf(), json)];
-        // The board's record has the matrix alone.
+        // The board's record contains only the matrix.
         if !self.corruption.is_empty() {
             files.push((figures.join("faults.svg"), corruption::figure(&self.corruption)?));
         }

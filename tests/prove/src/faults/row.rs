@@ -11,21 +11,21 @@ use serde::Serialize;
 pub struct Row {
     pub fault: &'static str,
     pub injected: u64,
-    /// Something was rejected, abandoned or ignored as a duplicate, or the frame was not published.
+    /// Faults after which something was rejected, abandoned or ignored as a duplicate, or the frame was not published.
     pub detected: u64,
-    /// No effect was noticed, and the frame was published as sent.
+    /// Number of faults without a noticed effect, where the frame was published as sent.
     pub harmless: u64,
-    /// A surface was published that was not sent.
+    /// Number of published surfaces that were not sent.
     pub published_wrong: u64,
     /// Count of each cause.
     pub rejected: BTreeMap<&'static str, u64>,
-    /// Undisturbed frames until one was published; 0 if the disturbed one was.
+    /// Mean number of undisturbed frames until one was published; 0 if the disturbed one was.
     pub recovered_frames_mean: f64,
     pub recovered_frames_max: u32,
     /// Packets from the fault to the next publication.
     pub recovered_packets_mean: f64,
     pub recovered_packets_max: u32,
-    /// Faults after which no frame was published any more.
+    /// Number of faults after which no frame was published any more.
     pub not_recovered: u64,
     #[serde(skip)]
     pub(super) sums: [u64; 2],
@@ -54,7 +54,7 @@ impl fmt::Display for Row {
 }
 
 impl Row {
-    /// Both counts together.
+    /// The sum of both counts.
     pub fn plus(mut self, other: Self) -> Self {
         self.injected += other.injected;
         self.detected += other.detected;

@@ -1,4 +1,4 @@
-//! Bytes of a frame of a beating heart, by way of sending.
+//! Bytes of a frame of a beating heart, by the way of sending.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -33,12 +33,12 @@ pub struct Row {
     pub vertices: usize,
     /// The way of sending.
     pub frames: String,
-    /// Frames a second: those of the record, or one a control tick, in between.
+    /// Frames a second: those of the recording, or interpolated ones, one in each control tick.
     pub rate: f32,
     pub bytes_per_frame: f64,
     pub bytes_max: usize,
     pub packets_per_frame: f64,
-    /// Largest distance of a vertex from the receiver's, in mm; of modes, in any recorded frame.
+    /// Largest distance of a vertex from the receiver's, in mm; for modes, over all recorded frames.
     pub error_mm: f32,
     pub bytes_per_second: f64,
 }
@@ -126,7 +126,7 @@ fn heart(name: &'static str, mesh: &Mesh, motion: &Motion) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Modal frames: only the weights, one frame each control tick.
+/// Modal frames: only the weights, one frame in each control tick.
 fn modal(
     heart: &'static str,
     mesh: &Mesh,
@@ -159,7 +159,7 @@ fn modal(
         .collect()
 }
 
-/// The motion at a moment, in frames: between the two around it.
+/// The motion at a time in frames: interpolated between two frames.
 fn at(motion: &Motion, moment: f32) -> Vec<Vec3> {
     let frames = &motion.frames;
     let (first, share) = (moment as usize % frames.len(), moment.fract());

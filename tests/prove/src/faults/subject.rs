@@ -1,4 +1,4 @@
-//! A small surface with its tree, a sender and a receiver of it.
+//! A small surface with its tree, a sender and a receiver.
 
 use std::collections::VecDeque;
 use std::f32::consts::{PI, TAU};
@@ -32,7 +32,7 @@ const STRETCH: f32 = 1.3;
 /// Limit on the coordinates, in mm.
 pub const LIMIT: f32 = 400.0;
 
-/// An egg of some 12 cm: the smallest heart takes ten times as long.
+/// An egg of some 12 cm: the smallest heart would take ten times as long.
 static MESH: LazyLock<Mesh> = LazyLock::new(|| {
     let ring = |i: usize| {
         (0..RINGS).map(move |j| {
@@ -57,11 +57,10 @@ static MESH: LazyLock<Mesh> = LazyLock::new(|| {
     Mesh { positions, triangles, ..Mesh::default() }
 });
 
-/// The surface's tree.
 pub static TREE: LazyLock<BuiltTree> =
     LazyLock::new(|| Builder::new().stretch(STRETCH).build(&*MESH).expect("a tree"));
 
-/// The surface at a moment: a wandering bump, so that between two moments some vertices move and some do not.
+/// The surface at a time: a moving bump, so that some vertices move from frame to frame and some do not.
 pub fn surface(moment: u32) -> Vec<Vec3> {
     let rest = &MESH.positions;
     let at = rest[(moment as usize * 7) % rest.len()];
@@ -73,14 +72,14 @@ pub fn surface(moment: u32) -> Vec<Vec3> {
 /// Time between two frames, in ms.
 pub const FRAME_MS: u32 = 40;
 
-/// The way in which a run sends.
+/// A way of sending.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub quantised: bool,
     pub partial: bool,
 }
 
-/// The transport of a sender: packets sent, and packets to receive.
+/// A sender's transport: the sent packets, and packets to be received.
 #[derive(Default)]
 pub struct Mailbox {
     pub sent: Vec<Vec<u8>>,
@@ -122,15 +121,15 @@ pub fn source<M: Mac>(
         .with_clock(now)
 }
 
-/// The frames that were sent to the last packet, each as the receiver must have it.
+/// The completely sent frames, each as the receiver must have it.
 #[derive(Default)]
 pub struct Log(VecDeque<(u32, Vec<[u32; 3]>)>);
 
-/// More frames than any fault refers back to.
+/// More frames than any fault may refer back to.
 const REMEMBERED: usize = 64;
 
 impl Log {
-    /// Notes the frame that the sender has prepared last.
+    /// Records the frame that the sender has prepared last.
     pub fn note<M: Mac>(&mut self, source: &Source<M>) {
         if let Some((epoch, positions)) = source.held() {
             let bits = positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
@@ -141,12 +140,12 @@ impl Log {
         }
     }
 
-    /// Removes the last frame, which was not sent to its end.
+    /// Removes the last frame, which was not completely sent.
     pub fn forget_last(&mut self) {
         self.0.pop_back();
     }
 
-    /// Whether a frame of this number was sent with exactly these positions.
+    /// Whether a frame with this epoch and exactly these positions was sent.
     fn has(&self, epoch: u32, positions: &impl VertexTable) -> bool {
         let is_equal = |bits: &[[u32; 3]]| {
             (0..).zip(bits).all(|(row, bits)| {
@@ -167,18 +166,16 @@ impl Log {
     }
 }
 
-/// A receiving end, on this computer or the board.
+/// A receiver, on the host or the board.
 pub trait Receiver {
-    /// Its counters.
     fn counters(&self) -> &Counters;
 
-    /// Its status at this moment.
+    /// Its present status.
     fn status(&mut self) -> Vec<u8>;
 
-    /// A packet arrives as one message.
     fn message(&mut self, packet: &[u8], log: &Log);
 
-    /// Bytes arrive on a stream.
+    /// Receives bytes of a stream.
     fn bytes(&mut self, bytes: &[u8], log: &Log);
 
     /// Frames published since the start.
@@ -188,14 +185,14 @@ pub trait Receiver {
     fn wrong(&self) -> u64;
 }
 
-/// The receiver on this computer: the work of the bus interrupt, and a check of the control tick's view.
+/// The receiver on the host: the work of the bus interrupt, and a check of the frames that the control tick would read.
 pub struct Controller<'f, M> {
     deframer: Deframer<MTU>,
     assembler: Assembler<'f, StretchMonitor<'f, u16>, M>,
     reader: FrameReader<'f>,
     published: u32,
     wrong: u64,
-    /// In ms: some pass with each status.
+    /// Time in ms, which advances with each status.
     now: u32,
 }
 
@@ -207,7 +204,7 @@ impl<'f, M: Mac> Controller<'f, M> {
         Self { deframer: Deframer::new(), assembler, reader, published: 0, wrong: 0, now: 0 }
     }
 
-    /// Checks and publishes, in slices, and compares the published frame with the sent one.
+    /// Checks and publishes in slices, and compares the published frame with the sent one.
     fn work(&mut self, log: &Log) {
         for _ in 0..100 {
             match self.assembler.advance(WORK) {
@@ -265,7 +262,6 @@ impl<M: Mac> Receiver for Controller<'_, M> {
     }
 }
 
-/// The MAC under a challenge.
 pub fn mac_under(challenge: u64) -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, challenge)
 }
@@ -276,7 +272,7 @@ pub fn framed(packet: &[u8]) -> Vec<u8> {
     enframe(packet, &mut line).expect("packets fit").to_vec()
 }
 
-/// Rejections of each cause, abandoned frames and duplicates: the signs of a fault.
+/// The counts of rejections by cause, of abandoned frames and of duplicates: the signs of a fault.
 pub fn noticed(counters: &Counters) -> Vec<u32> {
     Event::ALL
         .into_iter()

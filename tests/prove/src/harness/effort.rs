@@ -3,23 +3,23 @@
 /// Sizes of the checks.
 #[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub struct Effort {
-    /// Cases on this computer.
+    /// Cases of checks on the host.
     pub cases: usize,
     /// Poses whose side must be right.
     pub sides: usize,
     /// Walks of 400 ticks against a filter of commands.
     pub walks: u64,
-    /// The same on the board, and glides about the heart with their ticks.
+    /// The same on the board, and glides near the heart with their number of ticks.
     pub board_walks: u64,
     pub board_glides: u64,
     pub board_glide_ticks: u32,
-    /// Ticks of a path, with each of some budgets.
+    /// Ticks of a path with each of several budgets.
     pub bounded_ticks: usize,
-    /// Queries that must give the same bits.
+    /// Queries whose bits must be the same.
     pub bits: usize,
-    /// Queries that must keep to their bound.
+    /// Queries that must stay within their bound.
     pub costs: usize,
-    /// The same on this computer, under callgrind.
+    /// The same on the host, under callgrind.
     pub host_costs: usize,
     /// Ticks of table 3's path on the board.
     pub ticks: u32,
@@ -27,25 +27,24 @@ pub struct Effort {
     pub poses: usize,
     /// Frames chosen to make the firmware's tick long.
     pub tick_frames: usize,
-    /// Queries under which frames are published.
+    /// Queries during which frames are published.
     pub torn: u32,
-    /// Faults of each kind on the bus of this computer.
+    /// Faults of each kind on the host's bus.
     pub faults: u64,
     /// Faults of each kind on the board's bus.
     pub board_faults: u64,
-    /// Seconds of the controller's time.
+    /// Duration of the demo, in seconds of the controller's time.
     pub demo_seconds: u32,
-    /// The same, with faults on the bus.
+    /// The same with faults on the bus.
     pub fault_seconds: u32,
-    /// The same, on a flooded network.
+    /// The same on a flooded network.
     pub flood_seconds: u32,
-    /// Seconds of each fuzz target.
     pub fuzz_seconds: u32,
-    /// Whether the records go to the documents, unlike those of a run of the tests.
+    /// Whether the records are written to the documents; not for a run of the tests.
     pub is_record: bool,
-    /// Whether the checks on request are among them.
+    /// Whether the checks that run on request are included.
     pub is_whole: bool,
-    /// Divisor of the full size's cases.
+    /// Divisor of the full number of cases.
     pub share: u32,
 }
 
@@ -103,7 +102,7 @@ impl Effort {
         share: 0,
     };
 
-    /// One in `share` of the cases, but at least as many as in a run of the tests.
+    /// A fraction 1 / `share` of the cases, but at least as many as in a run of the tests.
     pub fn divided(self, share: u32) -> Self {
         let wide = |full: usize, least: usize| (full / share as usize).max(least);
         let narrow = |full: u32, least: u32| (full / share).max(least);
@@ -133,7 +132,7 @@ impl Effort {
         }
     }
 
-    /// For the records: `full`, `1/4`, or `test`.
+    /// The size as the records state it: `full`, `1/4`, or `test`.
     pub fn size(&self) -> String {
         match self.share {
             0 => "test".to_owned(),

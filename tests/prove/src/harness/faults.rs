@@ -1,4 +1,4 @@
-//! The fault matrix in docs/evidence/guarantees.md: of the host from docs/evidence/faults.json, of the board from
+//! The fault matrix in docs/evidence/guarantees.md: for the host from docs/evidence/faults.json, for the board from
 //! docs/evidence/faults-board.json, which have the same rows.
 
 use std::collections::BTreeMap;
@@ -12,10 +12,10 @@ use xtask::workspace;
 use super::markdown::grouped;
 use super::run::Run;
 
-/// A record of `crate::faults`; the board's has the matrix alone.
+/// A record of `crate::faults`; the board's contains only the matrix.
 #[derive(Deserialize)]
 struct Faults {
-    /// Older records have none.
+    /// Missing in older records.
     run: Option<Run>,
     matrix: Vec<Kind>,
     #[serde(default)]
@@ -64,7 +64,7 @@ struct Size {
     error_mm: f64,
 }
 
-/// The chapter; empty without a record.
+/// The chapter; empty if there is no record.
 pub fn render() -> Result<String> {
     let mut out = String::new();
     if let Some(host) = read("faults.json")? {
@@ -88,7 +88,7 @@ pub fn render() -> Result<String> {
     Ok(out)
 }
 
-/// Names the run of a chapter.
+/// Writes which run a chapter is from.
 fn of(out: &mut String, run: Option<&Run>) -> Result<()> {
     match run {
         Some(Run { date, commit, machine, size, .. }) => {

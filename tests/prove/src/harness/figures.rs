@@ -12,13 +12,13 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// A number.
+    /// Records a number.
     pub fn note(&mut self, name: &str, value: f64) {
         println!("{name}: {value}");
         self.measured.insert(name.to_owned(), Value::from(value));
     }
 
-    /// A text.
+    /// Records a text.
     pub fn text(&mut self, name: &str, value: String) {
         println!("{name}: {value}");
         self.measured.insert(name.to_owned(), Value::from(value));

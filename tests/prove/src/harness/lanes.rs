@@ -1,4 +1,4 @@
-//! Two lanes of checks: most wait for one emulator, which takes one core; sanitizers, fuzzers, the model checker and
+//! Two lanes of checks: most wait for one emulator, which occupies one core. Sanitizers, fuzzers, the model checker and
 //! others without an emulator run in a second process, whose output is shown once both have ended.
 
 use std::env;
@@ -19,13 +19,13 @@ use super::{Effort, Measured};
 use crate::checks::{BESIDE, CHECKS};
 use crate::demo;
 
-/// Files by which the two processes communicate.
+/// Files through which the two processes communicate.
 const EFFORT: &str = "effort.json";
 const FOUND: &str = "found.json";
 const STEPS: &str = "steps.txt";
 const LOG: &str = "log.txt";
 
-/// How long the second process may take after the first.
+/// Time that the second process may take after the first has ended.
 const PATIENCE: Duration = Duration::from_mins(12);
 
 /// The results of the second process.
@@ -42,10 +42,9 @@ pub struct Beside {
 }
 
 impl Beside {
-    /// Starts it.
     pub fn start(effort: &Effort) -> Result<Self> {
         let folder = workspace::target().join("beside");
-        // Removed, so that no file of an earlier run is taken for this one's.
+        // Removed, so that no file of an earlier run is mistaken for this one's.
         if folder.exists() {
             fs::remove_dir_all(&folder)?;
         }

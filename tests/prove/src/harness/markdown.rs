@@ -53,12 +53,12 @@ pub fn render(records: &[Record]) -> Result<String> {
     Ok(out)
 }
 
-/// The last run that made a measurement.
+/// The last run that measured anything.
 fn newest(records: &[Record]) -> Option<&Run> {
     records.iter().map(|record| &record.run).max()
 }
 
-/// States the rows' commit, or that of each row if they differ.
+/// States the commit of all rows, or of each row if they differ.
 fn provenance(out: &mut String, records: &[Record], newest: Option<&Run>) -> Result<()> {
     let Some(newest) = newest else { return Ok(()) };
     let missing = promises().filter(|(_, p)| records.iter().all(|r| r.id != p.id)).count();
@@ -107,7 +107,7 @@ impl Record {
         !self.promise.is_empty() || is_counted
     }
 
-    /// Names its run, if that is not the newest.
+    /// States its run, if that is not the newest.
     fn of(&self, newest: Option<&Run>) -> String {
         match newest {
             Some(newest) if !newest.is_of_the_same(&self.run) => {
@@ -118,7 +118,7 @@ impl Record {
     }
 }
 
-/// `{id}` in a text stands for the figure of that record.
+/// Replaces `{id}` in a text by the figure of that record.
 fn with_figures(text: &str, records: &[Record]) -> String {
     let mut text = text.to_owned();
     for record in records {
@@ -130,7 +130,7 @@ fn with_figures(text: &str, records: &[Record]) -> String {
     text
 }
 
-/// A number with thousands separated, or a text.
+/// A number with separated thousands, or a text.
 fn shown(figure: &Value) -> String {
     let Some(number) = figure.as_f64() else {
         return figure.as_str().map_or_else(|| figure.to_string(), |text| format!("`{text}`"));
@@ -141,7 +141,7 @@ fn shown(figure: &Value) -> String {
     grouped(number as u64)
 }
 
-/// A number with thousands separated.
+/// A number with separated thousands.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut grouped = String::new();

@@ -1,6 +1,6 @@
-//! One harness for every promise. A check, one file in `checks/`, measures figures and states a promise for each; the
-//! records join both in docs/evidence/guarantees.json, and docs/evidence/guarantees.md is made from the records. `cargo xtask test` runs
-//! the same checks on fewer cases, and compares their figures with the records.
+//! One harness for all promises. A check, one file in `checks/`, measures figures and states a promise for each; the
+//! records combine both in docs/evidence/guarantees.json, from which docs/evidence/guarantees.md is made. `cargo xtask
+//! test` runs the same checks on fewer cases, and compares their figures with the records.
 
 mod effort;
 mod faults;
@@ -24,9 +24,9 @@ use run::Run;
 
 /// A check, and the promises of its figures.
 pub struct Check {
-    /// The step's name; `--only` selects by it.
+    /// The step's name, which `--only` selects by.
     pub name: &'static str,
-    /// One for every figure that the check measures.
+    /// One promise for every figure that the check measures.
     pub promises: &'static [Promise],
     /// Measures.
     pub run: fn(&Effort, &mut Figures) -> Result<Outcome>,
@@ -35,33 +35,33 @@ pub struct Check {
 /// Measures every promise, and writes docs/evidence/guarantees.json and docs/evidence/guarantees.md.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Fits the constants of the cost model anew (`--only board`, `--only host`: of one machine), and ends; the
-    /// checks are another run, of a program that has them.
+    /// Fits the constants of the cost model again (`--only board`, `--only host`: for one machine), and ends; then run
+    /// the checks with a program that has the new constants.
     #[arg(long)]
     fit: bool,
     /// Seconds of each fuzz target.
     #[arg(long, default_value_t = 60)]
     fuzz_seconds: u32,
-    /// Makes docs/evidence/guarantees.md anew from docs/evidence/guarantees.json, and measures nothing.
+    /// Makes docs/evidence/guarantees.md from docs/evidence/guarantees.json, without measuring.
     #[arg(long)]
     render: bool,
-    /// As few cases as `cargo xtask test` takes, for a quick look.
+    /// As few cases as `cargo xtask test` uses, for a quick look.
     #[arg(long)]
     quick: bool,
-    /// One in so many of the full size's cases, but no fewer than `cargo xtask test` takes.
+    /// This fraction (1/N) of the full number of cases, but no fewer than `cargo xtask test` uses.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
     share: u32,
-    /// Only checks whose names contain this; the other records stay as they are.
+    /// Only checks whose names contain this; the other records are not changed.
     #[arg(long)]
     only: Option<String>,
-    /// Only checks that are not recorded at this commit and size; each is recorded at its end, so that a run that was stopped
-    /// goes on.
+    /// Only checks that are not recorded at this commit and size; each is recorded when it ends, so that an interrupted
+    /// run can continue.
     #[arg(long, conflicts_with_all = ["only", "quick"])]
     resume: bool,
-    /// Golden figures whose names begin so may be recorded above the lowest that was ever recorded.
+    /// Golden figures whose names start with this may be recorded above the lowest value ever recorded.
     #[arg(long, value_delimiter = ',', requires = "because")]
     raise: Vec<String>,
-    /// The defect that was mended, or the feature that is worth it.
+    /// The reason: a defect that was fixed, or a feature that is worth it.
     #[arg(long, default_value = "")]
     because: String,
 }
@@ -88,7 +88,7 @@ pub fn guarantees(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Measures the checks that are not recorded at this commit and size, one after the other.
+/// Measures the checks that are not recorded at this commit and size, one after another.
 fn resume(effort: &Effort, raise: Raise<'_>) -> Result<()> {
     let mut steps = Steps::default();
     for check in CHECKS {
@@ -113,7 +113,7 @@ pub fn test(effort: &Effort, steps: &mut Steps) {
     });
 }
 
-/// The figures of a run, and the checks that could not run here.
+/// The figures of a run, and the checks that could not run.
 pub struct Measured {
     pub figures: Figures,
     pub skipped: Vec<&'static str>,
@@ -150,7 +150,7 @@ impl Measured {
 fn run(effort: &Effort, only: Option<&str>, steps: &mut Steps) -> Measured {
     let mut measured = Measured::new(Run::now(effort.size()));
     if let Some(only) = only {
-        // Its name is a request.
+        // Naming a check requests it.
         let effort = &Effort { is_whole: true, ..*effort };
         measured.run_each(effort, |name| name.contains(only), steps);
         return measured;
@@ -164,7 +164,7 @@ fn run(effort: &Effort, only: Option<&str>, steps: &mut Steps) -> Measured {
 }
 
 impl Check {
-    /// The promises that the figures break, except those that depend on the records.
+    /// The promises that the figures break, except those that need the records.
     fn broken(&self, figures: &Figures) -> Vec<String> {
         self.promises.iter().filter_map(|promise| promise.broken(figures)).collect()
     }
@@ -175,7 +175,7 @@ impl Promise {
     pub fn broken(&self, figures: &Figures) -> Option<String> {
         let figure = figures.get(self.id)?;
         let other = |name: &str| figures.get(name)?.as_f64();
-        // A text, or JSON's substitute for a NaN, keeps no bound.
+        // A text, or the null that JSON has for NaN, breaks every bound.
         let is_kept = match figure.as_f64() {
             Some(number) => self.bound.holds(number, other),
             None => matches!(self.bound, promise::Bound::Informs),

@@ -6,7 +6,7 @@ use std::fmt;
 pub struct Promise {
     /// The figure's name.
     pub id: &'static str,
-    /// One sentence; empty for a figure that another one's text, or the table of instructions, shows.
+    /// One sentence; empty for a figure that another one's text, or the table of instructions, contains.
     pub says: &'static str,
     /// Criterion of IEC 62304, 5.5.4.
     pub criterion: &'static str,
@@ -19,18 +19,18 @@ pub struct Promise {
 /// The bound of a figure.
 #[derive(Clone, Copy)]
 pub enum Bound {
-    /// It informs.
+    /// No bound: the figure is information only.
     Informs,
     Is(f64),
     AtMost(f64),
     AtLeast(f64),
-    /// Not above another figure.
+    /// At most another figure.
     NotAbove(&'static str),
-    /// At most [`TOLERANCE`] per cent above the lowest figure ever recorded, unless that was raised for a reason.
+    /// At most [`TOLERANCE`] per cent above the lowest figure ever recorded, unless it was raised for a reason.
     Golden,
 }
 
-/// Per cent by which a golden figure may be above its floor.
+/// Per cent by which a golden figure may exceed its floor.
 pub const TOLERANCE: f64 = 5.0;
 
 impl fmt::Display for Bound {
@@ -47,7 +47,7 @@ impl fmt::Display for Bound {
 }
 
 impl Bound {
-    /// Whether a figure keeps it; `other` returns other figures. The records judge a golden bound.
+    /// Whether a figure satisfies the bound; `other` returns other figures. Golden bounds are checked with the records.
     pub fn holds(self, figure: f64, other: impl Fn(&str) -> Option<f64>) -> bool {
         match self {
             Self::Informs | Self::Golden => true,

@@ -1,4 +1,4 @@
-//! The records in docs/evidence/guarantees.json: one a promise, each with the run that measured it.
+//! The records in docs/evidence/guarantees.json: one for each promise, with the run that measured it.
 
 // Requirements: E-01, E-02
 
@@ -22,13 +22,13 @@ pub struct Record {
     pub promise: String,
     /// Criterion of IEC 62304, 5.5.4.
     pub criterion: String,
-    /// The check that measures it: `cargo xtask guarantees --only` takes its name.
+    /// The check that measures it, as for `cargo xtask guarantees --only`.
     pub check: String,
     pub figure: Value,
     pub bound: String,
     pub unit: String,
     pub limits: String,
-    /// For a golden figure, the lowest ever recorded, or the one that it was raised to.
+    /// For a golden figure, the lowest ever recorded, or the value that it was raised to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor: Option<f64>,
     /// Why the floor was raised, and from which figure.
@@ -37,7 +37,7 @@ pub struct Record {
     pub run: Run,
 }
 
-/// Golden figures that may be recorded above their floor, by the beginnings of their names, and the reason.
+/// Prefixes of the names of golden figures that may be recorded above their floor, and the reason.
 #[derive(Clone, Copy, Default)]
 pub struct Raise<'a> {
     pub names: &'a [String],
@@ -77,7 +77,7 @@ pub fn promises() -> impl Iterator<Item = (&'static Check, &'static Promise)> {
     CHECKS.iter().flat_map(|check| check.promises.iter().map(move |promise| (check, promise)))
 }
 
-/// Whether the records have all figures of a check, each of a run of the same commit, size and machine.
+/// Whether the records contain all figures of a check, each from a run of the same commit, size and machine.
 pub fn has(records: &[Record], check: &Check, run: &Run) -> bool {
     let is_there = |promise: &Promise| {
         records.iter().any(|record| record.id == promise.id && record.run.is_of_the_same(run))
@@ -85,8 +85,8 @@ pub fn has(records: &[Record], check: &Check, run: &Run) -> bool {
     check.promises.iter().all(is_there)
 }
 
-/// Writes both documents. A promise that was not measured keeps its record; so does a golden figure that is
-/// above its floor and was not raised, which is an error.
+/// Writes both documents. A promise that was not measured keeps its record; so does a golden figure above its floor
+/// that was not raised, which is an error.
 pub fn write(measured: &Measured, raise: Raise<'_>) -> Result<()> {
     let (records, broken) = merge(&committed().unwrap_or_default(), measured, raise);
     save(&records)?;
@@ -120,8 +120,8 @@ pub fn merge(
     (records, broken)
 }
 
-/// Makes docs/evidence/guarantees.md from docs/evidence/guarantees.json, without a measurement. A record keeps the words under which its
-/// figure was measured.
+/// Makes docs/evidence/guarantees.md from docs/evidence/guarantees.json, without measuring. A record keeps the text
+/// with which its figure was measured.
 pub fn render() -> Result<()> {
     save(&committed()?)
 }
@@ -138,8 +138,8 @@ fn save(records: &[Record]) -> Result<()> {
     Ok(())
 }
 
-/// Checks that every promise was measured and is in the documents, that no golden figure is above its floor by more
-/// than its tolerance, and that the documents agree.
+/// Checks that every promise was measured and is in the documents, that no golden figure exceeds its floor by more than
+/// its tolerance, and that the documents agree.
 pub fn compare(measured: &Measured) -> Result<()> {
     let before = committed()?;
     let mut broken = Vec::new();
@@ -189,7 +189,7 @@ impl Record {
         }
     }
 
-    /// With the floor of the previous record, or an error that states the excess over it.
+    /// The record with the floor of the previous one; an error states by how much it is exceeded.
     fn above(mut self, before: Option<&Self>, raise: Raise<'_>) -> Result<Self, String> {
         let (Some(now), Some(before)) = (self.floor, before) else { return Ok(self) };
         let Some(floor) = before.floor.or(before.figure.as_f64()) else { return Ok(self) };

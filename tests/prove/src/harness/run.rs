@@ -12,12 +12,12 @@ use xtask::workspace;
 pub struct Run {
     /// UTC, to the minute.
     pub date: String,
-    /// `-dirty` where anything but `docs`, which a run writes itself, differs from it.
+    /// With `-dirty` if anything except `docs`, which a run writes itself, is uncommitted.
     pub commit: String,
     pub compiler: String,
     pub machine: String,
     pub emulator: String,
-    /// `full`, `1/4` of that, or `test` for as few cases as a run of the tests takes.
+    /// `full`, `1/4` of that, or `test` for as few cases as a run of the tests uses.
     pub size: String,
 }
 
@@ -36,23 +36,22 @@ impl Run {
         }
     }
 
-    /// Whether figures of both count as one recording: all but the date is the same.
+    /// Whether the figures of both belong to one recording: everything except the date is equal.
     pub fn is_of_the_same(&self, other: &Self) -> bool {
         Self { date: other.date.clone(), ..self.clone() } == *other
     }
 
-    /// Whether it is of a clean commit, and of more cases than a run of the tests.
+    /// Whether it is from a clean commit, with more cases than a run of the tests.
     pub fn is_whole(&self) -> bool {
         self.size != "test" && !self.commit.ends_with("-dirty") && self.commit != UNKNOWN
     }
 
-    /// The day.
     pub fn day(&self) -> &str {
         self.date.split('T').next().unwrap_or_default()
     }
 }
 
-/// Stands for a fact that is not available.
+/// In place of a fact that is not available.
 pub const UNKNOWN: &str = "unknown";
 
 /// The processor, its cores, and the operating system.

@@ -1,4 +1,4 @@
-//! Ticks of a filter of commands, for the probe that filters them.
+//! Ticks of a filter of commands, for the probe that runs them.
 
 use anyhow::{Result, ensure};
 use dibs_build::BuiltTree;
@@ -15,12 +15,12 @@ pub struct Script {
 /// One tick on the board.
 pub struct Tick {
     pub instructions: u32,
-    /// Whether its answer is the host's, to the bit.
+    /// Whether its answer equals the host's, to the bit.
     pub is_same: bool,
 }
 
 impl Script {
-    /// Without a walk yet. On a large surface the trackers remember more nodes.
+    /// A script without a walk. On a large surface the trackers remember more nodes.
     pub fn new(built: &BuiltTree, is_large: bool) -> Self {
         let blob = built.blob();
         let mut words = vec![u32::from(is_large), blob.len() as u32];
@@ -28,13 +28,11 @@ impl Script {
         Self { words, expected: Vec::new() }
     }
 
-    /// All of it.
     pub fn bytes(&self) -> Vec<u8> {
         let end = [command::END];
         self.words.iter().chain(&end).flat_map(|word| word.to_le_bytes()).collect()
     }
 
-    /// The board's answers.
     pub fn read(&self, answers: &[u32]) -> Result<Vec<Tick>> {
         let (answers, rest) = answers.as_chunks::<ANSWER_WORDS>();
         ensure!(
@@ -44,7 +42,7 @@ impl Script {
         let pairs = answers.iter().zip(&self.expected);
         Ok(pairs
             .map(|([took, admitted @ ..], expected)| Tick {
-                // The board's clock counts 1.6 to each instruction.
+                // The board's clock counts 1.6 for each instruction.
                 instructions: (u64::from(*took) * 5 / 8) as u32,
                 is_same: admitted == expected,
             })

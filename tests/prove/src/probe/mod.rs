@@ -1,4 +1,4 @@
-//! The probe: a program that answers a script, on the emulated board and on this computer.
+//! The probe: a program that executes a script, on the emulated board and on the host.
 
 pub mod filter;
 pub mod script;
@@ -20,7 +20,7 @@ use xtask::{qemu, valgrind, workspace};
 
 use self::script::{Record, Script};
 
-/// One answer: its words, the first of which is its time on the clock.
+/// One answer: its words, the first of which is its duration on the clock.
 pub struct Answer<'a> {
     /// The question.
     pub record: Record,
@@ -66,7 +66,7 @@ impl Answers {
             rest = after;
             let instructions = match (&mut counts, record) {
                 (Some(counts), Record::Query { .. }) => counts.next().copied().unwrap_or_default(),
-                // The board's clock counts 1.6 to each instruction.
+                // The board's clock counts 1.6 for each instruction.
                 _ => (u64::from(words[0]) * 5 / 8) as u32,
             };
             Answer { record, words, instructions }
@@ -81,7 +81,7 @@ fn length(record: Record) -> usize {
     }
 }
 
-/// The toolchain of the board, if there is an emulator too.
+/// The board's toolchain, if there is an emulator as well.
 pub fn board() -> Result<Cross> {
     let cross = Cross::find()?;
     qemu::find()?;
@@ -96,21 +96,20 @@ pub fn build_for_board(cross: &Cross, name: &str) -> Result<PathBuf> {
     Ok(cross.program("firmware", name))
 }
 
-/// Answers on the emulated board; with `count`, its clock counts instructions.
+/// Answers from the emulated board; with `count`, its clock counts instructions.
 pub fn on_board(program: &Path, script: &Script, count: bool) -> Result<Answers> {
     let time = if count { COUNTING } else { Time::Real };
     Answers::new(run_on_board(program, &script.bytes(), time)?, script)
 }
 
-/// The board's clock counts 1.6 to each instruction.
+/// The board's clock counts 1.6 for each instruction.
 pub const COUNTING: Time = Time::Counted(6);
 
-/// Runs a program on the emulated board that reads a script, and returns the words that it answers.
+/// Runs a program that executes a script on the emulated board, and returns the words that it answers.
 pub fn run_on_board(program: &Path, script: &[u8], time: Time) -> Result<Vec<u32>> {
     run_emulated(&mut qemu::alone(program, time, &[]), script)
 }
 
-/// Answers on another emulated machine.
 pub fn on_machine(emulator: &mut Command, script: &Script) -> Result<Answers> {
     Answers::new(run_emulated(emulator, &script.bytes())?, script)
 }
@@ -153,8 +152,8 @@ pub fn executions(
     Ok(counts)
 }
 
-/// Answers on the emulated board, and visits the address of each executed instruction between some addresses: QEMU
-/// executes one at a time, and logs it.
+/// Answers from the emulated board, and calls `visit` with the address of each executed instruction in some ranges:
+/// QEMU executes one instruction at a time, and logs it.
 pub fn traced(
     program: &Path,
     script: &Script,
@@ -174,7 +173,7 @@ pub fn traced(
     } else {
         qemu.arg("-singlestep");
     }
-    // The log is long, and goes through a pipe.
+    // The log is long, so it is read through a pipe.
     qemu.args(["-d", "exec,nochain", "-dfilter", &filter.join(",")]);
     qemu.current_dir(folder.path()).stdin(Stdio::null()).stderr(Stdio::piped());
     let mut emulator = qemu.spawn().context("cannot start the emulator")?;
@@ -189,7 +188,7 @@ pub fn traced(
     Answers::new(words(&folder.path().join("answers.bin"))?, script)
 }
 
-/// Visits the addresses of a log, `Trace 0: HOST [flags/ADDRESS/...] name` each. Returns their number.
+/// Visits the addresses of a log, whose lines are `Trace 0: HOST [flags/ADDRESS/...] name`. Returns their number.
 fn each_address(mut log: impl BufRead, visit: &mut impl FnMut(u64) -> Result<()>) -> Result<u64> {
     let (mut line, mut count) = (Vec::new(), 0);
     while log.read_until(b'\n', &mut line)? > 0 {
@@ -211,17 +210,16 @@ fn qemu_major() -> Result<u32> {
     number.with_context(|| format!("no version in `{version}`"))
 }
 
-/// One way to build the probe for this computer.
+/// One way to build the probe for the host.
 #[derive(Clone, Copy)]
 pub enum Build {
     Debug,
     Release,
-    /// For this computer's processor, with all of its instructions.
+    /// For the host's processor, with all of its instructions.
     Native,
 }
 
 impl Build {
-    /// For people.
     pub fn name(self) -> &'static str {
         match self {
             Self::Debug => "debug",
@@ -230,14 +228,14 @@ impl Build {
         }
     }
 
-    /// Answers on this computer.
+    /// Answers from the host.
     pub fn answers(self, script: &Script) -> Result<Answers> {
         let program = self.program()?;
         let files = tempfile::tempdir()?;
         answer(&mut Command::new(program), files.path(), script)
     }
 
-    /// Answers on this computer, under callgrind, which counts the instructions of each query.
+    /// Answers from the host, under callgrind, which counts the instructions of each query.
     pub fn counted(self, script: &Script) -> Result<Answers> {
         valgrind::find()?;
         let program = self.program()?;
@@ -245,7 +243,7 @@ impl Build {
         let profile = files.path().join("profile");
         let mut valgrind = Command::new("valgrind");
         valgrind.args(["--quiet", "--tool=callgrind", "--dump-line=no", "--combine-dumps=yes"]);
-        // Counts the calls below `clocked`; each call of it begins a part of the profile.
+        // Counts the functions below `clocked`; each call of it starts a part of the profile.
         valgrind.args(["--collect-atstart=no", "--toggle-collect=probe::clocked"]);
         valgrind.arg("--dump-before=probe::clocked");
         valgrind.arg(format!("--callgrind-out-file={}", profile.display()));
@@ -290,7 +288,7 @@ impl Build {
     }
 }
 
-/// Lets a program of this computer answer a script.
+/// Runs a program of the host on a script.
 fn answer(program: &mut Command, folder: &Path, script: &Script) -> Result<Answers> {
     let (script_file, answers) = (folder.join("script"), folder.join("answers"));
     fs::write(&script_file, script.bytes())?;

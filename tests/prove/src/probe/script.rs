@@ -1,6 +1,7 @@
 //! Scripts for the probe: surfaces, frames and queries, as words.
 //!
-//! One file, because a script and its words belong together; [`moved`] has those of surfaces that are no table of rows.
+//! One file, because a script and its words belong together; [`moved`] has those for surfaces that are not a table of
+//! rows.
 
 mod moved;
 
@@ -20,17 +21,17 @@ use probe::{command, how};
 #[derive(Default)]
 pub struct Script {
     words: Vec<u32>,
-    /// The options of every query, besides the measured stretch.
+    /// The options of every query, except the measured stretch.
     how: u32,
     /// Roots of the last tree besides the first.
     roots: u32,
-    /// Of the last frame.
+    /// The table of the last frame.
     table: Table,
-    /// The kind of each answer, by its place.
+    /// The kind of each answer, in order.
     pub records: Vec<Record>,
 }
 
-/// The questions to the probe, in order.
+/// A question to the probe.
 #[derive(Clone, Copy, Debug)]
 pub enum Record {
     /// The stretch of a frame of this many triangles.
@@ -39,61 +40,58 @@ pub enum Record {
     Bound,
     /// Every position of a modal frame of this many vertices.
     Positions(u32),
-    /// A query.
     Query {
         /// Whether the tool is a capsule.
         is_capsule: bool,
         /// Roots of the tree besides the first.
         roots: u32,
         table: Table,
-        /// Instructions that the budget was made for, if it was.
+        /// Number of instructions that the budget was made for, if any.
         deadline: Option<u32>,
     },
 }
 
-/// Where a query's positions come from.
+/// The source of a query's positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Table {
     /// The rows of a frame.
     #[default]
     Rows,
-    /// Those of two frames.
+    /// The rows of two frames.
     Moving,
-    /// Nodes.
     Nodes,
-    /// Modes.
     Modes,
-    /// Modes, with a memory of positions.
+    /// Modes, with a cache of positions.
     Memory,
 }
 
-/// Ticks until the tool of table 3 repeats itself, roughly: 77 s.
+/// Ticks until the tool of table 3 repeats its path, approximately: 77 s.
 const PATH_TICKS: u32 = 77_000;
 /// Most frames of the heart's motion that poses are tried on.
 const FRAMES_OF_POSES: usize = 10;
 
-/// How the queries of a script are drawn.
+/// How the queries of a script are generated.
 #[derive(Clone, Copy)]
 pub enum Draw {
     /// Every option at random.
     Any,
-    /// The same, half of the queries wide, and half of them signed.
+    /// The same, half of the queries batched, and half of them signed.
     EitherWay,
-    /// Without a budget: the whole search.
+    /// Without a budget: complete searches.
     Exhausting,
-    /// With a budget of a few tests, so that the costliest of them shows.
+    /// With a budget of a few tests, so that the most expensive tests dominate.
     Short,
-    /// With a budget made for a random number of instructions, at these costs of a sphere and a capsule.
+    /// With a budget made for a random number of instructions, by these cost models of a sphere and a capsule.
     Deadline([Cost; 2]),
 }
 
 impl Draw {
-    /// A warm start, now and then one that the tree does not have.
+    /// A triangle for a warm start; sometimes one that the tree does not have.
     fn warm(triangles: u32, rng: &mut Rng) -> u32 {
         if rng.bool() { u32::MAX } else { rng.u32(..triangles + 2) }
     }
 
-    /// A budget, and the instructions that it was made for, if it was.
+    /// A budget, and the number of instructions that it was made for, if any.
     fn budget(self, is_capsule: bool, rng: &mut Rng) -> (Budget, Option<u32>) {
         match self {
             Self::Any | Self::EitherWay if rng.bool() => (Budget::new(rng.u32(..780)), None),
@@ -108,16 +106,16 @@ impl Draw {
     }
 }
 
-/// A query's prior knowledge.
+/// The information that a query starts from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// None, and the tree's limit on stretch.
+    /// None, with the tree's stretch limit.
     Cold,
     /// The last tick's triangle, and the frame's measured stretch.
     Warm,
 }
 
-/// The outputs of a query.
+/// The results that a query must find.
 #[derive(Clone, Copy)]
 pub enum Asks {
     /// The unsigned distance.
@@ -138,7 +136,7 @@ impl Asks {
     }
 }
 
-/// A surface, and the most triangles of a leaf of its tree.
+/// A surface, and the largest number of triangles in a leaf of its tree.
 pub struct Subject {
     pub name: &'static str,
     mesh: Mesh,
@@ -152,8 +150,8 @@ impl Subject {
 }
 
 impl Script {
-    /// Small surfaces of every kind in every deformation, with adversarial tools: near, on and inside, at centres and
-    /// middle planes, where all distances are equal.
+    /// Small surfaces of every kind in every deformation, with adversarial tools: close, on and inside, at centres and
+    /// mid-planes, where all distances are equal.
     pub fn adversarial(queries: usize, draw: Draw, seed: u64) -> Self {
         let subjects = [
             Subject::new("heart", generate::heart(1_280).expect("a valid size").mesh, 8),
@@ -164,7 +162,7 @@ impl Script {
         Self::about_all(&subjects, false, queries, draw, seed)
     }
 
-    /// The same about these surfaces; with `wandering`, half of the tools wander around the surface.
+    /// The same for these surfaces; with `wandering`, half of the tools wander around the surface.
     pub fn about_all(
         subjects: &[Subject],
         wandering: bool,
@@ -175,7 +173,7 @@ impl Script {
         let mut rng = Rng::with_seed(seed);
         let mut script = Self::default();
         let of_each = queries.div_ceil(subjects.len());
-        // Few enough queries of a frame that every mesh has every deformation twice.
+        // So few queries for each frame that every mesh has every deformation twice.
         let of_frame = (of_each / (2 * Deformation::ALL.len())).clamp(1, 100);
         for Subject { mesh, leaf, .. } in subjects {
             let built = build(mesh, *leaf);
@@ -204,7 +202,7 @@ impl Script {
         (script, built, motion)
     }
 
-    /// The heart of the firmware in its motion, and a tool that wanders around it: the usual case.
+    /// The moving heart of the firmware, and a tool that wanders around it: the typical case.
     pub fn usual(queries: usize, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let (mut script, built, motion) = Self::heart();
@@ -221,8 +219,8 @@ impl Script {
         script
     }
 
-    /// The generated heart as it beats and the capsule of table 3, at ticks spread over the whole path:
-    /// each on the surface of its own tick.
+    /// The beating generated heart and the capsule of table 3, at ticks spread over the whole path: each on the surface
+    /// of its own tick.
     pub fn beating(ticks: u32, start: Start, asks: Asks) -> Self {
         let (mut script, built, motion) = Self::heart();
         script.how = asks.how();
@@ -250,7 +248,7 @@ impl Script {
         script
     }
 
-    /// The same heart in its motion, with adversarial capsules: on, in, through and far from it.
+    /// The same moving heart with adversarial capsules: on, in, through and far from it.
     pub fn poses(queries: usize, asks: Asks, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let (mut script, built, motion) = Self::heart();
@@ -270,7 +268,7 @@ impl Script {
         script
     }
 
-    /// Capsules beside a ball, with one coordinate that is subnormal: a processor that flushes those to zero answers with
+    /// Capsules beside a ball, with one subnormal coordinate: a processor that flushes subnormals to zero answers with
     /// another point of the axis.
     pub fn subnormal() -> Self {
         let mesh = surfaces::ball(1);
@@ -290,7 +288,6 @@ impl Script {
         script
     }
 
-    /// The script's bytes.
     pub fn bytes(&self) -> Vec<u8> {
         self.words.iter().flat_map(|word| word.to_le_bytes()).collect()
     }
@@ -326,7 +323,7 @@ impl Script {
             } else {
                 pose(&rows, &triangles, rng)
             };
-            // A capsule of length zero is a capsule too.
+            // A capsule of length zero is a capsule as well.
             let is_capsule = tool.start != tool.end || rng.u32(..8) == 0;
             let warm = Draw::warm(tree.triangle_count(), rng);
             let measured = rng.bool();
@@ -386,7 +383,7 @@ impl Script {
     }
 }
 
-/// A tool that wanders around a surface: a sphere and a capsule in turn.
+/// A tool that wanders around a surface: alternately a sphere and a capsule.
 fn about(rows: &[Vec3], triangles: &[[u32; 3]], number: usize, rng: &mut Rng) -> Instrument {
     let [a, ..] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
     let away = a.normalize_or(Vec3::Z) * 60.0 * rng.f32();

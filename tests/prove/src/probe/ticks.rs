@@ -1,4 +1,4 @@
-//! Ticks of the paper's moving tool around a surface that moves, for the probe that tracks.
+//! Ticks of the paper's moving tool around a moving surface, for the probe with a tracker.
 
 use anyhow::{Result, bail, ensure};
 use dibs_build::{BuiltTree, Motion};
@@ -14,7 +14,7 @@ pub struct Script {
 }
 
 impl Script {
-    /// With the surface before the first tick.
+    /// A script that starts with the surface before the first tick.
     pub fn new(built: &BuiltTree, rows: &[Vec3]) -> Self {
         let mut bytes = (built.blob().len() as u32).to_le_bytes().to_vec();
         bytes.extend(built.blob());
@@ -38,7 +38,7 @@ impl Script {
         self.put_points(rows);
     }
 
-    /// A tick so far on the way to the last frame. `bits` is what the probe asks.
+    /// Adds a tick at the fraction `share` of the interval to the last frame. `bits` selects what the probe must find.
     pub fn tick(&mut self, bits: u32, share: f32, tool: &Capsule) {
         self.put(&[command::TICK, bits, share.to_bits()]);
         let joints = joints(tool);
@@ -46,14 +46,14 @@ impl Script {
         self.put(&[tool.radius().to_bits()]);
     }
 
-    /// All of it.
+    /// The script's bytes.
     pub fn end(mut self) -> Vec<u8> {
         self.put(&[command::END]);
         self.bytes
     }
 }
 
-/// The script of so many ticks. `bits` is what the probe asks at each.
+/// The script for this many ticks. `bits` selects what the probe must find at each.
 pub fn script(built: &BuiltTree, motion: &Motion, bits: u32, ticks: u32) -> Result<Vec<u8>> {
     let rows = |number: usize| built.to_rows(&motion.frames[number % motion.frames.len()]);
     let beat = Beat::new(motion);
@@ -71,7 +71,7 @@ pub fn script(built: &BuiltTree, motion: &Motion, bits: u32, ticks: u32) -> Resu
     Ok(script.end())
 }
 
-/// The ends of a chain whose first link is the tool, each link turned by a tenth of a radian against the one before.
+/// The ends of a chain whose first link is the tool; each link is rotated by 0.1 rad relative to the previous one.
 fn joints(tool: &Capsule) -> [Vec3; JOINTS] {
     let mut link = tool.end() - tool.start();
     let mut joints = [tool.start(); JOINTS];
@@ -89,10 +89,10 @@ pub struct Tick {
     pub whole: u32,
     /// The tracker's node and triangle tests.
     pub tests: [u32; 2],
-    /// Pairs that were searched.
+    /// Number of pairs that were searched.
     pub searched: u32,
     pub is_fallback: bool,
-    /// How far the certified interval is from a whole query's, in units of both accuracies.
+    /// Distance of the certified interval from a whole query's, in units of both accuracies.
     pub apart: f32,
 }
 
@@ -103,9 +103,9 @@ impl Tick {
     }
 }
 
-/// The answers to a script of so many ticks, without that to the first.
+/// The answers to a script of this many ticks, except the first one.
 pub fn read(words: &[u32], ticks: u32) -> Result<Vec<Tick>> {
-    // The board's clock counts 1.6 to each instruction.
+    // The board's clock counts 1.6 for each instruction.
     let instructions = |clock: u32| (u64::from(clock) * 5 / 8) as u32;
     let (answers, rest) = words.as_chunks::<ANSWER_WORDS>();
     ensure!(rest.is_empty(), "an answer is not whole");

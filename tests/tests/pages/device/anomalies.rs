@@ -1,13 +1,12 @@
-//! Known anomalies: where the library is worse than it should be, or where its promise ends in a way that surprises.
+//! Known anomalies: where the library is worse than it should be, or where its promise has a surprising limit.
 
-/// An anomaly.
 pub struct Anomaly {
-    /// It is never used again for another.
+    /// It is never reused for another anomaly.
     pub id: &'static str,
     /// `{id}` stands for the recorded figure of that name.
     pub says: &'static str,
     pub remedy: &'static str,
-    /// Where it is.
+    /// The file that contains it.
     pub file: &'static str,
 }
 

@@ -1,8 +1,7 @@
-//! What is assumed of the use, and where it is checked.
+//! Assumptions of use, and where they are checked.
 
-/// An assumption.
 pub struct Assumption {
-    /// It is never used again for another.
+    /// It is never reused for another assumption.
     pub id: &'static str,
     pub says: &'static str,
     pub check: Check,
@@ -10,9 +9,9 @@ pub struct Assumption {
 
 /// Where an assumption is checked at run time.
 pub enum Check {
-    /// By a function of a file of the core, with this outcome.
+    /// By a function in a file of the core, with this outcome.
     By { file: &'static str, function: &'static str, outcome: &'static str },
-    /// Nowhere: what its user can do.
+    /// Not checked: what the user can do.
     Yours(&'static str),
 }
 use Check::{By, Yours};

@@ -1,7 +1,7 @@
-//! Pages for a device's file: assumptions of use, known anomalies, and an index by clause. `DIBS_WRITE=1` writes them anew.
+//! Pages for a device's file: assumptions of use, anomalies, and an index by clause. `DIBS_WRITE=1` writes them again.
 //!
-//! What fails: a check of an assumption that is not there, a variant that does not exist, a file or a figure of an anomaly
-//! that is not there, an id that is used twice, a page of the index that does not exist.
+//! These fail: a missing check of an assumption, a variant that does not exist, a missing file or figure of an anomaly,
+//! an id that is used twice, and a page of the index that does not exist.
 
 // Requirement: E-03
 
@@ -98,7 +98,7 @@ fn filled(says: &str, records: &[Value]) -> Result<String, String> {
     Ok(text)
 }
 
-/// Whole numbers from 100 on, two digits below.
+/// Whole numbers from 100 on, otherwise two decimals.
 fn number(value: f64) -> String {
     if value >= 100.0 {
         return page::thousands(value.round() as u32);
@@ -110,7 +110,7 @@ fn number(value: f64) -> String {
 /// A name and a path from `docs/evidence`.
 type Page = (&'static str, &'static str);
 
-/// A clause of IEC 62304:2006+A1:2015, what it is about, and the pages for it.
+/// A clause of IEC 62304:2006+A1:2015, its subject, and the pages for it.
 const CLAUSES: [(&str, &str, &[Page]); 5] = [
     (
         "5.3.3",

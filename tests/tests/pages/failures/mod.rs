@@ -1,7 +1,7 @@
-//! The failures of every public call of `guard`: `docs/evidence/failures.md`, which `DIBS_WRITE=1` writes anew.
+//! The failures of every public call of `guard`: `docs/evidence/failures.md`, which `DIBS_WRITE=1` writes again.
 //!
-//! A call without a row, a row without a call, an error that a signature has and its row has not, and a variant that no row
-//! gives and no reason excludes, fail.
+//! These fail: a call without a row, a row without a call, an error of a signature that is missing in its row, and a
+//! variant that no row gives and no reason excludes.
 
 // Requirement: E-03
 
@@ -50,7 +50,7 @@ fn given(variants: &Variants, of: &BTreeSet<&str>) -> BTreeSet<String> {
     of.iter().copied().filter(is_given).map(str::to_owned).collect()
 }
 
-/// What is missing, unknown, or said twice.
+/// Missing, unknown and duplicate entries.
 fn faults(
     calls: &[Call],
     never: &[(&str, &[&str], &str)],

@@ -1,6 +1,5 @@
-//! What can go wrong in each public call of `guard`, what the caller gets, and what stays.
+//! The failures of each public call of `guard`: what the caller gets, and what stays.
 
-/// A call.
 pub struct Call {
     pub name: &'static str,
     pub goes_wrong: &'static str,
@@ -37,7 +36,7 @@ const START: &[Gives] = &[
     ("SplitError", All),
     ("StretchError", Only(&["NoMetric", "Corrupt"])),
 ];
-/// Of a packet, and of bytes that become packets.
+/// For a packet, and for bytes that contain packets.
 const PACKET: &[Gives] =
     &[("ReceiveError", But(&["Stretch"])), ("PacketError", All), ("PoseError", All)];
 const BYTES: &[Gives] = &[
@@ -46,7 +45,7 @@ const BYTES: &[Gives] = &[
     ("PoseError", All),
     ("StreamError", All),
 ];
-/// Of a frame of this process: the rest are defects of packets.
+/// For a frame from this process: the other variants are defects of packets.
 const FRAME: &[Gives] =
     &[("ReceiveError", Only(&["RowCount", "NotFinite", "TooFar", "TooOld", "Earlier", "Busy"]))];
 const POSED: &[Gives] = &[
@@ -58,7 +57,7 @@ const POSED: &[Gives] = &[
 ];
 const WORK: &[Gives] =
     &[("ReceiveError", Only(&["Stretch"])), ("StretchError", But(&["NoMetric", "VertexCount"]))];
-/// Of the surface, the bus and the tree.
+/// For the surface, the bus and the tree.
 const TRUST: Variants = But(&["NoPose", "NoDirection", "NoSide", "CutShort", "NotFinite"]);
 const TICK: &[Gives] = &[
     ("Unavailable", TRUST),
@@ -71,7 +70,7 @@ const ADMIT: &[Gives] = &[
     ("QueryError", Only(&["Position", "Uncovered", "Corrupt", "OtherTree", "OtherFrame"])),
     ("FilterError", Only(&["Parameter", "Command", "Query", "Untrusted"])),
 ];
-/// Of a constraint, whose state is safe with this cause.
+/// For a constraint whose state is safe with this cause.
 const FORCE: &[Gives] = &[("Unavailable", All)];
 const NOTHING: &[Gives] = &[];
 

@@ -1,4 +1,4 @@
-//! The calls and error variants that the sources have.
+//! The calls and error variants in the sources.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -9,7 +9,7 @@ use syn::{Attribute, ImplItem, Item, ItemEnum, Meta, ReturnType};
 use crate::page::REPOSITORY;
 use crate::public_api::{is_hidden, is_public};
 
-/// Enums of errors, each with its file in the core.
+/// The enums of errors, each with its file in the core.
 const ENUMS: [(&str, &str); 12] = [
     ("Error", "error.rs"),
     ("FormatError", "tree/error.rs"),
@@ -25,16 +25,15 @@ const ENUMS: [(&str, &str); 12] = [
     ("FilterError", "control/filter/answer.rs"),
 ];
 
-/// Errors of one kind.
+/// Errors without variants.
 pub const STRUCTS: [&str; 2] = ["SplitError", "AcknowledgeError"];
 
-/// A variant: the first sentence of its documentation, and the error in it.
+/// A variant: the first sentence of its documentation, and the error that it contains.
 pub struct Variant {
     pub says: String,
     pub inner: Option<String>,
 }
 
-/// Enums with their variants.
 pub type Enums = BTreeMap<String, BTreeMap<String, Variant>>;
 
 /// Public functions, as `Type::name`, each with the errors that it returns.
@@ -44,11 +43,11 @@ pub fn enums() -> Enums {
     ENUMS.iter().map(|(name, file)| ((*name).to_owned(), variants(name, file))).collect()
 }
 
-/// Of an enum in a file of the core.
+/// The variants of an enum in a file of the core.
 pub fn variants(name: &str, file: &str) -> BTreeMap<String, Variant> {
     let text = source(file);
     let item: ItemEnum = match text.split_once("\nerrors! {") {
-        // A macro lists the variants as an enum does.
+        // A macro lists its variants as an enum does.
         Some((_, list)) => syn::parse_str(&format!("enum {name} {{ {list}")).expect("variants"),
         None => {
             let items = syn::parse_file(&text).expect("it compiles").items;
@@ -77,7 +76,7 @@ pub fn functions() -> Functions {
     for file in fs::read_dir(Path::new(REPOSITORY).join("dibs-nostd/src/guard")).expect("a folder")
     {
         let path = file.expect("a file").path();
-        // A module's folder holds its tests.
+        // A folder of a module only contains its tests.
         if path.is_dir() {
             continue;
         }
@@ -104,7 +103,6 @@ pub fn functions() -> Functions {
     functions
 }
 
-/// The types of errors that a type names.
 fn errors_in(of: &syn::Type) -> BTreeSet<String> {
     struct Names(BTreeSet<String>);
     impl Names {

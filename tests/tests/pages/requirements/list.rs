@@ -1,11 +1,12 @@
-//! The requirements: what this library promises, each with an id that sources name.
+//! The requirements: the library's promises, each with an id that sources refer to.
 
 /// What the library must do.
 pub struct Requirement {
-    /// A letter for the area, and a number. It is never used again for something else.
+    /// A letter for the area, and a number. It is never reused for another requirement.
     pub id: &'static str,
     pub says: &'static str,
-    /// Ids of the figures in `guarantees.json` whose bounds are the requirement's; none where it holds without exception.
+    /// Ids of the figures in `guarantees.json` whose bounds this requirement states; empty if it holds without
+    /// exception.
     pub figures: &'static [&'static str],
 }
 

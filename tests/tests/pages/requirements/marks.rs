@@ -1,4 +1,4 @@
-//! The ids that sources name.
+//! The requirement ids that sources state.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -6,14 +6,13 @@ use std::path::Path;
 
 use crate::page::REPOSITORY;
 
-/// A source file that names requirements, or has to.
+/// A source file that states requirements, or must.
 pub struct Mark {
     /// From the repository's root.
     pub file: String,
     pub ids: BTreeSet<String>,
-    /// Whether it shows requirements; the others implement them.
+    /// Whether it tests requirements; other files implement them.
     pub is_test: bool,
-    /// The checks in it.
     pub checks: Vec<String>,
 }
 
@@ -29,7 +28,7 @@ impl Mark {
         format!("[{name}](../../{})", self.file)
     }
 
-    /// Enough of its path to tell it from others.
+    /// Enough of its path to be unique.
     fn short(&self) -> &str {
         let parts =
             if self.file.ends_with("/mod.rs") || self.file.ends_with("/tests.rs") { 3 } else { 2 };
@@ -50,10 +49,10 @@ const FOLDERS: [&str; 9] = [
     "tests",
     "xtask/src",
 ];
-/// The viewer's folders besides what its tools put there.
+/// The viewer's folders, except those that its tools fill.
 const VIEWER: [&str; 2] = ["viewer/src", "viewer/test"];
 
-/// Every file that names requirements, and every file of tests that names none.
+/// Every file that states requirements, and every file of tests that states none.
 pub fn marks() -> Vec<Mark> {
     let proofs = proofs();
     let mut marks = Vec::new();
@@ -101,7 +100,7 @@ fn proofs() -> BTreeMap<String, Vec<String>> {
         let links = line.split("](../").skip(1).filter_map(|rest| rest.split(')').next());
         let is_source = |link: &&str| link.ends_with(".rs") || link.ends_with(".mjs");
         for (at, link) in links.filter(is_source).enumerate() {
-            // A measurement without a bound shows nothing.
+            // A measurement without a bound proves nothing.
             if link.contains("/benches/") {
                 continue;
             }

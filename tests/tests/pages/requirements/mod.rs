@@ -1,8 +1,8 @@
-//! Requirements have ids, and a trace both ways: `docs/evidence/requirements.md`, which `DIBS_WRITE=1` writes anew.
+//! Requirements have ids, and a trace in both directions: `docs/evidence/requirements.md`, which `DIBS_WRITE=1` writes
+//! again.
 //!
-//! Sources name what they implement and what they test, in a line after the text of the file, as this one does. Here is the
-//! list, and what fails: an id without implementation or test, a file of tests without an id, an id that is not listed, a
-//! figure that is not recorded.
+//! Sources state what they implement and what they test, in a line after the file's documentation, as in this file.
+//! These fail: an id without implementation or test, a file of tests without id, an unknown id, a figure not recorded.
 
 // Requirement: E-03
 
@@ -37,7 +37,7 @@ fn the_page_traces_every_requirement() {
     page::keep("requirements.md", &text(REQUIREMENTS, &marks, &records));
 }
 
-/// What breaks the trace.
+/// Violations of the trace.
 fn faults(list: &[Requirement], marks: &[Mark], records: &[Value]) -> Vec<String> {
     let mut faults = Vec::new();
     let ids: BTreeSet<&str> = list.iter().map(|requirement| requirement.id).collect();

@@ -87,7 +87,7 @@ pub fn stl_binary(mesh: &Mesh) -> Vec<u8> {
     bytes
 }
 
-/// PLY with properties besides positions and corners, and with coordinates of two types.
+/// PLY with additional properties and elements, and with coordinates of two types.
 pub fn ply(mesh: &Mesh, encoding: &str) -> Vec<u8> {
     let big = encoding == "binary_big_endian";
     let ascii = encoding == "ascii";
@@ -140,7 +140,6 @@ pub fn samples() -> Vec<(&'static str, Format, Vec<u8>)> {
     ]
 }
 
-/// A folder for mesh files.
 pub struct Folder(pub tempfile::TempDir);
 
 impl Folder {

@@ -1,4 +1,4 @@
-//! Scripts about surfaces that modes, nodes or two frames make.
+//! Scripts for surfaces that modes, nodes or two frames define.
 
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, Volume, generate};
@@ -26,7 +26,7 @@ impl Script {
         Self::modal_of(&mesh, &motion, modes, queries, Draw::Exhausting, seed)
     }
 
-    /// The same of any surface, with queries that are drawn.
+    /// The same for any surface, with generated queries.
     pub fn modal_of(
         mesh: &Mesh,
         motion: &Motion,
@@ -79,7 +79,7 @@ impl Script {
         script
     }
 
-    /// A surface between the frames of a motion and beyond them.
+    /// A surface interpolated between the frames of a motion, and extrapolated beyond them.
     pub fn moving_of(mesh: &Mesh, motion: &Motion, queries: usize, draw: Draw, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let built = build(mesh, 8);
@@ -101,7 +101,7 @@ impl Script {
         script
     }
 
-    /// A surface that the nodes of a lattice carry, at so many cells each way.
+    /// A surface that the nodes of a lattice move, with this many cells along each axis.
     pub fn embedded_of(mesh: &Mesh, cells: u32, queries: usize, draw: Draw, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let volume = Volume::lattice(mesh, [cells; 3]).expect("a lattice");
@@ -126,7 +126,7 @@ impl Script {
         script
     }
 
-    /// Queries of a surface with these positions: half of the tools wander around it.
+    /// Queries on a surface with these positions: half of the tools wander around it.
     fn drawn(
         &mut self,
         built: &BuiltTree,
