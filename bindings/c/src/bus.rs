@@ -77,9 +77,8 @@ impl Kind for dibs_bus {
 /// @param limits   The guard's limits: the same as for `dibs_guard_init`.
 /// @param bus      Receives the bus's address.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of rows is not the tree's;
-/// `DIBS_CODE_STORAGE_SIZE`
-///          also if the surface has only two buffers; `DIBS_CODE_TAKEN` if its end was taken;
-///          `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` if the limits need one; or a misuse.
+///         `DIBS_CODE_STORAGE_SIZE` also if the surface has only two buffers; `DIBS_CODE_TAKEN` if its end was taken;
+///         `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` if the limits need one; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_init(
     storage: *mut c_void,
@@ -168,13 +167,13 @@ pub extern "C" fn dibs_bus_packet(
 /// Cost: linear in the vertices, each of which is read several times.
 ///
 /// @param bus        The bus.
-/// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order. Read
-///                   during the call.
+/// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order.
+///                   Read during the call.
 /// @param count      Their number: the vertices of the mesh's file.
 /// @param captured   Time of capture on the receiver's clock, in ms: at most 65,534 before `now`.
 /// @param now        The receiver's clock, in ms; wraps.
 /// @return `DIBS_CODE_OK`, a cause of refusal as from `dibs_receiver_accept` (the last good surface stays), or a
-/// misuse.
+///         misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_frame(
     bus: *mut dibs_bus,
@@ -213,8 +212,7 @@ pub struct dibs_pose {
 /// @param captured   Time of capture of positions and pose.
 /// @param now        The receiver's clock, in ms; wraps.
 /// @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM`
-/// for
-///          an invalid pose.
+///         for an invalid pose.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_frame_at(
     bus: *mut dibs_bus,
@@ -339,8 +337,8 @@ pub extern "C" fn dibs_bus_get_facts(bus: *mut dibs_bus, facts: *mut dibs_bus_fa
 
 /// Position (mm) of a vertex, or node, in the latest published frame, for a checksum of the published rows, or a log.
 ///
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex, or a
-///         misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex,
+///         or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_bus_position(
     bus: *mut dibs_bus,

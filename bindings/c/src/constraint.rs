@@ -95,7 +95,7 @@ fn failure(outcome: u32) -> Option<dibs_code> {
 ///
 /// @param wall       The wall.
 /// @param outcome    The code of the query, of the fail-safe machine, or of the reader: the first one that was not
-///                    `DIBS_CODE_OK`.
+///                   `DIBS_CODE_OK`.
 /// @param proximity  The closest pair; not read, and may be null, if the outcome is an error.
 /// @param velocity   Velocity (mm/s) of the tool's closest point relative to the surface.
 /// @param force      Receives the force.

@@ -125,7 +125,8 @@ impl TryFrom<dibs_limits> for Limits {
 /// @param size      Bytes of the storage.
 /// @param limits    Its limits.
 /// @param failsafe  Receives the machine's address.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, `DIBS_CODE_LIMIT_UNTRIPPABLE`, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, `DIBS_CODE_LIMIT_UNTRIPPABLE`, or a
+///         misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_failsafe_init(
     storage: *mut c_void,
@@ -243,8 +244,7 @@ pub extern "C" fn dibs_failsafe_acknowledge(failsafe: *mut dibs_failsafe) -> dib
 /// @param verdict    The verdict of this tick.
 /// @param proximity  The answer of this tick, which is widened.
 /// @return `DIBS_CODE_OK`; in the safe state the cause, to be passed on to a wall; `DIBS_CODE_ARGUMENT` for numbers
-/// that are
-///          not a state or a code; or a misuse.
+///         that are not a state or a code; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_verdict_admit(
     verdict: *const dibs_verdict,

@@ -220,10 +220,8 @@ impl Command<'_> {
 /// @param row_count    Their number: at most `DIBS_FILTER_ROWS`.
 /// @param admitted     Receives the motion to execute, and its reason; nothing is written after an error.
 /// @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range;
-/// `DIBS_CODE_NOT_FINITE` for a
-///          command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too many, too many rows, or a
-/// frame of the
-///          caller's vertices; the errors of `dibs_tracker_closest`; or a misuse.
+///         `DIBS_CODE_NOT_FINITE` for a command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too
+///         many, too many rows, or a frame of the caller's vertices; the errors of `dibs_tracker_closest`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_filter_admit(
     filter: *const dibs_filter,

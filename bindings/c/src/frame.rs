@@ -168,10 +168,10 @@ pub extern "C" fn dibs_frame_init(
 ///
 /// @param frame           The frame; if a reader holds it, it is released first.
 /// @param positions       x, y and z (mm) of each vertex, in the tree's order of rows, not that of the mesh's file:
-///                        `dibs_tree_to_rows`. Not copied: they must not change until the frame is given other vertices or released.
+///                        `dibs_tree_to_rows`. Not copied: they must not change until the frame is given other vertices
+///                        or released.
 /// @param vertices        Their number.
-/// @param position_error  Largest error (mm, at least 0) of a vertex position. Part of the accuracy of
-///                         every answer.
+/// @param position_error  Largest error (mm, at least 0) of a vertex position. Part of the accuracy of every answer.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an error that is negative or not finite, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_set_vertices(
@@ -197,13 +197,11 @@ pub extern "C" fn dibs_frame_set_vertices(
 /// @param frame           The frame; if a reader holds it, it is released first.
 /// @param tree            The tree, which must exist as long as the frame has these nodes.
 /// @param positions       x, y and z (mm) of each node, in the order of the volume's file. Not copied: they must not
-/// change until
-///                         the frame is given other positions or released.
+///                        change until the frame is given other positions or released.
 /// @param nodes           Their number.
 /// @param position_error  Largest error (mm, at least 0) of a node position.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` for another number than the tree's `rows`, `DIBS_CODE_ARGUMENT` if
-/// the tree
-///          has no nodes, or for an error that is negative or not finite, or a misuse.
+///         the tree has no nodes, or for an error that is negative or not finite, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_set_nodes(
     frame: *mut dibs_frame,
@@ -240,9 +238,9 @@ pub(crate) fn rows(positions: *const f32, count: u32) -> Result<&'static [[f32; 
 /// Cost: linear in the triangles.
 ///
 /// @param stretch  Receives the largest stretch, 1 for none; or null.
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` if distances on this frame could be wrong, as with vertices in the
-///         file's order, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a
-///         misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` if distances on this frame could be wrong, as with vertices in
+///         the file's order, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_TREE_NO_METRIC`,
+///         `DIBS_CODE_VERTEX_COUNT`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_frame_measure(
     frame: *mut dibs_frame,

@@ -71,9 +71,8 @@ impl Kind for dibs_guard {
 /// @param limits   The guard's limits: the same as for `dibs_bus_init`.
 /// @param guard    Receives the guard's address.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of rows is not the tree's;
-/// `DIBS_CODE_STORAGE_SIZE`
-///          also if the surface has only two buffers; `DIBS_CODE_TAKEN` if its end was taken;
-///          `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
+///         `DIBS_CODE_STORAGE_SIZE` also if the surface has only two buffers; `DIBS_CODE_TAKEN` if its end was taken;
+///         `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_guard_init(
     storage: *mut c_void,
@@ -200,8 +199,7 @@ impl From<Answer> for dibs_answer {
 /// @param now     The receiver's clock, in ms; wraps.
 /// @param answer  Receives the answer.
 /// @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_TOOL_COORDINATE` or `DIBS_CODE_TOOL_RADIUS`, with the same
-/// answer as
-///          without a pose; or a misuse.
+///         answer as without a pose; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_guard_closest(
     guard: *mut dibs_guard,
@@ -379,8 +377,7 @@ pub const DIBS_START_BASE: usize = DIBS_TREE_SIZE + DIBS_BUS_SIZE + DIBS_GUARD_S
 /// Cost: linear in the bytes; once, at start-up.
 ///
 /// @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that move them),
-/// aligned
-///                 to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no initial value.
+///                aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no initial value.
 /// @param size    Bytes of the memory.
 /// @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
 /// @param length  Bytes of the tree.

@@ -306,8 +306,7 @@ pub extern "C" fn dibs_query_init(
 /// @param options    Options, or null.
 /// @param proximity  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_TOOL_COORDINATE` to
-/// `DIBS_CODE_QUERY_FAILED`,
-///          `DIBS_CODE_TREE_CORRUPT`, or a misuse.
+///         `DIBS_CODE_QUERY_FAILED`, `DIBS_CODE_TREE_CORRUPT`, or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_query_closest(
     query: *mut dibs_query,

@@ -139,8 +139,7 @@ pub extern "C" fn dibs_reader_init(
 /// @param frame   Holds the frame; a frame that it held before is released.
 /// @param age     Receives its age, even if it is too old; or null.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` if another frame holds one of
-/// this
-///          surface, or a misuse. After an error the frame is empty.
+///         this surface, or a misuse. After an error the frame is empty.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_reader_latest(
     reader: *mut dibs_reader,

@@ -94,8 +94,7 @@ impl From<dibs_surface_limits> for SurfaceLimits {
 /// @param limits    Limits of every frame.
 /// @param receiver  Receives the receiver's address.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of vertices is not the tree's;
-/// `DIBS_CODE_TAKEN` if
-///          the surface has a receiver already; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
+///         `DIBS_CODE_TAKEN` if the surface has a receiver already; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_init(
     storage: *mut c_void,
@@ -176,7 +175,7 @@ pub extern "C" fn dibs_receiver_register(receiver: *mut dibs_receiver) -> dibs_c
 /// @param now       The receiver's clock, in ms; wraps.
 /// @param progress  Receives its outcome, or null.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` if the packet was refused (and
-///          counted), or a misuse.
+///         counted), or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_accept(
     receiver: *mut dibs_receiver,
@@ -257,8 +256,7 @@ impl From<Advance> for dibs_advance {
 /// @param work      Most rows and triangles that are checked or copied.
 /// @param advance   Receives the outcome, or null.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` if the frame is
-/// refused (and
-///          counted); or a misuse.
+///         refused (and counted); or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_advance(
     receiver: *mut dibs_receiver,
@@ -329,7 +327,8 @@ pub extern "C" fn dibs_receiver_epoch(receiver: *mut dibs_receiver, epoch: *mut 
 
 /// Position (mm) of a vertex in the latest published frame, for a checksum of the published rows, or a log.
 ///
-/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
+/// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a
+///         misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_position(
     receiver: *mut dibs_receiver,

@@ -144,8 +144,8 @@ pub extern "C" fn dibs_sender_settings_of() -> dibs_sender_settings {
 ///
 /// @param storage   `DIBS_SENDER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size      Bytes of the storage.
-/// @param tree      The surface's tree: the controller's, or one built from the same mesh in the same way. Not used after
-///                  the call.
+/// @param tree      The surface's tree: the controller's, or one built from the same mesh in the same way. Not used
+///                  after the call.
 /// @param target    `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`, ended by a zero.
 /// @param settings  How to send; or null for `dibs_sender_settings_of`.
 /// @param sender    Receives the sender's address.
@@ -178,16 +178,15 @@ pub extern "C" fn dibs_sender_init(
 /// allocates nothing.
 ///
 /// @param sender     The sender.
-/// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order; or of
-///                   each node that carries the surface.
+/// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order;
+///                   or of each node that carries the surface.
 /// @param count      Their number.
 /// @param age        Time (ms) since the surface was captured; or `DIBS_AGE_UNKNOWN`.
 /// @param sent       Receives the frame's number and size; or null.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are not a frame of the surface: nothing was
-/// sent;
-///          `DIBS_CODE_SENDER_LINE` if the connection broke: close the sender, and make another;
-///          `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the
-///          full text.
+///         sent; `DIBS_CODE_SENDER_LINE` if the connection broke: close the sender, and make another;
+///         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the
+///         full text.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_sender_send(
     sender: *mut dibs_sender,

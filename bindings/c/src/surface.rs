@@ -67,8 +67,8 @@ const _: () = assert!(align_of::<Head>() == 4 && align_of::<Position>() == 4);
 /// Makes a surface without a frame.
 ///
 /// @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, or `DIBS_GUARDED_SIZE(vertices)` for a guard, aligned to
-///                   `DIBS_ALIGNMENT`. Needs no initial value. Must exist for as long as its two ends and their frames
-/// are used.
+///                  `DIBS_ALIGNMENT`. Needs no initial value. Must exist for as long as its two ends and their frames
+///                  are used.
 /// @param size      Bytes of the storage.
 /// @param vertices  Rows of the surface: `rows` of the tree's facts.
 /// @param surface   Receives the surface's address.

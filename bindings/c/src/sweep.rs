@@ -9,8 +9,8 @@ use crate::query::{dibs_options, dibs_proximity};
 use crate::tool::dibs_tool;
 use crate::tracker::dibs_tracker;
 
-/// The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices each move
-/// straight and evenly.
+/// The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices
+/// each move straight and evenly.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_sweep {
@@ -18,8 +18,8 @@ pub struct dibs_sweep {
     pub from: dibs_tool,
     /// The tool at the end. Between them it has the larger of their radii.
     pub to: dibs_tool,
-    /// The surface at the start and at the end: 0 is the tracker's surface before the last `dibs_tracker_set_frame`, 1 the one
-    /// since then.
+    /// The surface at the start and at the end: 0 is the tracker's surface before the last `dibs_tracker_set_frame`, 1
+    /// the one since then.
     pub share: [f32; 2],
     /// In mm, not negative.
     pub margin: f32,
@@ -32,8 +32,8 @@ pub struct dibs_sweep {
 pub struct dibs_swept {
     /// Before this time they are certainly not closer than the margin; 1 or more: at no time.
     pub clear_until: f32,
-    /// The first time at which they were found within the margin, or farther by no more than the accuracy; -1 for none. With
-    /// none and `clear_until` below 1 the samples were too few to decide.
+    /// The first time at which they were found within the margin, or farther by no more than the accuracy; -1 for none.
+    /// With none and `clear_until` below 1 the samples were too few to decide.
     pub contact: f32,
     /// The closest pair at the end.
     pub at_end: dibs_proximity,
@@ -52,8 +52,8 @@ impl From<SweepAnswer> for dibs_swept {
     }
 }
 
-/// Whether tool and surface come closer than a margin between two ticks, and when first, by conservative advancement: no time is
-/// skipped at any speed. The distance is that to the surface itself, from either side.
+/// Whether tool and surface come closer than a margin between two ticks, and when first, by conservative advancement:
+/// no time is skipped at any speed. The distance is that to the surface itself, from either side.
 ///
 /// Cost: that of `dibs_tracker_closest` for each sample; the budget is for each.
 ///
@@ -61,7 +61,8 @@ impl From<SweepAnswer> for dibs_swept {
 /// @param sweep    The motion.
 /// @param options  Options, or null.
 /// @param swept    Receives the result.
-/// @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a share out of range.
+/// @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a share out of
+///         range.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_sweep(
     tracker: *mut dibs_tracker,

@@ -114,8 +114,7 @@ impl VertexTable for Copied {
 /// Makes a tracker on a tree, without a surface.
 ///
 /// @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`; `DIBS_TRACKER_SIZE(0)` is enough
-/// for
-///                  `dibs_tracker_closest_on` alone. Needs no initial value.
+///                 for `dibs_tracker_closest_on` alone. Needs no initial value.
 /// @param size     Bytes of the storage.
 /// @param tree     The tree.
 /// @param tracker  Receives the tracker's address.
@@ -156,8 +155,7 @@ pub extern "C" fn dibs_tracker_init(
 /// @param tracker  The tracker.
 /// @param frame    The surface.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_VERTEX_COUNT` (also if the storage has
-/// no
-///          room for copies), or a misuse. After an error the surface is the previous one.
+///         no room for copies), or a misuse. After an error the surface is the previous one.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_set_frame(
     tracker: *mut dibs_tracker,

@@ -21,8 +21,8 @@ pub(crate) type Row = u16;
 #[cfg(feature = "large")]
 pub(crate) type Row = u32;
 
-/// A validated tree, such as `heart.dibs` from `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices; the library that
-/// `cargo build -p dibs-c --features large` makes takes larger trees instead.
+/// A validated tree, such as `heart.dibs` from `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices; the
+/// library that `cargo build -p dibs-c --features large` makes takes larger trees instead.
 ///
 /// Any number of contexts may use it at once.
 pub struct dibs_tree {
@@ -80,7 +80,7 @@ pub struct dibs_tree_facts {
 /// @param storage  `DIBS_TREE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`, for as long as the tree is used.
 /// @param size     Bytes of the storage.
 /// @param bytes    The tree, in flash or in memory. Not copied: it must not change for as long as the tree, or any
-///                  object made with it, is used. It is read faster if aligned to 4.
+///                 object made with it, is used. It is read faster if aligned to 4.
 /// @param length   Bytes of the tree.
 /// @param tree     Receives the tree's address.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_TREE_LENGTH` to `DIBS_CODE_TREE_FORM`, or a misuse.
@@ -147,8 +147,8 @@ pub extern "C" fn dibs_tree_rest_position(
     })
 }
 
-/// Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows, as a frame
-/// needs them. A frame in the file's order gives wrong distances without an error, unless it is measured.
+/// Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows,
+/// as a frame needs them. A frame in the file's order gives wrong distances without an error, unless it is measured.
 ///
 /// Cost: linear in the vertices.
 ///
@@ -157,9 +157,9 @@ pub extern "C" fn dibs_tree_rest_position(
 /// @param count   Their number: `file_vertices` of the tree's facts.
 /// @param rows    Receives x, y and z of each row. Must not overlap `values`.
 /// @param room    The number of rows that fit there: at least `vertices` of the tree's facts.
-/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` for another number than the file's; `DIBS_CODE_CAPACITY` for too little room;
-///         `DIBS_CODE_ARGUMENT` if the tree was built without its vertex order, or if nodes move the surface (their order is the
-///         volume's); or a misuse.
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` for another number than the file's; `DIBS_CODE_CAPACITY` for too
+///         little room; `DIBS_CODE_ARGUMENT` if the tree was built without its vertex order, or if nodes move the
+///         surface (their order is the volume's); or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tree_to_rows(
     tree: *mut dibs_tree,
@@ -246,8 +246,8 @@ pub extern "C" fn dibs_scrub_init(
 
 /// Checks the next `most` bytes, and at the end of a round compares the checksum.
 ///
-/// @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_CORRUPT` at the end of a round in which the bytes did not match: make the output
-///         safe.
+/// @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_CORRUPT` at the end of a round in which the bytes did not match: make the
+///         output safe.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_scrub_step(scrub: *mut dibs_scrub, most: usize) -> dibs_code {
     dibs_code::of(|| Ok(scrub.open()?.0.step(most)?))

@@ -63,7 +63,7 @@ pub extern "C" fn dibs_writer_begin(writer: *mut dibs_writer) -> dibs_code {
 /// @param positions  x, y and z (mm) of each vertex, in the tree's order of rows. Copied.
 /// @param count      Their number.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` if these are more rows than the frame lacks: nothing is stored; or
-/// a misuse.
+///         a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_writer_push(
     writer: *mut dibs_writer,
@@ -89,18 +89,14 @@ pub extern "C" fn dibs_writer_push(
 ///
 /// @param writer          The writer.
 /// @param tree            The surface's tree, to measure the stretch, which makes queries cheaper; or null: queries
-/// then
-///                         assume the tree's limit.
+///                        then assume the tree's limit.
 /// @param epoch           Number of the frame.
 /// @param received        Its time on the reader's clock, in ms; wraps.
 /// @param position_error  Largest error (mm, at least 0) of a vertex position.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` while vertices are missing; `DIBS_CODE_HELD` while the published
-/// frame is
-///          read: nothing is lost, call again; `DIBS_CODE_STRETCH_EXCEEDED` if distances on this frame could be wrong,
-/// and
-///          the other codes of `dibs_frame_measure`; `DIBS_CODE_ARGUMENT` for an error that is negative or not finite;
-/// or a
-///          misuse.
+///         frame is read: nothing is lost, call again; `DIBS_CODE_STRETCH_EXCEEDED` if distances on this frame could be
+///         wrong, and the other codes of `dibs_frame_measure`; `DIBS_CODE_ARGUMENT` for an error that is negative or
+///         not finite; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_writer_publish(
     writer: *mut dibs_writer,
