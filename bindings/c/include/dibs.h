@@ -49,12 +49,12 @@
 #define DIBS_CONTACTS_SIZE 13056
 
 /**
- * Contacts that a list holds: of more, the deepest.
+ * Contacts that a list holds; if there are more, the deepest.
  */
 #define DIBS_CONTACTS 16
 
 /**
- * Triangles that a list looks at together: of more, the nearest.
+ * Triangles that a search for contacts considers at once; if there are more, the nearest.
  */
 #define DIBS_NEAR 512
 
@@ -69,7 +69,7 @@
 #define DIBS_FILTER_TOOLS 8
 
 /**
- * Most rows of a caller's.
+ * Most rows that a caller may add.
  */
 #define DIBS_FILTER_ROWS 8
 
@@ -84,7 +84,7 @@
 #define DIBS_GUARD_SIZE 25344
 
 /**
- * Bytes of the memory of a loop's objects, besides the surface.
+ * Bytes of the memory for a control loop's objects, except the surface.
  */
 #define DIBS_START_BASE ((DIBS_TREE_SIZE + DIBS_BUS_SIZE) + DIBS_GUARD_SIZE)
 
@@ -94,7 +94,7 @@
 #define DIBS_QUERY_SIZE 4864
 
 /**
- * As much as it takes, for a budget; no limit, for a watch.
+ * For a budget: unlimited work. For a pair of limits: no limit.
  */
 #define DIBS_UNLIMITED UINT32_MAX
 
@@ -104,17 +104,17 @@
 #define DIBS_COLD 1
 
 /**
- * A flag of options: no side is asked for, at the cost of the distance alone. The separation is that of a tool outside.
+ * A flag of options: the side is not determined, which saves its cost. The separation is that of a tool outside.
  */
 #define DIBS_UNSIGNED 2
 
 /**
- * List only contacts of the triangles with the options' label, as if the others were not there.
+ * A flag of options: lists only contacts of the triangles with the options' label, as if the others did not exist.
  */
 #define DIBS_CONTACTS_OF 4
 
 /**
- * In place of a triangle's row: none.
+ * Row of a triangle if there is none.
  */
 #define DIBS_NO_TRIANGLE UINT32_MAX
 
@@ -144,7 +144,7 @@
 #define DIBS_EVENTS 27
 
 /**
- * Most surfaces of a scene.
+ * Largest number of surfaces in a scene.
  */
 #define DIBS_SURFACES 8
 
@@ -154,13 +154,13 @@
 #define DIBS_SENDER_SIZE 1024
 
 /**
- * The age of a frame whose time of capture is not known: it counts as captured when it is sent, unless it equals the
- * last one in every bit.
+ * The age of a frame whose time of capture is unknown: the frame counts as captured when it is sent, unless it equals
+ * the last one in every bit.
  */
 #define DIBS_AGE_UNKNOWN UINT32_MAX
 
 /**
- * Bytes of a surface's storage besides its vertices.
+ * Bytes of a surface's storage in addition to its vertices.
  */
 #define DIBS_SURFACE_BASE 576
 
@@ -175,22 +175,22 @@
 #define DIBS_GUARDED_VERTEX 36
 
 /**
- * Most tools of a chain.
+ * Largest number of tools in a chain.
  */
 #define DIBS_TOOLS 16
 
 /**
- * Bytes of a tracker's storage besides its vertices.
+ * Bytes of a tracker's storage in addition to its vertices.
  */
 #define DIBS_TRACKER_BASE 24896
 
 /**
- * Bytes of a tracker's storage for each vertex: the surface as it is, and as it was.
+ * Bytes of a tracker's storage for each vertex: the present and the previous surface.
  */
 #define DIBS_TRACKER_VERTEX 24
 
 /**
- * Nodes of the tree that a tracker remembers: more, and ticks are whole queries.
+ * Nodes of the tree that a tracker remembers: if a search opens more, ticks are whole queries.
  */
 #define DIBS_OPENED 256
 
@@ -205,7 +205,8 @@
 #define DIBS_SCRUB_SIZE 128
 
 /**
- * The header's version: a million times the major one, a thousand times the minor one, and the patch.
+ * The header's version: a million times the major number, plus a thousand times the minor number, plus the patch
+ * number.
  */
 #define DIBS_VERSION 1000
 
@@ -215,7 +216,7 @@
 #define DIBS_WRITER_SIZE 256
 
 /**
- * The outcome of a call. Numbers do not change from version to version; those from 1 to 99 are misuses.
+ * The outcome of a call. Numbers stay the same in all versions; those from 1 to 99 are misuses.
  */
 enum dibs_code
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -251,7 +252,7 @@ enum dibs_code
    */
   DIBS_CODE_IN_USE = 6,
   /**
-   * This end of the surface's buffers was taken before: one receiver, one reader.
+   * This end of the surface's buffers was taken before: there is one receiver and one reader.
    */
   DIBS_CODE_TAKEN = 7,
   /**
@@ -259,11 +260,11 @@ enum dibs_code
    */
   DIBS_CODE_HELD = 8,
   /**
-   * The objects are not of one tree, or of one number of vertices.
+   * The objects are of different trees, or of different numbers of vertices.
    */
   DIBS_CODE_OTHER_TREE = 9,
   /**
-   * A number that is not one of those allowed: flags, counts, states.
+   * A number that is not allowed: flags, counts, states.
    */
   DIBS_CODE_ARGUMENT = 10,
   /**
@@ -279,7 +280,7 @@ enum dibs_code
    */
   DIBS_CODE_TREE_LENGTH = 100,
   /**
-   * The bytes are no tree.
+   * The bytes are not a tree.
    */
   DIBS_CODE_TREE_MAGIC = 101,
   /**
@@ -323,7 +324,7 @@ enum dibs_code
    */
   DIBS_CODE_TOOL_RADIUS = 201,
   /**
-   * The surface has not one vertex for each of the tree's.
+   * The surface's number of vertices is not the tree's.
    */
   DIBS_CODE_VERTEX_COUNT = 202,
   /**
@@ -339,7 +340,7 @@ enum dibs_code
    */
   DIBS_CODE_STRETCH_OF_OTHER_FRAME = 205,
   /**
-   * The surface is stretched beyond what the query was told.
+   * The surface is stretched beyond the limit given to the query.
    */
   DIBS_CODE_UNCOVERED = 206,
   /**
@@ -407,7 +408,7 @@ enum dibs_code
    */
   DIBS_CODE_TOO_FAST = 313,
   /**
-   * There is no surface for another cause.
+   * There is no surface, for another cause.
    */
   DIBS_CODE_UNAVAILABLE = 314,
   /**
@@ -427,7 +428,7 @@ enum dibs_code
    */
   DIBS_CODE_PACKET_DAMAGED = 400,
   /**
-   * The packet is of another protocol version.
+   * The packet's checksum is right, but its form is not.
    */
   DIBS_CODE_PACKET_VERSION = 401,
   /**
@@ -439,7 +440,7 @@ enum dibs_code
    */
   DIBS_CODE_PACKET_MESH = 403,
   /**
-   * The packet has no genuine tag.
+   * The packet's tag is missing or not authentic.
    */
   DIBS_CODE_PACKET_FORGED = 404,
   /**
@@ -451,15 +452,15 @@ enum dibs_code
    */
   DIBS_CODE_PACKET_UNEXPECTED = 406,
   /**
-   * The frame before is still being checked.
+   * The previous frame is still being checked.
    */
   DIBS_CODE_PACKET_BUSY = 407,
   /**
-   * The frame changes another one than that published.
+   * The partial frame is not based on the published frame.
    */
   DIBS_CODE_PACKET_BASE = 408,
   /**
-   * Rows came before the published frame was copied that far.
+   * Rows came before the published frame was copied up to them.
    */
   DIBS_CODE_PACKET_NOT_READY = 409,
   /**
@@ -467,11 +468,11 @@ enum dibs_code
    */
   DIBS_CODE_PACKET_ROWS = 410,
   /**
-   * The frame's content or encoding is not received here.
+   * The frame's content or encoding is not accepted here.
    */
   DIBS_CODE_PACKET_ENCODING = 411,
   /**
-   * The packet's place in the frame does not fit the others, or leaves too many gaps.
+   * The packet's position in the frame does not fit the others, or leaves too many gaps.
    */
   DIBS_CODE_PACKET_ORDER = 412,
   /**
@@ -487,7 +488,7 @@ enum dibs_code
    */
   DIBS_CODE_PACKET_DIGEST = 415,
   /**
-   * Bytes between two zeros of the stream are no packet.
+   * Bytes between two zeros of the stream are not a packet.
    */
   DIBS_CODE_FRAMING = 416,
   /**
@@ -499,11 +500,11 @@ enum dibs_code
    */
   DIBS_CODE_PACKET_EARLIER = 418,
   /**
-   * The surface was 65,535 ms old or older when it was sent, or captured in the future.
+   * The surface's age was 65,535 ms or more when it was sent, or its capture is in the future.
    */
   DIBS_CODE_PACKET_TOO_OLD = 419,
   /**
-   * A hello came too soon after another to be answered at once.
+   * A hello came too soon after another one to be answered at once.
    */
   DIBS_CODE_PACKET_THROTTLED = 420,
   /**
@@ -515,7 +516,7 @@ enum dibs_code
    */
   DIBS_CODE_LIMIT_ORDER = 501,
   /**
-   * A limit is 2^31 or more, or the age is not watched.
+   * A limit is 2^31 or more, or the age has no limit.
    */
   DIBS_CODE_LIMIT_TOO_LONG = 502,
   /**
@@ -523,7 +524,7 @@ enum dibs_code
    */
   DIBS_CODE_LIMIT_SPEED = 503,
   /**
-   * No frame cannot recover a surface.
+   * The number of frames that recover is 0.
    */
   DIBS_CODE_LIMIT_RECOVERY = 504,
   /**
@@ -531,19 +532,19 @@ enum dibs_code
    */
   DIBS_CODE_ACKNOWLEDGE = 505,
   /**
-   * A limit is so high that its input never exceeds it.
+   * A limit is so high that its input can never exceed it.
    */
   DIBS_CODE_LIMIT_UNTRIPPABLE = 506,
   /**
-   * A stand-off, speed, lever, approach, period or uncertainty of a filter is out of range.
+   * A stand-off, speed, lever arm, approach, period or uncertainty of a filter is out of range.
    */
   DIBS_CODE_FILTER = 507,
   /**
-   * A sender's target is none, or cannot be opened.
+   * A sender's target is invalid, or cannot be opened.
    */
   DIBS_CODE_SENDER_TARGET = 600,
   /**
-   * The positions are no frame of the sender's surface, or cannot be sent.
+   * The positions are not a frame of the sender's surface, or cannot be sent.
    */
   DIBS_CODE_SENDER_FRAME = 601,
   /**
@@ -584,11 +585,11 @@ enum dibs_progress
    */
   DIBS_PROGRESS_BEGUN = 1,
   /**
-   * The packet was taken.
+   * The packet was accepted.
    */
   DIBS_PROGRESS_STORED = 2,
   /**
-   * The packet had come before, and was ignored.
+   * The packet was a repetition, and was ignored.
    */
   DIBS_PROGRESS_DUPLICATE = 3,
   /**
@@ -596,11 +597,11 @@ enum dibs_progress
    */
   DIBS_PROGRESS_COMPLETE = 4,
   /**
-   * The sender lives.
+   * The packet was a heartbeat of the sender.
    */
   DIBS_PROGRESS_HEARTBEAT = 5,
   /**
-   * The sender asks for a status: it is due now.
+   * The packet was a hello, which asks for a status: it is due now.
    */
   DIBS_PROGRESS_HELLO = 6,
 };
@@ -629,7 +630,7 @@ enum dibs_advance
    */
   DIBS_ADVANCE_PENDING = 1,
   /**
-   * The frame is admitted, but the last one is being read: a later call publishes it.
+   * The frame is admitted, but the previous one is being read: a later call publishes it.
    */
   DIBS_ADVANCE_HELD = 2,
   /**
@@ -646,7 +647,7 @@ typedef uint32_t dibs_advance;
 #endif // __cplusplus
 
 /**
- * The origin of a force.
+ * Which rule a force comes from.
  */
 enum dibs_force_state
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -666,7 +667,7 @@ enum dibs_force_state
    */
   DIBS_FORCE_STATE_SATURATED = 2,
   /**
-   * The answer cannot be used: the force is the hold.
+   * The answer cannot be used: the force is the hold, pure damping.
    */
   DIBS_FORCE_STATE_SAFE = 3,
 };
@@ -687,27 +688,27 @@ enum dibs_reason
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * It is the command.
+   * It is the commanded motion.
    */
   DIBS_REASON_COMMANDED = 0,
   /**
-   * The nearest motion that walls, the caller's rows and the robot's speed allow.
+   * It is the closest motion that walls, the caller's rows and the robot's speed allow.
    */
   DIBS_REASON_NEAREST = 1,
   /**
-   * A half of that, or less: no more could be verified.
+   * It is half of that motion, or less: no more could be verified.
    */
   DIBS_REASON_SHORTENED = 2,
   /**
-   * Nothing but rest could be verified.
+   * No motion could be verified: it is zero.
    */
   DIBS_REASON_STOPPED = 3,
   /**
-   * The surface comes closer: the least motion that keeps the stand-off.
+   * The surface approaches: it is the smallest motion that keeps the stand-off.
    */
   DIBS_REASON_RETREATING = 4,
   /**
-   * No motion was found that certainly keeps the stand-off. The motion is the best one known.
+   * No motion was found that certainly keeps the stand-off. It is the best known one.
    */
   DIBS_REASON_NO_SAFE_MOTION = 5,
 };
@@ -720,7 +721,7 @@ typedef uint32_t dibs_reason;
 #endif // __cplusplus
 
 /**
- * On which side of the surface a tool's axis is.
+ * The side of the surface on which a tool's axis is.
  */
 enum dibs_side
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -728,7 +729,7 @@ enum dibs_side
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * Outside: where the triangles' corners are seen counter-clockwise.
+   * Outside: from there the triangles' corners appear counter-clockwise.
    */
   DIBS_SIDE_OUTSIDE = 0,
   /**
@@ -740,7 +741,7 @@ enum dibs_side
    */
   DIBS_SIDE_CROSSING = 2,
   /**
-   * No side: none was asked for.
+   * No side: not requested.
    */
   DIBS_SIDE_NOT_ASKED = 3,
   /**
@@ -752,7 +753,7 @@ enum dibs_side
    */
   DIBS_SIDE_OPEN_BOUNDARY = 5,
   /**
-   * No side: the sides are closer than the accuracy.
+   * No side: distances to both sides differ by less than the accuracy.
    */
   DIBS_SIDE_BELOW_ACCURACY = 6,
   /**
@@ -764,7 +765,7 @@ enum dibs_side
    */
   DIBS_SIDE_CUT_SHORT = 8,
   /**
-   * No side: the closest point is on an edge of more than two triangles that are no pairs.
+   * No side: the closest point is on an edge of more than two triangles that do not form pairs.
    */
   DIBS_SIDE_NON_MANIFOLD = 9,
 };
@@ -777,7 +778,7 @@ typedef uint32_t dibs_side;
 #endif // __cplusplus
 
 /**
- * How it is known that the tree's spheres cover the surface, so that no part of it is nearer than an answer says.
+ * How it is known that the tree's spheres cover the surface, so that no part of it is nearer than the answer.
  */
 enum dibs_coverage
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -793,8 +794,8 @@ enum dibs_coverage
    */
   DIBS_COVERAGE_PROVEN = 1,
   /**
-   * Nothing was measured: the tree's stretch limit is taken to hold. If it does not, a nearer part of the surface can be
-   * missed.
+   * Nothing was measured: the tree's stretch limit is assumed to hold. If it does not, a nearer part of the surface
+   * can be missed.
    */
   DIBS_COVERAGE_ASSUMED = 2,
 };
@@ -819,11 +820,11 @@ enum dibs_state
    */
   DIBS_STATE_NOMINAL = 0,
   /**
-   * The surface is acted on, with a growing margin.
+   * The surface may be acted on, with a growing margin.
    */
   DIBS_STATE_DEGRADED = 1,
   /**
-   * The surface is not acted on.
+   * The surface must not be acted on.
    */
   DIBS_STATE_SAFE = 2,
 };
@@ -836,7 +837,7 @@ typedef uint32_t dibs_state;
 #endif // __cplusplus
 
 /**
- * A processor and a tool whose tests were counted.
+ * A processor and a kind of tool whose instructions were measured.
  */
 enum dibs_cost
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -869,7 +870,7 @@ typedef uint32_t dibs_cost;
 #endif // __cplusplus
 
 /**
- * The reason for a whole query.
+ * Why a tick was a whole query.
  */
 enum dibs_fallback
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -877,15 +878,15 @@ enum dibs_fallback
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /**
-   * It was none.
+   * It was not a whole query.
    */
   DIBS_FALLBACK_NONE = 0,
   /**
-   * The first tick, or the one after an error.
+   * It was the first tick, or the first after an error.
    */
   DIBS_FALLBACK_START = 1,
   /**
-   * The surface's motion was not measured all the way.
+   * The surface's motion is not known without gaps.
    */
   DIBS_FALLBACK_SURFACE = 2,
   /**
@@ -893,7 +894,7 @@ enum dibs_fallback
    */
   DIBS_FALLBACK_JUMP = 3,
   /**
-   * More nodes had to be opened than there are places.
+   * More nodes were opened than the tracker has room for.
    */
   DIBS_FALLBACK_FULL = 4,
 };
@@ -906,12 +907,12 @@ typedef uint32_t dibs_fallback;
 #endif // __cplusplus
 
 /**
- * The bus's end of a guarded surface: it takes packets, checks complete frames in slices, publishes them, watches the
- * tree's bytes, and makes the statuses that go back.
+ * The bus's end of a guarded surface: it receives packets, checks complete frames in slices, publishes them, checks
+ * the tree's bytes in the background, and writes the statuses for the sender.
  *
- * Two contexts may use it, one at a time: an interrupt that takes bytes, and an idle loop that works. Both are below the
- * control tick's priority. The interrupt gets `DIBS_CODE_IN_USE` where it meets the loop at work: it keeps its bytes for
- * later, or the loop works with the interrupt masked.
+ * Two contexts may use it, one at a time: an interrupt that receives bytes, and an idle loop that checks. Both have a
+ * lower priority than the control tick. The interrupt gets `DIBS_CODE_IN_USE` while the loop uses the bus: it then
+ * keeps its bytes for later, or the loop masks the interrupt while it works.
  */
 typedef struct dibs_bus dibs_bus;
 
@@ -923,93 +924,93 @@ typedef struct dibs_bus dibs_bus;
 typedef struct dibs_contacts dibs_contacts;
 
 /**
- * The machine. It begins in the safe state.
+ * The machine. It starts in the safe state.
  *
  * One context at a time.
  */
 typedef struct dibs_failsafe dibs_failsafe;
 
 /**
- * The surface at one moment: vertices of the caller's, or the frame that a reader holds. Queries search it.
+ * The surface at one moment: the caller's vertices, or the frame that a reader holds. Queries search it.
  *
  * One context at a time.
  */
 typedef struct dibs_frame dibs_frame;
 
 /**
- * The control tick's end of a guarded surface: the closest pair of one tool on the surface as it is now, and the trust in
- * it.
+ * The control tick's end of a guarded surface: it finds the closest pair of one tool and the present surface, and
+ * decides whether to trust the surface.
  *
  * One context at a time: the control interrupt, of higher priority than the bus's.
  */
 typedef struct dibs_guard dibs_guard;
 
 /**
- * A query on one tree. It starts from its last answer.
+ * A query on one tree. It starts its search from its last answer.
  *
  * One context at a time.
  */
 typedef struct dibs_query dibs_query;
 
 /**
- * Reads the frame that was published last.
+ * Reads the latest published frame.
  *
  * One context at a time: the control interrupt.
  */
 typedef struct dibs_reader dibs_reader;
 
 /**
- * Assembles frames from packets, checks them, and publishes those that are complete and right.
+ * Assembles frames from packets, checks them, and publishes those that are complete and valid.
  *
  * One context at a time, of lower priority than the reader's: the bus interrupt.
  */
 typedef struct dibs_receiver dibs_receiver;
 
 /**
- * A background check of a tree's bytes: flash that rots after start-up gives wrong answers, and no error.
+ * A background check of a tree's bytes: flash that is corrupted after start-up gives wrong answers without an error.
  *
  * One context at a time.
  */
 typedef struct dibs_scrub dibs_scrub;
 
 /**
- * Sends the frames of a moving surface to a controller, and takes the statuses that come back.
+ * Sends the frames of a moving surface to a controller, and receives statuses.
  *
- * In the library for a computer alone. Its calls wait for the line, and are no work for a control loop. Unlike the other
- * objects it allocates when it starts, and has a thread, which reads the line: `dibs_sender_close` ends both. Another
- * `dibs_sender_init` in the storage without it leaves them until the program ends.
+ * Only in the library for a host computer. Its calls wait for the line, so they do not belong in a control loop.
+ * Unlike the other objects it allocates when it starts, and has a thread that reads the line: `dibs_sender_close` ends
+ * both. Another `dibs_sender_init` in the same storage without it leaks them.
  */
 typedef struct dibs_sender dibs_sender;
 
 /**
- * Two buffers of vertices: one end fills one, the other end holds the other, and neither waits. A third keeps the frame
- * before, from which a guard knows the motion.
+ * Two buffers of vertices: one end fills one while the other end reads the other, and neither waits. With a third
+ * buffer the previous frame is kept, from which a guard extrapolates.
  *
  * Any number of contexts may use it at once.
  */
 typedef struct dibs_surface dibs_surface;
 
 /**
- * A query that remembers its last answer's proof.
+ * A query that remembers the proof of its last answer.
  *
- * It keeps a copy of the surface, so that a frame is held for its copying alone, or it searches a reader's frame itself. One
- * context at a time.
+ * It keeps a copy of the surface, so that a frame is only held while it is copied; or it searches a reader's frame
+ * directly. One context at a time.
  */
 typedef struct dibs_tracker dibs_tracker;
 
 /**
- * A validated tree, by name `heart.dibs` of `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices; the library of
- * `cargo build -p dibs-c --features large` takes larger trees in place of these.
+ * A validated tree, such as `heart.dibs` from `dibs build heart.ply -o heart.dibs`. At most 65,536 vertices; the
+ * library that `cargo build -p dibs-c --features large` makes takes larger trees instead.
  *
  * Any number of contexts may use it at once.
  */
 typedef struct dibs_tree dibs_tree;
 
 /**
- * Publishes frames whose positions the caller has, for a reader of the same surface.
+ * Publishes frames of the caller's positions, for a reader of the same surface.
  *
- * A frame is one `dibs_writer_begin`, any number of `dibs_writer_push`, and one `dibs_writer_publish`. Only the stretch is
- * checked: frames that come over a line belong to a receiver. One context at a time.
+ * A frame is one `dibs_writer_begin`, any number of `dibs_writer_push`, and one `dibs_writer_publish`. Only the
+ * stretch is checked: frames that arrive over a line belong to a receiver. One context at a time.
  */
 typedef struct dibs_writer dibs_writer;
 
@@ -1018,17 +1019,17 @@ typedef struct dibs_writer dibs_writer;
  */
 typedef struct {
   /**
-   * The most work, in tests of spheres and planes, of which an exact triangle test counts as 8:
-   * `dibs_budget_for_instructions`. 0 asks for next to nothing: set it.
+   * The most work, in tests of spheres and planes, where an exact triangle test counts as 8:
+   * `dibs_budget_for_instructions`. 0 allows next to no work, so set it.
    */
   uint32_t budget;
   /**
-   * Largest length (mm) of the interval of a depth where the tool's axis crosses the surface; 0 for a 512th of the
+   * Largest length (mm) of the interval of a depth if the tool's axis crosses the surface; 0 for a 512th of the
    * axis' length.
    */
   float depth_tolerance;
   /**
-   * The sum of any of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
+   * Any sum of `DIBS_COLD`, `DIBS_UNSIGNED` and `DIBS_CONTACTS_OF`.
    */
   uint32_t flags;
   /**
@@ -1038,8 +1039,8 @@ typedef struct {
 } dibs_options;
 
 /**
- * Two limits on one input: beyond the first the state is degraded, beyond the second safe. Both `DIBS_UNLIMITED` where
- * the input is not watched; otherwise below 2^31.
+ * Two limits on one input: above the first the state is degraded, above the second safe. Both `DIBS_UNLIMITED` if the
+ * input has no limits; otherwise below 2^31.
  */
 typedef struct {
   /**
@@ -1047,7 +1048,7 @@ typedef struct {
    */
   uint32_t degraded;
   /**
-   * The second limit, not below the first.
+   * The second limit, at least the first.
    */
   uint32_t safe;
 } dibs_watch;
@@ -1057,7 +1058,7 @@ typedef struct {
  */
 typedef struct {
   /**
-   * Age of the surface; must be watched.
+   * Age of the surface; must have limits.
    */
   dibs_watch age;
   /**
@@ -1073,7 +1074,7 @@ typedef struct {
    */
   dibs_watch rejections;
   /**
-   * Transit of the published frame. With `DIBS_UNLIMITED` it has no limit, and is in the margin.
+   * Transit time of the published frame. With `DIBS_UNLIMITED` it has no limit, and is covered by the margin.
    */
   dibs_watch transit;
   /**
@@ -1081,7 +1082,7 @@ typedef struct {
    */
   dibs_watch source_age;
   /**
-   * Forged packets, of which 10 are forgotten each second; the limits are below 1,000.
+   * Forged packets, minus 10 for each second; the limits are below 1,000.
    */
   dibs_watch forgeries;
   /**
@@ -1089,29 +1090,29 @@ typedef struct {
    */
   float tissue_speed;
   /**
-   * Frames in a row that recover: 1 to 65,535.
+   * Consecutive good frames that recover: 1 to 65,535.
    */
   uint32_t recovery_frames;
   /**
-   * Steps in a row with every input within its first limit, before the one that recovers.
+   * Consecutive steps with every input within its first limit, before recovery.
    */
   uint32_t dwell;
   /**
-   * Other than 0 to leave the time on the way out of the margin and the limits: a delay is then not detected.
+   * Other than 0 to omit the transit time from the margin and the limits: a delay is then not detected.
    */
   uint32_t without_transit;
   /**
-   * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+   * 0 to leave the safe state only by an acknowledgement; otherwise automatically.
    */
   uint32_t automatic;
 } dibs_limits;
 
 /**
- * Limits of a surface besides the tree's stretch limit. A limit that is not a number refuses every frame.
+ * Limits of a surface in addition to the tree's stretch limit. A limit that is NaN refuses every frame.
  */
 typedef struct {
   /**
-   * No coordinate is beyond this (mm) on any axis. The smaller, the more damage it tells from a surface.
+   * Largest magnitude (mm) of a coordinate. The smaller it is, the more damage it detects.
    */
   float reach;
   /**
@@ -1119,18 +1120,18 @@ typedef struct {
    */
   float speed;
   /**
-   * Least size of a region as a part of its size at rest, 0.25 for example; 0 for no limit.
+   * Least size of a region relative to its size at rest, 0.25 for example; 0 for no limit.
    */
   float shrinkage;
   /**
-   * Farthest (mm) that a vertex may be from its place in the published frame, however long ago that was; 0 for a
-   * tenth of the reach, `INFINITY` for no limit.
+   * Largest displacement (mm) of a vertex from its position in the published frame, however long ago that was; 0 for
+   * a tenth of the reach, `INFINITY` for no limit.
    */
   float recovery;
 } dibs_surface_limits;
 
 /**
- * How far a surface is trusted, and how a tick asks. `dibs_guard_limits_of` makes one of two numbers.
+ * Limits on the trust in a surface, and options of a tick's query. `dibs_guard_limits_of` makes one from two numbers.
  */
 typedef struct {
   /**
@@ -1138,34 +1139,34 @@ typedef struct {
    */
   float speed;
   /**
-   * Largest age (ms) of a surface: about two periods of the source and the time on the way. From three quarters of it on
-   * the state is degraded, beyond it safe.
+   * Largest age (ms) of a surface: about two periods of the source plus the transit time. From three quarters of it
+   * on the state is degraded, above it safe.
    */
   uint32_t age;
   /**
-   * Ticks of the control loop a second, above 0: velocities count from it.
+   * Ticks of the control loop a second, above 0: needed for velocities.
    */
   uint32_t ticks_a_second;
   /**
-   * Options of every tick's query; its budget is the most work of a tick.
+   * Options of every tick's query; the budget limits the work of a tick.
    */
   dibs_options options;
   /**
-   * 0 to leave the safe state by an acknowledgement alone; otherwise without one.
+   * 0 to leave the safe state only by an acknowledgement; otherwise automatically.
    */
   uint32_t automatic;
   /**
-   * Other than 0 for a line on which no status goes back: a delayed frame is then taken for a new one, and no margin
+   * Other than 0 for a line that returns no status: a delayed frame is then taken for a new one, and no margin
    * covers the delay.
    */
   uint32_t without_transit;
   /**
-   * The fail-safe machine's limits; or null for those that follow from the four numbers above.
+   * The fail-safe machine's limits; or null to derive them from the numbers above.
    */
   const dibs_limits *trust;
   /**
-   * The published surfaces' limits; or null for those that follow from the speed and the tree's rest shape: no vertex is
-   * farther than four sizes of it.
+   * The published surfaces' limits; or null to derive them from the speed and the tree's rest shape: a reach of four
+   * times its size.
    */
   const dibs_surface_limits *surfaces;
 } dibs_guard_limits;
@@ -1189,7 +1190,7 @@ typedef struct {
 } dibs_vec3;
 
 /**
- * Where a mesh is as a whole: its point `p` is at `rotation p + shift`.
+ * A rigid pose of a mesh: its point `p` is at `rotation p + shift`.
  */
 typedef struct {
   /**
@@ -1203,19 +1204,19 @@ typedef struct {
 } dibs_pose;
 
 /**
- * Facts about a bus.
+ * State of a bus.
  */
 typedef struct {
   /**
-   * 0 before the first frame; then the epoch is 0, too.
+   * 0 before the first frame; the epoch is then 0 as well.
    */
   uint32_t is_published;
   /**
-   * Number of the frame published last; wraps.
+   * Number of the latest published frame; wraps.
    */
   uint32_t epoch;
   /**
-   * Whole rounds of the check of the tree's bytes; wraps.
+   * Completed rounds of the check of the tree's bytes; wraps.
    */
   uint32_t rounds;
 } dibs_bus_facts;
@@ -1235,7 +1236,7 @@ typedef struct {
    */
   float damping;
   /**
-   * Damping (N s/mm, at least 0) where there is no answer to act on; 0 lets go of the tool.
+   * Damping (N s/mm, at least 0) if there is no answer to act on; 0 releases the tool.
    */
   float hold_damping;
   /**
@@ -1243,27 +1244,28 @@ typedef struct {
    */
   float max_force;
   /**
-   * Reach of the wall from the surface (mm, above 0).
+   * Distance from the surface at which the wall begins (mm, above 0).
    */
   float margin;
 } dibs_wall;
 
 /**
- * The closest pair. `dibs_proximity_interval` gives the interval that holds its separation.
+ * The closest pair. `dibs_proximity_interval` gives the interval that contains its separation.
  *
- * Where the side is none of the first three, the numbers are those of a tool outside.
+ * If the side is none of the first three, the numbers are those of a tool outside.
  */
 typedef struct {
   /**
-   * Signed separation (mm) of the best pair found: negative where tool and surface overlap.
+   * Signed separation (mm) of the best pair found: negative if tool and surface overlap.
    */
   float separation;
   /**
-   * The interval's lower end (mm): equal to `separation`, unless the budget ran out or the axis crosses.
+   * The interval's lower bound (mm): equal to `separation`, unless the budget ran out or the axis crosses the
+   * surface.
    */
   float lower;
   /**
-   * No separation above is off by more (mm).
+   * Largest error (mm) of the separations above.
    */
   float accuracy;
   /**
@@ -1271,11 +1273,11 @@ typedef struct {
    */
   uint32_t side;
   /**
-   * A `dibs_coverage`: whether the stretch that the answer rests on was checked.
+   * A `dibs_coverage`: whether the stretch that the answer depends on was checked.
    */
   uint32_t coverage;
   /**
-   * Distance (mm) from the tool's axis to the surface: 0 where it crosses.
+   * Distance (mm) from the tool's axis to the surface: 0 if they cross.
    */
   float axis_distance;
   /**
@@ -1287,11 +1289,11 @@ typedef struct {
    */
   dibs_vec3 point_on_tool;
   /**
-   * Unit vector that leads out; zero where none does.
+   * Unit vector that points out of the surface; zero if it is undefined.
    */
   dibs_vec3 direction;
   /**
-   * Place of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.
+   * Position of the pair along the tool's axis: 0 at its start, 1 at its end; 0 for a sphere.
    */
   float axis_parameter;
   /**
@@ -1325,11 +1327,11 @@ typedef struct {
    */
   dibs_vec3 force;
   /**
-   * In N mm, about the point asked for. Always finite; zero of one pair.
+   * In N mm, about the given point. Always finite; zero for a single pair.
    */
   dibs_vec3 torque;
   /**
-   * Their origin.
+   * Which rule they come from.
    */
   dibs_force_state state;
   /**
@@ -1339,8 +1341,8 @@ typedef struct {
 } dibs_force;
 
 /**
- * A rigid instrument: all points within `radius` of the segment from `start` to `end`, in the mesh's frame and unit
- * (mm). A capsule; a sphere where both ends are equal.
+ * A rigid instrument: all points within `radius` of the segment from `start` to `end`, in the mesh's coordinates (mm).
+ * A capsule; a sphere if both ends are equal.
  */
 typedef struct {
   /**
@@ -1358,7 +1360,7 @@ typedef struct {
 } dibs_tool;
 
 /**
- * Facts that hold for a list.
+ * Properties of a list.
  */
 typedef struct {
   /**
@@ -1366,15 +1368,15 @@ typedef struct {
    */
   uint32_t count;
   /**
-   * Every contact whose separation is below this (mm) is in the list.
+   * Every contact with a separation below this (mm) is in the list.
    */
   float bound;
   /**
-   * No separation is too high by more (mm).
+   * No separation is too high by more than this (mm).
    */
   float accuracy;
   /**
-   * 1 where contacts within the margin were left out because the list is full; else 0.
+   * 1 if contacts within the margin were left out because the list is full; else 0.
    */
   uint32_t is_full;
 } dibs_contacts_facts;
@@ -1384,11 +1386,11 @@ typedef struct {
  */
 typedef struct {
   /**
-   * Signed separation (mm): the lower end of the pair's interval, as `lower` of `dibs_proximity`.
+   * Signed separation (mm): the lower bound of the pair's interval, as `lower` of `dibs_proximity`.
    */
   float separation;
   /**
-   * Unit vector that leads out.
+   * Unit vector that points out of the surface.
    */
   dibs_vec3 normal;
   /**
@@ -1400,15 +1402,15 @@ typedef struct {
    */
   dibs_vec3 point_on_tool;
   /**
-   * Place of the pair along the tool's axis: 0 at its start, 1 at its end.
+   * Position of the pair along the tool's axis: 0 at its start, 1 at its end.
    */
   float axis_parameter;
   /**
-   * The surface's number in a scene; 0 for a single surface.
+   * Index of the surface in a scene; 0 for a single surface.
    */
   uint32_t surface;
   /**
-   * The tool's number in a chain; 0 for a single tool.
+   * Index of the tool in a chain; 0 for a single tool.
    */
   uint32_t tool;
   /**
@@ -1424,7 +1426,7 @@ typedef struct {
    */
   float barycentric[3];
   /**
-   * Velocity (mm/s) of the surface there: zero until `dibs_contacts_set_velocities`, and there in a guard's list.
+   * Velocity (mm/s) of the surface at the contact: zero until `dibs_contacts_set_velocities`; a guard's list has it.
    */
   dibs_vec3 velocity;
 } dibs_contact;
@@ -1435,8 +1437,8 @@ typedef struct {
  */
 typedef struct {
   /**
-   * Factors of the linear velocity: the contact's normal; where the deepest point is inside the tool's axis, the mean of
-   * two triangles'.
+   * Factors of the linear velocity: the contact's normal; if the deepest point is inside the tool's axis, the mean
+   * of two triangles' normals.
    */
   float linear[3];
   /**
@@ -1444,17 +1446,17 @@ typedef struct {
    */
   float angular[3];
   /**
-   * The least sum allowed (mm/s).
+   * Lower bound of the sum (mm/s).
    */
   float least;
 } dibs_row;
 
 /**
- * The frame that was published last, and its age.
+ * The latest published frame, and its age.
  */
 typedef struct {
   /**
-   * 0 before the first frame; then the rest is 0, too.
+   * 0 before the first frame; all other fields are then 0 as well.
    */
   uint32_t is_published;
   /**
@@ -1462,7 +1464,7 @@ typedef struct {
    */
   uint32_t epoch;
   /**
-   * When its first packet came, on the receiver's clock; wraps.
+   * Arrival of its first packet, on the receiver's clock; wraps.
    */
   uint32_t received;
   /**
@@ -1472,7 +1474,7 @@ typedef struct {
 } dibs_age;
 
 /**
- * The health of the bus. Times in ms, `UINT32_MAX` for one that is not known.
+ * The health of the bus. Times in ms, `UINT32_MAX` if unknown.
  */
 typedef struct {
   /**
@@ -1488,11 +1490,11 @@ typedef struct {
    */
   uint32_t rejections;
   /**
-   * Packets without a genuine tag, less 10 for each second.
+   * Packets without an authentic tag, minus 10 for each second.
    */
   uint32_t forgeries;
   /**
-   * Transit of the published frame, at most.
+   * Upper bound on the transit time of the published frame.
    */
   uint32_t transit;
   /**
@@ -1506,19 +1508,19 @@ typedef struct {
  */
 typedef struct {
   /**
-   * The published frame and its age: of `dibs_reader_latest`.
+   * The published frame and its age, from `dibs_reader_latest`.
    */
   dibs_age age;
   /**
-   * The bus's health: of `dibs_reader_link`.
+   * The bus's health, from `dibs_reader_link`.
    */
   dibs_link link;
   /**
-   * Code of the query on that frame: `DIBS_CODE_OK` where it gave an answer, and where it was not asked.
+   * Code of the query on that frame: `DIBS_CODE_OK` if it gave an answer, or there was no query.
    */
   uint32_t query;
   /**
-   * Other than 0 once the tree's bytes were found changed: of `dibs_scrub_step`. Leave it set.
+   * Other than 0 once `dibs_scrub_step` has found the tree's bytes changed. Leave it set.
    */
   uint32_t is_tree_corrupt;
 } dibs_observation;
@@ -1536,17 +1538,17 @@ typedef struct {
    */
   uint32_t cause;
   /**
-   * Most that the tissue moves (mm) in the surface's age and transit.
+   * Largest motion of the tissue (mm) in the surface's age and transit time.
    */
   float margin;
   /**
-   * 1 where only an acknowledgement is missing to leave the safe state; else 0.
+   * 1 if only an acknowledgement is missing to leave the safe state; else 0.
    */
   uint32_t waits_for_acknowledgement;
 } dibs_verdict;
 
 /**
- * A filter of commands. `dibs_filter_of` makes one of two numbers.
+ * A filter of commands. `dibs_filter_of` makes one from two numbers.
  */
 typedef struct {
   /**
@@ -1554,16 +1556,16 @@ typedef struct {
    */
   float stand_off;
   /**
-   * Most speed (mm/s) of the robot's reference point, and of the lever's end by a rotation; above 0.
+   * Largest speed (mm/s) of the robot's reference point, and of the lever arm's end in a rotation; above 0.
    */
   float speed;
   /**
-   * A rotation by one radian counts as much as a translation by this length (mm), at least 1; 0 for the distance from the
-   * reference point to the farthest end of a tool's axis.
+   * Lever arm: a rotation by one radian counts as a translation by this length (mm), at least 1; 0 for the distance
+   * from the reference point to the farthest end of a tool's axis.
    */
   float lever;
   /**
-   * A tool comes nearer to its stand-off at no more than its distance from there divided by this time (s), at least 0; 0 for
+   * A tool approaches its stand-off no faster than its distance from it divided by this time (s), at least 0; 0 for
    * no such limit.
    */
   float approach;
@@ -1576,13 +1578,14 @@ typedef struct {
    */
   uint32_t cost;
   /**
-   * As of `dibs_options`.
+   * As in `dibs_options`.
    */
   float depth_tolerance;
 } dibs_filter;
 
 /**
- * The motion of a rigid instrument in a period: its reference point goes straight, and the instrument turns about it.
+ * The motion of a rigid instrument in a period: its reference point moves in a straight line, and the instrument
+ * rotates about it.
  */
 typedef struct {
   /**
@@ -1600,22 +1603,23 @@ typedef struct {
 } dibs_motion;
 
 /**
- * How far the tissue may be from the surface that is searched, besides that surface's own position error.
+ * How far the tissue may be from the searched surface, in addition to that surface's own position error.
  */
 typedef struct {
   /**
-   * At the start of the period (mm, at least 0): the speed times age and transit, and the error of registration.
+   * At the start of the period (mm, at least 0): the tissue's speed times age and transit time, plus the error of
+   * registration.
    */
   float now;
   /**
-   * Most speed (mm/s, at least 0) of the tissue in the period.
+   * Largest speed (mm/s, at least 0) of the tissue in the period.
    */
   float speed;
 } dibs_uncertainty;
 
 /**
  * An inequality on the motion: `linear . translation + angular . rotation >= least`. For limits that only the caller
- * knows: joints, a remote centre, a guide. They hold before the walls do.
+ * knows: joints, a remote centre of motion, a guide. They take precedence over the walls.
  */
 typedef struct {
   /**
@@ -1627,7 +1631,7 @@ typedef struct {
    */
   float angular[3];
   /**
-   * The least sum allowed (mm).
+   * Lower bound of the sum (mm).
    */
   float least;
 } dibs_motion_row;
@@ -1641,37 +1645,38 @@ typedef struct {
    */
   dibs_motion motion;
   /**
-   * No separation (mm) of any tool is less at any instant of the period, wherever the tissue is within its uncertainty.
+   * At no instant of the period the separation (mm) of any tool is less, as long as the tissue is within its
+   * uncertainty.
    */
   float least_separation;
   /**
-   * Why it is this motion.
+   * Why this motion was chosen.
    */
   dibs_reason reason;
   /**
-   * Queries made.
+   * Number of queries.
    */
   uint32_t queries;
   /**
-   * Instructions that the queries took, by the filter's cost.
+   * Instructions of the queries, by the filter's cost model.
    */
   uint32_t instructions;
 } dibs_admitted;
 
 /**
- * Facts about a frame.
+ * Properties of a frame.
  */
 typedef struct {
   /**
-   * Vertices.
+   * Number of vertices.
    */
   uint32_t vertices;
   /**
-   * No vertex is farther (mm) than this from where it is here. Part of the accuracy of every answer.
+   * Largest error (mm) of a vertex position. Part of the accuracy of every answer.
    */
   float position_error;
   /**
-   * The largest stretch, 1 for none; 0 where it was not measured.
+   * The largest stretch, 1 for none; 0 if it was not measured.
    */
   float stretch;
 } dibs_frame_facts;
@@ -1681,49 +1686,50 @@ typedef struct {
  */
 typedef struct {
   /**
-   * No true separation is less.
+   * Lower bound of the true separation.
    */
   float lower;
   /**
-   * No true separation is more.
+   * Upper bound of the true separation.
    */
   float upper;
 } dibs_interval;
 
 /**
- * The answer of a tick, of one tracker or of several.
+ * The answer of a tick, from one tracker or several.
  */
 typedef struct {
   /**
-   * The closest pair; its counts of tests are this tick's. Of several pairs its interval begins at the least lower end of
-   * all, its accuracy is the worst, its tests are those of all, and its side is `DIBS_SIDE_CUT_SHORT` if the budget left
-   * that of any pair open.
+   * The closest pair; its counts of tests are this tick's. For several pairs its interval starts at the least lower
+   * bound of all, its accuracy is the worst, its tests are those of all, and its side is `DIBS_SIDE_CUT_SHORT` if
+   * the budget ended before the side of any pair was known.
    */
   dibs_proximity proximity;
   /**
-   * Other than 0 where this tick's search found no side, because its budget ended or the side is undefined: it is the last
-   * tick's, as far as the motion since leaves it possible. The pair may not be the closest then; the interval holds.
+   * Other than 0 if this tick's search found no side, because its budget ended or the side is undefined: the side is
+   * then the last tick's, if the motion since allows that. The pair may then not be the closest; the interval is
+   * still valid.
    */
   uint32_t is_kept;
   /**
-   * A `dibs_fallback`: the first reason for a whole query, of the pairs that were searched.
+   * A `dibs_fallback`: the first reason for a whole query, among the pairs that were searched.
    */
   uint32_t fallback;
   /**
-   * The most (mm) that tool and surface together have moved since the last tick; -1 where it is not known, and of several
+   * Upper bound (mm) on the motion of tool and surface together since the last tick; -1 if unknown, and for several
    * pairs.
    */
   float moved;
   /**
-   * Opened nodes that the tracker remembers, of `DIBS_OPENED`.
+   * Opened nodes that the tracker remembers, of at most `DIBS_OPENED`.
    */
   uint32_t opened;
   /**
-   * That pair's number, of several; else 0.
+   * Index of the pair, if there are several; else 0.
    */
   uint32_t pair;
   /**
-   * Pairs that were searched; the others were certain to be farther.
+   * Number of pairs that were searched; the others were certain to be farther.
    */
   uint32_t searched;
 } dibs_tracked;
@@ -1733,57 +1739,57 @@ typedef struct {
  */
 typedef struct {
   /**
-   * A `dibs_code`: `DIBS_CODE_OK` where there is a pair; otherwise why there is none. Before the first surface the rest is
-   * 0, and the residual -1.
+   * A `dibs_code`: `DIBS_CODE_OK` if there is a pair; otherwise why there is none. Before the first surface all
+   * other fields are 0, and the residual is -1.
    */
   uint32_t outcome;
   /**
-   * The pair; no numbers where there is none. Its accuracy covers the frame's error and the extrapolation's.
+   * The pair; NaN if there is none. Its accuracy covers the frame's error and the extrapolation's.
    */
   dibs_tracked tracked;
   /**
-   * Number of the frame before that of the answer's age; the same for a surface that is held.
+   * Number of the frame before the latest one; the same number if the surface is held at the latest frame.
    */
   uint32_t before;
   /**
-   * Its time in steps: 0 is the frame before, 1 the last frame, 3 the end of the extrapolation.
+   * Its time in frame intervals: 0 is the previous frame, 1 the latest one, 3 the end of the extrapolation.
    */
   float t;
   /**
-   * Error (mm) of each position, that of the extrapolation included.
+   * Error (mm) of each position, including that of the extrapolation.
    */
   float position_error;
   /**
-   * The distance (mm) of the last frames from their extrapolation; -1 for a surface that is held.
+   * The distance (mm) of recent frames from their extrapolation; -1 if the surface is held at the latest frame.
    */
   float residual;
   /**
-   * Its velocity (mm/s) at the pair: from one frame to the next, zero for a surface that is held.
+   * Its velocity (mm/s) at the pair: from one frame to the next, zero if the surface is held.
    */
   dibs_vec3 velocity;
 } dibs_searched;
 
 /**
- * The answer of a tick: what a wall may act on, and how it came about.
+ * The answer of a tick: the pair that a wall may act on, and how it was found.
  */
 typedef struct {
   /**
-   * A `dibs_code`: `DIBS_CODE_OK` where there is a pair to act on; otherwise why there is none.
+   * A `dibs_code`: `DIBS_CODE_OK` if there is a pair to act on; otherwise why there is none.
    */
   uint32_t outcome;
   /**
-   * The closest pair to act on; no numbers where there is none. Its accuracy covers the frame's error, the
-   * extrapolation's, and the tissue's motion where the surface lags; where its side is not known it is the last one whose
-   * side was.
+   * The closest pair to act on; NaN if there is none. Its accuracy covers the frame's error, the extrapolation's
+   * error, and the tissue's motion during the surface's lag. If its side is unknown, it is the last pair whose side
+   * was known.
    */
   dibs_proximity closest;
   /**
-   * Its certified interval: act on the lower end. From minus to plus infinity where there is no pair.
+   * Its certified interval: act on the lower bound. From minus to plus infinity if there is no pair.
    */
   dibs_interval interval;
   /**
-   * Velocity (mm/s) of the tool's point of the pair relative to the surface's; without a pair that of the middle of the
-   * axis. Zero at the first tick, and no number without a tool.
+   * Velocity (mm/s) of the tool's point of the pair relative to the surface's; without a pair that of the middle of
+   * the axis. Zero at the first tick, NaN without a tool.
    */
   dibs_vec3 velocity;
   /**
@@ -1795,8 +1801,8 @@ typedef struct {
    */
   dibs_age age;
   /**
-   * Time (ms) by which the surface that was searched is behind the present, as far as its error does not cover it;
-   * `UINT32_MAX` where that is not known.
+   * Time (ms) by which the searched surface lags behind the present, as far as its error does not cover it;
+   * `UINT32_MAX` if unknown.
    */
   uint32_t lag;
   /**
@@ -1804,25 +1810,26 @@ typedef struct {
    */
   dibs_link link;
   /**
-   * The surface that was searched, and the pair on it, trusted or not: for records.
+   * The searched surface, and the pair on it, trusted or not: for records.
    */
   dibs_searched searched;
 } dibs_answer;
 
 /**
- * A chain of tools, whose axes touch each other, and the surfaces around it. A chain and one surface are a scene too.
+ * A chain of tools whose axes touch each other, and the surfaces around it. A chain and one surface are a scene as
+ * well.
  */
 typedef struct {
   /**
-   * Addresses of queries, one for each surface, on the surface's tree. No query is there twice.
+   * Addresses of queries, one for each surface, on the surface's tree. No query may be listed twice.
    */
   dibs_query *const *queries;
   /**
-   * Addresses of the surfaces' frames, in the same order. No frame is there twice.
+   * Addresses of the surfaces' frames, in the same order. No frame may be listed twice.
    */
   dibs_frame *const *frames;
   /**
-   * Surfaces: 1 to `DIBS_SURFACES`.
+   * Number of surfaces: 1 to `DIBS_SURFACES`.
    */
   uint32_t surface_count;
   /**
@@ -1830,7 +1837,7 @@ typedef struct {
    */
   const dibs_tool *tools;
   /**
-   * Tools: 1 to `DIBS_TOOLS`.
+   * Number of tools: 1 to `DIBS_TOOLS`.
    */
   uint32_t tool_count;
 } dibs_scene;
@@ -1840,22 +1847,23 @@ typedef struct {
  */
 typedef struct {
   /**
-   * The surface's number in the scene.
+   * Index of the surface in the scene.
    */
   uint32_t surface;
   /**
-   * The tool's number in the chain.
+   * Index of the tool in the chain.
    */
   uint32_t tool;
   /**
-   * The pair. Its interval begins at the least lower end of all pairs, its accuracy is the worst, its tests are those
-   * of all. Its side is `DIBS_SIDE_CUT_SHORT` if the budget left that of any pair open.
+   * The pair. Its interval starts at the least lower bound of all pairs, its accuracy is the worst, and its tests
+   * are those of all pairs. Its side is `DIBS_SIDE_CUT_SHORT` if the budget ended before the side of any pair was
+   * known.
    */
   dibs_proximity proximity;
 } dibs_closest;
 
 /**
- * How a surface is sent. `dibs_sender_settings_of` makes one.
+ * Settings of a sender. `dibs_sender_settings_of` returns the defaults.
  */
 typedef struct {
   /**
@@ -1863,11 +1871,11 @@ typedef struct {
    */
   uint32_t quantised;
   /**
-   * Sends only the vertices that moved by more than this (mm); below 0 every frame whole.
+   * Sends only the vertices that moved by more than this (mm); below 0 every frame is whole.
    */
   float partial;
   /**
-   * With partial frames, the most frames from one whole frame to the next.
+   * With partial frames, the largest number of frames from one whole frame to the next.
    */
   uint32_t whole_every;
   /**
@@ -1875,8 +1883,8 @@ typedef struct {
    */
   uint32_t heartbeat;
   /**
-   * Number of this run of the sender. The receiver ignores packets of an earlier run, which is one with a smaller
-   * number, so a program that starts anew needs a larger one. By default the time in tenths of a second.
+   * Session number of this sender. The receiver ignores packets of earlier sessions, whose numbers are smaller, so a
+   * program that restarts needs a larger one. By default the time in tenths of a second.
    */
   uint32_t session;
 } dibs_sender_settings;
@@ -1894,15 +1902,15 @@ typedef struct {
    */
   uint32_t is_partial;
   /**
-   * Rows in it.
+   * Number of rows in it.
    */
   uint32_t rows;
   /**
-   * Packets that it took.
+   * Number of its packets.
    */
   uint32_t packets;
   /**
-   * Bytes of the packets, without a serial line's framing.
+   * Bytes of its packets, without the framing of a serial line.
    */
   uint32_t bytes;
   /**
@@ -1912,7 +1920,7 @@ typedef struct {
 } dibs_sent;
 
 /**
- * Facts about a sender.
+ * State of a sender.
  */
 typedef struct {
   /**
@@ -1920,7 +1928,7 @@ typedef struct {
    */
   uint32_t frames;
   /**
-   * Statuses that came back.
+   * Statuses received.
    */
   uint32_t statuses;
   /**
@@ -1928,18 +1936,18 @@ typedef struct {
    */
   uint32_t in_flight;
   /**
-   * 0 until the receiver has published a frame of this sender; then `acknowledged` is 0, too.
+   * 0 until the receiver has published a frame of this sender; `acknowledged` is then 0 as well.
    */
   uint32_t is_acknowledged;
   /**
-   * The last of them.
+   * Number of the latest acknowledged frame.
    */
   uint32_t acknowledged;
 } dibs_sender_facts;
 
 /**
- * The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices each move
- * straight and evenly.
+ * The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices
+ * each move straight and evenly.
  */
 typedef struct {
   /**
@@ -1951,8 +1959,8 @@ typedef struct {
    */
   dibs_tool to;
   /**
-   * The surface at the start and at the end: 0 is the tracker's surface before the last `dibs_tracker_set_frame`, 1 the one
-   * since then.
+   * The surface at the start and at the end: 0 is the tracker's surface before the last `dibs_tracker_set_frame`, 1
+   * the one since then.
    */
   float share[2];
   /**
@@ -1974,8 +1982,8 @@ typedef struct {
    */
   float clear_until;
   /**
-   * The first time at which they were found within the margin, or farther by no more than the accuracy; -1 for none. With
-   * none and `clear_until` below 1 the samples were too few to decide.
+   * The first time at which they were found within the margin, or farther by no more than the accuracy; -1 for none.
+   * With none and `clear_until` below 1 the samples were too few to decide.
    */
   float contact;
   /**
@@ -1989,7 +1997,7 @@ typedef struct {
 } dibs_swept;
 
 /**
- * Facts about a tree.
+ * Properties of a tree.
  */
 typedef struct {
   /**
@@ -1997,7 +2005,7 @@ typedef struct {
    */
   uint32_t vertices;
   /**
-   * Rows of a frame: the nodes that carry the surface where the tree has any (`dibs build --nodes`), else its vertices.
+   * Rows of a frame: the nodes that move the surface if the tree has any (`dibs build --nodes`), else its vertices.
    */
   uint32_t rows;
   /**
@@ -2005,7 +2013,7 @@ typedef struct {
    */
   uint32_t triangles;
   /**
-   * Nodes.
+   * Nodes of the tree of spheres.
    */
   uint32_t nodes;
   /**
@@ -2021,25 +2029,25 @@ typedef struct {
    */
   float stretch;
   /**
-   * Largest distance (mm) of a vertex from its place in the mesh's file.
+   * Largest distance (mm) of a vertex from its position in the mesh's file.
    */
   float position_error;
   /**
-   * Vertices of the mesh's file, those of no triangle too: positions of a frame in the file's order.
+   * Vertices of the mesh's file, including those of no triangle: positions of a frame in the file's order.
    */
   uint32_t file_vertices;
   /**
-   * Triangles of the mesh's file, those too that the builder dropped.
+   * Triangles of the mesh's file, including those that the builder dropped.
    */
   uint32_t file_triangles;
   /**
-   * Unit of the mesh's file: 0 not known, 1 mm, 2 cm, 3 m, 4 inch, 5 micrometre. All lengths of the tree are in mm.
+   * Unit of the mesh's file: 0 unknown, 1 mm, 2 cm, 3 m, 4 inch, 5 micrometre. All lengths of the tree are in mm.
    */
   uint8_t unit;
 } dibs_tree_facts;
 
 /**
- * A point of the mesh's file (mm), which single precision may not hold.
+ * A point of the mesh's file (mm), in double precision.
  */
 typedef struct {
   /**
@@ -2061,7 +2069,7 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * Makes the bus's end of a surface, once. `dibs_start` makes it with all that it needs.
+ * Makes the bus's end of a surface, once. `dibs_start` makes it together with all other objects.
  *
  * @param storage  `DIBS_BUS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size     Bytes of the storage.
@@ -2069,9 +2077,9 @@ extern "C" {
  * @param tree     Its tree.
  * @param limits   The guard's limits: the same as for `dibs_guard_init`.
  * @param bus      Receives the bus's address.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many rows; `DIBS_CODE_STORAGE_SIZE`
- *         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
- *         `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` where the limits need one; or a misuse.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of rows is not the tree's;
+ *         `DIBS_CODE_STORAGE_SIZE` also if the surface has only two buffers; `DIBS_CODE_TAKEN` if its end was taken;
+ *         `DIBS_CODE_TREE_NO_METRIC`; `DIBS_CODE_TREE_NO_REST_SHAPE` if the limits need one; or a misuse.
  */
 dibs_code dibs_bus_init(void *storage,
                         size_t size,
@@ -2081,10 +2089,10 @@ dibs_code dibs_bus_init(void *storage,
                         dibs_bus **bus);
 
 /**
- * Takes bytes of a serial line or another stream. `dibs_bus_counters` says what became of them, by cause.
+ * Receives bytes from a serial line or another stream. `dibs_bus_counters` counts the outcomes by cause.
  *
- * Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped where the next one begins
- * before it was checked.
+ * Cost: linear in the bytes. `dibs_bus_work` must keep up: a complete frame is dropped if the next one begins before
+ * it was checked.
  *
  * @param bus     The bus.
  * @param bytes   The bytes, read during the call.
@@ -2098,7 +2106,7 @@ dibs_code dibs_bus_receive(dibs_bus *bus,
                            uint32_t now);
 
 /**
- * Takes one packet, from a bus that keeps packets apart.
+ * Receives one packet, from a bus that preserves packet boundaries.
  *
  * Cost: linear in the bytes.
  *
@@ -2116,21 +2124,22 @@ dibs_code dibs_bus_packet(dibs_bus *bus,
                           dibs_progress *progress);
 
 /**
- * Takes a whole frame from this process, say from a solver's own thread. `dibs_bus_work` then checks and publishes it, as
- * one that came in packets.
+ * Receives a whole frame from this process, for example from a solver's own thread. `dibs_bus_work` then checks and
+ * publishes it like a frame of packets.
  *
- * The call counts as a sign of life, and its transit time is 0. One source at a time: a frame of packets that is in work
- * is abandoned. No lock: the control tick reads the last surface meanwhile.
+ * The call counts as a good packet, and the frame's transit time is 0. Use one source at a time: an unfinished frame
+ * of packets is abandoned. There is no lock: the control tick reads the last surface meanwhile.
  *
- * Cost: linear in the vertices, several readings each.
+ * Cost: linear in the vertices, each of which is read several times.
  *
  * @param bus        The bus.
- * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order. Read
- *                   during the call.
+ * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order.
+ *                   Read during the call.
  * @param count      Their number: the vertices of the mesh's file.
- * @param captured   When the surface was so, on the receiver's clock, in ms: at most 65,534 before `now`.
+ * @param captured   Time of capture on the receiver's clock, in ms: at most 65,534 before `now`.
  * @param now        The receiver's clock, in ms; wraps.
- * @return `DIBS_CODE_OK`, the cause of a refusal as `dibs_receiver_accept` (the last good surface stays), or a misuse.
+ * @return `DIBS_CODE_OK`, a cause of refusal as from `dibs_receiver_accept` (the last good surface stays), or a
+ *         misuse.
  */
 dibs_code dibs_bus_frame(dibs_bus *bus,
                          const float *positions,
@@ -2139,20 +2148,20 @@ dibs_code dibs_bus_frame(dibs_bus *bus,
                          uint32_t now);
 
 /**
- * The same as `dibs_bus_frame`, with the mesh as a whole elsewhere, say by a tracker of the patient: tools, answers and
- * commands are then in the world. A frame without a pose is where the mesh's file has it.
+ * The same as `dibs_bus_frame`, with a rigid pose of the whole mesh, for example from a tracker of the patient: tools,
+ * answers and commands are then in world coordinates. Without a pose the mesh is where its file has it.
  *
- * The limits on speed and recovery hold for positions and pose together; the reach is that of the positions alone. Where a
- * step turns by more than half a radian the surface is held, not extrapolated.
+ * The limits on speed and recovery apply to positions and pose together; the reach applies to the positions alone. If
+ * a step rotates by more than half a radian, the surface is held at the last frame, not extrapolated.
  *
  * @param bus        The bus.
  * @param positions  As for `dibs_bus_frame`.
  * @param count      Their number.
  * @param pose       The pose, read during the call.
- * @param captured   When the surface was so, and there.
+ * @param captured   Time of capture of positions and pose.
  * @param now        The receiver's clock, in ms; wraps.
- * @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM` for
- *         numbers that are no pose.
+ * @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM`
+ *         for an invalid pose.
  */
 dibs_code dibs_bus_frame_at(dibs_bus *bus,
                             const float *positions,
@@ -2162,14 +2171,14 @@ dibs_code dibs_bus_frame_at(dibs_bus *bus,
                             uint32_t now);
 
 /**
- * Does a slice of the checks: looks at some rows and triangles of the frame that arrives, and publishes it once it is
+ * Does a slice of the checks: checks some rows and triangles of the arriving frame, and publishes it once it is
  * complete and admitted. Without a frame it checks the tree's bytes.
  *
  * Cost: linear in `work`.
  *
  * @param bus      The bus.
- * @param work     Most rows and triangles that are looked at.
- * @param advance  Receives the outcome, `DIBS_ADVANCE_PENDING` if more is due at once; or null.
+ * @param work     Most rows and triangles that are checked.
+ * @param advance  Receives the outcome, `DIBS_ADVANCE_PENDING` if more work is due at once; or null.
  * @return As `dibs_receiver_advance`.
  */
 dibs_code dibs_bus_work(dibs_bus *bus,
@@ -2177,15 +2186,15 @@ dibs_code dibs_bus_work(dibs_bus *bus,
                         dibs_advance *advance);
 
 /**
- * Writes the status that is due for the sender, whose next frame echoes it, which measures the transit of frames.
- * Call it after each slice of work: none is due unless there is news, or 100 ms went by.
+ * Writes the status for the sender, if one is due. The sender's next frame echoes it, which measures the transit time
+ * of frames. Call it after each slice of work: a status is due if there is news, or 100 ms have passed.
  *
  * @param bus       The bus.
  * @param now       The receiver's clock, in ms.
  * @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
- * @param out       Receives it.
- * @param capacity  Bytes that there is room for: `DIBS_STATUS` at least.
- * @param length    Receives its length; 0 where none is due.
+ * @param out       Receives the status.
+ * @param capacity  Size of `out` in bytes: at least `DIBS_STATUS`.
+ * @param length    Receives the status's length; 0 if none is due.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
  */
 dibs_code dibs_bus_status(dibs_bus *bus,
@@ -2204,25 +2213,25 @@ dibs_code dibs_bus_status(dibs_bus *bus,
 dibs_code dibs_bus_counters(dibs_bus *bus, uint32_t *counters);
 
 /**
- * Reads the facts about a bus.
+ * Reads the state of a bus.
  *
  * @param bus    The bus.
- * @param facts  Receives the facts.
+ * @param facts  Receives the state.
  */
 dibs_code dibs_bus_get_facts(dibs_bus *bus, dibs_bus_facts *facts);
 
 /**
- * Position (mm) of a vertex, or node, in the frame published last, for a checksum of the published rows, or a log.
+ * Position (mm) of a vertex, or node, in the latest published frame, for a checksum of the published rows, or a log.
  *
- * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex, or a
- *         misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` beyond the last vertex,
+ *         or a misuse.
  */
 dibs_code dibs_bus_position(dibs_bus *bus,
                             uint32_t vertex,
                             dibs_vec3 *position);
 
 /**
- * Registers the surface anew, as `dibs_receiver_register` does: only an operator decides that.
+ * Registers the surface again, as `dibs_receiver_register` does: only an operator may decide this.
  *
  * @return `DIBS_CODE_OK`, or a misuse.
  */
@@ -2231,22 +2240,23 @@ dibs_code dibs_bus_register(dibs_bus *bus);
 /**
  * One sentence about a code, in English, without a full stop.
  *
- * Never null, also for a number that is no code. The text is static.
+ * Never null, even for a number that is not a code. The text is static.
  */
 const char *dibs_code_text(uint32_t code);
 
 /**
  * The force of a wall on the tool, from its closest pair.
  *
- * Call it at every tick, with the code of whatever the pair came from: with an error the force is the hold, pure damping.
+ * Call it at every tick, with the code of the call that returned the pair: with an error the force is the hold, pure
+ * damping.
  *
  * @param wall       The wall.
- * @param outcome    The code of the query, of the fail-safe machine, or of the reader: of the first that was not
+ * @param outcome    The code of the query, of the fail-safe machine, or of the reader: the first one that was not
  *                   `DIBS_CODE_OK`.
- * @param proximity  The closest pair; not read, and may be null, where the outcome is an error.
- * @param velocity   Velocity (mm/s) of the tool's closest point against the surface.
+ * @param proximity  The closest pair; not read, and may be null, if the outcome is an error.
+ * @param velocity   Velocity (mm/s) of the tool's closest point relative to the surface.
  * @param force      Receives the force.
- * @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
+ * @return `DIBS_CODE_OK`, even if the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
  */
 dibs_code dibs_wall_force(const dibs_wall *wall,
                           uint32_t outcome,
@@ -2255,16 +2265,17 @@ dibs_code dibs_wall_force(const dibs_wall *wall,
                           dibs_force *force);
 
 /**
- * The force and the torque of a wall on the tool, from all its contacts: a proxy that they hold outside together.
+ * The force and the torque of a wall on the tool, from all its contacts: by a proxy that the contacts together keep
+ * outside.
  *
  * @param wall      The wall. Its margin is at most that of the contacts.
  * @param outcome   As for `dibs_wall_force`.
  * @param contacts  The list.
- * @param origin    The tool's point (mm) that the torque and the velocity are about.
+ * @param origin    The tool's point (mm) that torque and velocity refer to.
  * @param velocity  Velocity (mm/s) of the tool at `origin`.
  * @param angular   Angular velocity (1/s) of the tool.
  * @param force     Receives force and torque.
- * @return `DIBS_CODE_OK`, also where the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
+ * @return `DIBS_CODE_OK`, even if the force is the hold; `DIBS_CODE_GAIN`; or a misuse.
  */
 dibs_code dibs_wall_proxy_force(const dibs_wall *wall,
                                 uint32_t outcome,
@@ -2292,7 +2303,7 @@ dibs_code dibs_contacts_init(void *storage, size_t size, dibs_contacts **contact
  * @param frame      The surface.
  * @param tool       The tool.
  * @param margin     In mm, at least 0.
- * @param options    Options, or null. A budget that runs out shows in the list's bound.
+ * @param options    Options, or null. A budget that runs out lowers the list's bound.
  * @param contacts   The list; empty after an error.
  * @param proximity  Receives the closest pair, or null.
  * @return As `dibs_query_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
@@ -2306,23 +2317,23 @@ dibs_code dibs_query_contacts(dibs_query *query,
                               dibs_proximity *proximity);
 
 /**
- * Facts that hold for the list.
+ * Reads the properties of the list.
  */
 dibs_code dibs_contacts_get_facts(dibs_contacts *contacts, dibs_contacts_facts *facts);
 
 /**
- * One contact of the list, the deepest being number 0.
+ * One contact of the list; number 0 is the deepest.
  *
- * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` where there are not so many, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` if there are fewer contacts, or a misuse.
  */
 dibs_code dibs_contacts_get(dibs_contacts *contacts, uint32_t number, dibs_contact *contact);
 
 /**
- * Sets each contact's velocity to that of the surface there.
+ * Sets each contact's velocity to that of the surface at the contact.
  *
  * @param velocities  x, y and z (mm/s) of each vertex, in the tree's order of rows; only read during the call.
  * @param vertices    Their number.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` where a contact's corner has no row, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` if a contact's corner has no row, or a misuse.
  */
 dibs_code dibs_contacts_set_velocities(dibs_contacts *contacts,
                                        const float *velocities,
@@ -2331,17 +2342,17 @@ dibs_code dibs_contacts_set_velocities(dibs_contacts *contacts,
 /**
  * The rows of all contacts in the list, deepest first.
  *
- * With a row, a contact's separation falls towards `stand_off` no faster than exponentially, at a rate of `gain`; below, it
- * has to grow.
+ * By its row, a contact's separation decreases towards `stand_off` no faster than exponentially, at a rate of `gain`;
+ * below `stand_off` it must increase.
  *
  * @param contacts   The list.
- * @param origin     The tool's point (mm) whose velocity the rows are about.
+ * @param origin     The tool's point (mm) that the rows' velocity refers to.
  * @param stand_off  In mm.
  * @param gain       In 1/s.
- * @param capacity   Rows that there is room for.
+ * @param capacity   Number of rows that fit in `rows`.
  * @param rows       Receives them.
  * @param count      Receives their number.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` where there is room for fewer, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY` if not all rows fit, or a misuse.
  */
 dibs_code dibs_contacts_rows(dibs_contacts *contacts,
                              dibs_vec3 origin,
@@ -2358,7 +2369,8 @@ dibs_code dibs_contacts_rows(dibs_contacts *contacts,
  * @param size      Bytes of the storage.
  * @param limits    Its limits.
  * @param failsafe  Receives the machine's address.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, `DIBS_CODE_LIMIT_UNTRIPPABLE`, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`, `DIBS_CODE_LIMIT_UNTRIPPABLE`, or a
+ *         misuse.
  */
 dibs_code dibs_failsafe_init(void *storage,
                              size_t size,
@@ -2370,7 +2382,7 @@ dibs_code dibs_failsafe_init(void *storage,
  *
  * Cost: a comparison of two limits for each input.
  *
- * @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for a query's code that is none; or a misuse.
+ * @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_ARGUMENT` for an invalid code of the query; or a misuse.
  */
 dibs_code dibs_failsafe_step(dibs_failsafe *failsafe,
                              const dibs_observation *seen,
@@ -2388,8 +2400,8 @@ dibs_code dibs_failsafe_acknowledge(dibs_failsafe *failsafe);
  *
  * @param verdict    The verdict of this tick.
  * @param proximity  The answer of this tick, which is widened.
- * @return `DIBS_CODE_OK`; in the safe state the cause, to be passed on to a wall; `DIBS_CODE_ARGUMENT` for numbers that are
- *         no state or no code; or a misuse.
+ * @return `DIBS_CODE_OK`; in the safe state the cause, to be passed on to a wall; `DIBS_CODE_ARGUMENT` for numbers
+ *         that are not a state or a code; or a misuse.
  */
 dibs_code dibs_verdict_admit(const dibs_verdict *verdict,
                              dibs_proximity *proximity);
@@ -2398,35 +2410,35 @@ dibs_code dibs_verdict_admit(const dibs_verdict *verdict,
  * A filter with 200,000 instructions of a Cortex-M7 a tick.
  *
  * @param stand_off  Least separation (mm) from the tissue.
- * @param speed      Most speed (mm/s) of the robot.
+ * @param speed      Largest speed (mm/s) of the robot.
  */
 dibs_filter dibs_filter_of(float stand_off, float speed);
 
 /**
- * The motion nearest to a commanded one that keeps every tool of a rigid chain out of the tissue at every instant of the
- * period. After an error nothing is admitted: the tool stays at rest.
+ * The motion closest to a commanded one that keeps every tool of a rigid chain out of the tissue at every instant of
+ * the period. After an error nothing is admitted: the tool must rest.
  *
- * The promise is that of the core's module `filter`: the robot executes the motion, the tissue is within its uncertainty and
- * no faster than stated, the surface within its stretch. A tick does not end because a search was cut: its tracker goes on
- * in the next one.
+ * The promise is that of the core's module `filter`, provided that the robot executes the motion, the tissue is within
+ * its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
+ * its tracker continues in the next tick.
  *
- * Cost: the filter's instructions at most for the queries, and for each motion that is tried 1,000 as a rule, 40,000 at
- * most.
+ * Cost: at most the filter's instructions for the queries, and for each motion that is tried usually 1,000, at most
+ * 40,000.
  *
  * @param filter       The filter.
- * @param trackers     Addresses of the trackers, one for each tool. No tracker is there twice.
- * @param frame        A reader's frame, for all tools, without a copy of it; null for the trackers' own surfaces.
+ * @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.
+ * @param frame        A reader's frame, used for all tools without copying it; null for the trackers' own surfaces.
  * @param tools        The tools as they are now, in the same order.
- * @param count        Tools: 1 to `DIBS_FILTER_TOOLS`.
+ * @param count        Number of tools: 1 to `DIBS_FILTER_TOOLS`.
  * @param command      The commanded motion.
  * @param period       The period, in s: above 0.
  * @param uncertainty  That of the tissue.
  * @param rows         The caller's rows; null for none.
  * @param row_count    Their number: at most `DIBS_FILTER_ROWS`.
- * @param admitted     Receives the motion to execute, and why it is that; nothing is written after an error.
- * @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range; `DIBS_CODE_NOT_FINITE` for a
- *         command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too many, too many rows, or a frame of the
- *         caller's vertices; those of `dibs_tracker_closest`; or a misuse.
+ * @param admitted     Receives the motion to execute, and its reason; nothing is written after an error.
+ * @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range;
+ *         `DIBS_CODE_NOT_FINITE` for a command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too
+ *         many, too many rows, or a frame of the caller's vertices; the errors of `dibs_tracker_closest`; or a misuse.
  */
 dibs_code dibs_filter_admit(const dibs_filter *filter,
                             dibs_tracker *const *trackers,
@@ -2441,20 +2453,18 @@ dibs_code dibs_filter_admit(const dibs_filter *filter,
                             dibs_admitted *admitted);
 
 /**
- * A tool after a motion of up to half a radian: a point of the axis is where the rotation and the displacement lead it.
+ * A tool after a motion of up to half a radian: each point of the axis is rotated and displaced.
  *
  * @param motion  The motion.
  * @param tool    The tool before.
  * @param moved   Receives the tool after; may be the same.
  * @return `DIBS_CODE_OK`, or a misuse.
  */
-dibs_code dibs_motion_apply(const dibs_motion *motion,
-                            const dibs_tool *tool,
-                            dibs_tool *moved);
+dibs_code dibs_motion_apply(const dibs_motion *motion, const dibs_tool *tool, dibs_tool *moved);
 
 /**
- * The distance (mm) between tool and searched surface at which a period begins without a risk of contact: the uncertainty
- * at its end. A filter keeps its stand-off beyond that.
+ * The distance (mm) between tool and searched surface at which a period can begin without a risk of contact: the
+ * uncertainty at its end. A filter adds its stand-off to this.
  *
  * @param uncertainty  The uncertainty at the start.
  * @param period       The period, in s.
@@ -2466,7 +2476,7 @@ dibs_code dibs_uncertainty_stand_off(const dibs_uncertainty *uncertainty,
                                      float *distance);
 
 /**
- * Makes an empty frame. Storage of a frame that a reader holds is released before it is used anew.
+ * Makes an empty frame. If the storage has a frame that a reader holds, it is released first.
  *
  * @param storage  `DIBS_FRAME_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size     Bytes of the storage.
@@ -2475,14 +2485,14 @@ dibs_code dibs_uncertainty_stand_off(const dibs_uncertainty *uncertainty,
 dibs_code dibs_frame_init(void *storage, size_t size, dibs_frame **frame);
 
 /**
- * Makes the frame one of these vertices. Its stretch is not measured: queries take the tree's limit.
+ * Sets the frame to these vertices. Their stretch is not measured: queries assume the tree's limit.
  *
- * @param frame           The frame; one that a reader holds is released first.
+ * @param frame           The frame; if a reader holds it, it is released first.
  * @param positions       x, y and z (mm) of each vertex, in the tree's order of rows, not that of the mesh's file:
- *                        `dibs_tree_to_rows`. Not copied: unchanged until the frame is given other vertices or released.
+ *                        `dibs_tree_to_rows`. Not copied: they must not change until the frame is given other vertices
+ *                        or released.
  * @param vertices        Their number.
- * @param position_error  No vertex is farther (mm, at least 0) than this from where it is here. Part of the accuracy of
- *                        every answer.
+ * @param position_error  Largest error (mm, at least 0) of a vertex position. Part of the accuracy of every answer.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an error that is negative or not finite, or a misuse.
  */
 dibs_code dibs_frame_set_vertices(dibs_frame *frame,
@@ -2491,17 +2501,17 @@ dibs_code dibs_frame_set_vertices(dibs_frame *frame,
                                   float position_error);
 
 /**
- * Makes the frame the surface that these nodes carry, of a tree that `dibs build --nodes` made. Vertices are computed where a
- * query reads them. The stretch is not measured: queries take the tree's limit.
+ * Sets the frame to the surface that these nodes move, for a tree that `dibs build --nodes` made. Vertices are
+ * computed when a query reads them. The stretch is not measured: queries assume the tree's limit.
  *
- * @param frame           The frame; one that a reader holds is released first.
- * @param tree            The tree, used for as long as the frame has these nodes.
- * @param positions       x, y and z (mm) of each node, in the order of the volume's file. Not copied: unchanged until the
- *                        frame is given other positions or released.
+ * @param frame           The frame; if a reader holds it, it is released first.
+ * @param tree            The tree, which must exist as long as the frame has these nodes.
+ * @param positions       x, y and z (mm) of each node, in the order of the volume's file. Not copied: they must not
+ *                        change until the frame is given other positions or released.
  * @param nodes           Their number.
- * @param position_error  No node is farther (mm, at least 0) than this from where it is here.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` of another number than the tree's `rows`, `DIBS_CODE_ARGUMENT` where the tree
- *         has no nodes, or for an error that is negative or not finite, or a misuse.
+ * @param position_error  Largest error (mm, at least 0) of a node position.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_VERTEX_COUNT` for another number than the tree's `rows`, `DIBS_CODE_ARGUMENT` if
+ *         the tree has no nodes, or for an error that is negative or not finite, or a misuse.
  */
 dibs_code dibs_frame_set_nodes(dibs_frame *frame,
                                dibs_tree *tree,
@@ -2510,32 +2520,33 @@ dibs_code dibs_frame_set_nodes(dibs_frame *frame,
                                float position_error);
 
 /**
- * Measures the stretch of the frame's vertices, which makes queries on it cheaper. Frames from a receiver are measured.
+ * Measures the stretch of the frame, which makes queries on it cheaper. A receiver's frames are already measured.
  *
  * Cost: linear in the triangles.
  *
  * @param stretch  Receives the largest stretch, 1 for none; or null.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, vertices in the file's order
- *         among them, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TREE_NO_METRIC`, `DIBS_CODE_VERTEX_COUNT`, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_STRETCH_EXCEEDED` if distances on this frame could be wrong, as with vertices in
+ *         the file's order, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_TREE_NO_METRIC`,
+ *         `DIBS_CODE_VERTEX_COUNT`, or a misuse.
  */
 dibs_code dibs_frame_measure(dibs_frame *frame,
                              dibs_tree *tree,
                              float *stretch);
 
 /**
- * Facts about the frame.
+ * Reads the properties of a frame.
  *
- * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` for an empty frame, or a misuse.
  */
 dibs_code dibs_frame_get_facts(dibs_frame *frame, dibs_frame_facts *facts);
 
 /**
- * Lets go of the vertices, or of the frame that a reader holds: the next one can then be published.
+ * Releases the vertices, or the frame that a reader holds: the next frame can then be published.
  */
 dibs_code dibs_frame_release(dibs_frame *frame);
 
 /**
- * Makes the control tick's end of a surface, once. `dibs_start` makes it with all that it needs.
+ * Makes the control tick's end of a surface, once. `dibs_start` makes it together with all other objects.
  *
  * @param storage  `DIBS_GUARD_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size     Bytes of the storage.
@@ -2543,8 +2554,8 @@ dibs_code dibs_frame_release(dibs_frame *frame);
  * @param tree     Its tree.
  * @param limits   The guard's limits: the same as for `dibs_bus_init`.
  * @param guard    Receives the guard's address.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many rows; `DIBS_CODE_STORAGE_SIZE`
- *         also where the surface has room for two buffers alone; `DIBS_CODE_TAKEN` where its end was taken;
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of rows is not the tree's;
+ *         `DIBS_CODE_STORAGE_SIZE` also if the surface has only two buffers; `DIBS_CODE_TAKEN` if its end was taken;
  *         `DIBS_CODE_LIMIT_ORDER` to `DIBS_CODE_LIMIT_RECOVERY`; or a misuse.
  */
 dibs_code dibs_guard_init(void *storage,
@@ -2555,18 +2566,19 @@ dibs_code dibs_guard_init(void *storage,
                           dibs_guard **guard);
 
 /**
- * The answer of this tick: the closest pair on the surface published last, moved on to now, and whether it may be trusted.
+ * The answer of this tick: the closest pair on the latest published surface, extrapolated to now, and whether to trust
+ * it.
  *
- * Call it at every tick. Errors of the query are in the answer, and lead to the safe state.
+ * Call it at every tick. An error of the query is reported in the answer, and leads to the safe state.
  *
- * Cost: the budget at most, and about a thousand instructions.
+ * Cost: at most the budget, and about a thousand instructions.
  *
  * @param guard   The guard.
- * @param tool    The tool; null where it has no pose: the answer is then the hold, and the next velocity starts anew.
+ * @param tool    The tool; null if it has no pose: the answer is then the hold, and the velocity is measured anew.
  * @param now     The receiver's clock, in ms; wraps.
  * @param answer  Receives the answer.
- * @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_TOOL_COORDINATE` or `DIBS_CODE_TOOL_RADIUS`, with the answer of a
- *         tool without a pose; or a misuse.
+ * @return `DIBS_CODE_OK`, whatever the state; `DIBS_CODE_TOOL_COORDINATE` or `DIBS_CODE_TOOL_RADIUS`, with the same
+ *         answer as without a pose; or a misuse.
  */
 dibs_code dibs_guard_closest(dibs_guard *guard,
                              const dibs_tool *tool,
@@ -2574,19 +2586,19 @@ dibs_code dibs_guard_closest(dibs_guard *guard,
                              dibs_answer *answer);
 
 /**
- * The answer of this tick, and all locally closest pairs whose separation is at most `margin`, deepest first, in the one
- * budget. Each has the velocity of the surface there, so that `dibs_contacts_set_velocities` is not needed.
+ * The answer of this tick, and all locally closest pairs with a separation of at most `margin`, deepest first, within
+ * the same budget. Each has the velocity of the surface there, so `dibs_contacts_set_velocities` is not needed.
  *
- * Call it in place of `dibs_guard_closest`. Act on the list only where the answer's outcome is `DIBS_CODE_OK`, and for a
- * constraint within the list's bound. Its accuracy covers what the pair's does.
+ * Call it instead of `dibs_guard_closest`. Act on the list only if the answer's outcome is `DIBS_CODE_OK`, and in a
+ * constraint only up to the list's bound. Its accuracy covers the same errors as the pair's.
  *
  * Cost: that of `dibs_guard_closest`, and some hundred instructions a contact.
  *
  * @param guard     The guard.
- * @param tool      The tool; null where it has no pose: the list is then empty.
+ * @param tool      The tool; null if it has no pose: the list is then empty.
  * @param margin    In mm, at least 0.
  * @param now       The receiver's clock, in ms; wraps.
- * @param contacts  The list; empty where there is no surface, or the query failed.
+ * @param contacts  The list; empty if there is no surface, or the query failed.
  * @param answer    Receives the answer.
  * @return As `dibs_guard_closest`.
  */
@@ -2598,11 +2610,11 @@ dibs_code dibs_guard_contacts(dibs_guard *guard,
                               dibs_answer *answer);
 
 /**
- * The answer of this tick, and the motion nearest to a commanded one that keeps the tool out of the tissue until the next tick.
- * The period, the tissue's speed, lag and transit are the guard's. The surface is extrapolated, whose residual is an
- * estimate.
+ * The answer of this tick, and the motion closest to a commanded one that keeps the tool out of the tissue until the
+ * next tick. The period, the tissue's speed, lag and transit time are the guard's. The surface is extrapolated, and
+ * its residual is an estimate.
  *
- * Call it in place of `dibs_guard_closest`. After an error nothing is admitted: the tool stays at rest.
+ * Call it instead of `dibs_guard_closest`. After an error nothing is admitted: the tool must rest.
  *
  * Cost: that of `dibs_guard_closest` and of `dibs_filter_admit`.
  *
@@ -2611,7 +2623,7 @@ dibs_code dibs_guard_contacts(dibs_guard *guard,
  * @param tool      The tool as it is now.
  * @param command   The commanded motion.
  * @param now       The receiver's clock, in ms; wraps.
- * @param answer    Receives the answer, also where nothing is admitted; or null.
+ * @param answer    Receives the answer, even if nothing is admitted; or null.
  * @param admitted  Receives the motion to execute.
  * @return As `dibs_filter_admit`; in the safe state its cause.
  */
@@ -2641,20 +2653,21 @@ dibs_code dibs_guard_acknowledge(dibs_guard *guard);
 dibs_code dibs_answer_force(const dibs_answer *answer, const dibs_wall *wall, dibs_force *force);
 
 /**
- * Makes all that a control loop needs in one piece of memory: validates the tree, and makes the surface and its two ends. For
- * pieces apart, each in memory of its own: `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init`, `dibs_guard_init`.
+ * Makes all objects of a control loop in one piece of memory: validates the tree, and makes the surface and its two
+ * ends. To make each object in memory of its own, use `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init` and
+ * `dibs_guard_init`.
  *
  * Cost: linear in the bytes; once, at start-up.
  *
- * @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that carry them), aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no
- *                initial value.
+ * @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that move them),
+ *                aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no initial value.
  * @param size    Bytes of the memory.
  * @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
  * @param length  Bytes of the tree.
  * @param limits  The guard's limits.
  * @param bus     Receives the bus's address.
  * @param guard   Receives the guard's address.
- * @return As of the four functions; `DIBS_CODE_STORAGE_SIZE` where the tree has more rows than there is room for.
+ * @return As the four functions; `DIBS_CODE_STORAGE_SIZE` if the tree has more rows than fit.
  */
 dibs_code dibs_start(void *memory,
                      size_t size,
@@ -2673,12 +2686,12 @@ dibs_code dibs_start(void *memory,
 dibs_guard_limits dibs_guard_limits_of(float speed, uint32_t age);
 
 /**
- * The certified interval of a pair's separation: both ends include the accuracy, rounded outwards. Act on its lower end.
+ * The certified interval of a separation: both bounds include the accuracy, rounded outwards. Act on the lower one.
  *
- * Without a side the tool may be inside at any depth: the lower end is negative infinity. With `DIBS_SIDE_NOT_ASKED` and
- * `DIBS_SIDE_NO_ADJACENCY` it is that of a tool outside.
+ * Without a side the tool may be inside to any depth: the lower bound is negative infinity. With `DIBS_SIDE_NOT_ASKED`
+ * and `DIBS_SIDE_NO_ADJACENCY` it is that of a tool outside.
  *
- * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a side or coverage that is none, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for an invalid side or coverage, or a misuse.
  */
 dibs_code dibs_proximity_interval(const dibs_proximity *proximity,
                                   dibs_interval *interval);
@@ -2696,18 +2709,18 @@ dibs_code dibs_query_init(void *storage, size_t size, dibs_tree *tree, dibs_quer
 /**
  * The closest pair of the tool and the surface in the frame.
  *
- * Exact within `accuracy`, as long as the surface keeps to its stretch. A budget that runs out is no error: the interval is
- * wider then.
+ * Exact within `accuracy`, as long as the surface is within its stretch limit. A budget that runs out is not an error:
+ * the interval is then wider.
  *
- * Cost: the budget at most.
+ * Cost: at most the budget.
  *
  * @param query      The query.
  * @param frame      The surface.
  * @param tool       The tool.
  * @param options    Options, or null.
  * @param proximity  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_TOOL_COORDINATE` to `DIBS_CODE_QUERY_FAILED`,
- *         `DIBS_CODE_TREE_CORRUPT`, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_TOOL_COORDINATE` to
+ *         `DIBS_CODE_QUERY_FAILED`, `DIBS_CODE_TREE_CORRUPT`, or a misuse.
  */
 dibs_code dibs_query_closest(dibs_query *query,
                              dibs_frame *frame,
@@ -2716,12 +2729,14 @@ dibs_code dibs_query_closest(dibs_query *query,
                              dibs_proximity *proximity);
 
 /**
- * The budget of a query that is to end within so many instructions, by a fit with a margin of 20 %.
+ * The budget of a query that must end within this number of instructions, by a fitted model with a margin of 20 %.
  *
  * @param cost  A `dibs_cost`.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is no `dibs_cost`, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is not a `dibs_cost`, or a misuse.
  */
-dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, uint32_t *budget);
+dibs_code dibs_budget_for_instructions(uint32_t instructions,
+                                       uint32_t cost,
+                                       uint32_t *budget);
 
 /**
  * Makes the reader of a surface, once.
@@ -2730,21 +2745,21 @@ dibs_code dibs_budget_for_instructions(uint32_t instructions, uint32_t cost, uin
  * @param size     Bytes of the storage.
  * @param surface  The surface.
  * @param reader   Receives the reader's address.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a reader, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` if the surface has a reader already, or a misuse.
  */
 dibs_code dibs_reader_init(void *storage, size_t size, dibs_surface *surface, dibs_reader **reader);
 
 /**
- * Holds the frame that was published last, if it is not too old. Until it is released no frame is published, so
- * release it after the tick's queries.
+ * Holds the latest published frame, if it is not too old. Until it is released no frame is published, so release it
+ * after the tick's queries.
  *
  * @param reader  The reader.
  * @param now     The receiver's clock, in ms; wraps.
- * @param limit   The greatest age, in ms; UINT32_MAX leaves the age to the fail-safe machine.
- * @param frame   The frame that holds it; what it held before is released.
- * @param age     Receives its age, also where it is too old; or null.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` where another frame holds one of this
- *         surface, or a misuse. The frame is then empty.
+ * @param limit   Largest age, in ms; UINT32_MAX leaves the age to the fail-safe machine.
+ * @param frame   Holds the frame; a frame that it held before is released.
+ * @param age     Receives its age, even if it is too old; or null.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE`, `DIBS_CODE_STALE`, `DIBS_CODE_HELD` if another frame holds one of
+ *         this surface, or a misuse. After an error the frame is empty.
  */
 dibs_code dibs_reader_latest(dibs_reader *reader,
                              uint32_t now,
@@ -2766,8 +2781,8 @@ dibs_code dibs_reader_link(dibs_reader *reader, uint32_t now, dibs_link *link);
  * @param tree      Its tree.
  * @param limits    Limits of every frame.
  * @param receiver  Receives the receiver's address.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` where surface and tree have not as many vertices; `DIBS_CODE_TAKEN` where
- *         the surface has a receiver; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_OTHER_TREE` if the surface's number of vertices is not the tree's;
+ *         `DIBS_CODE_TAKEN` if the surface has a receiver already; `DIBS_CODE_TREE_NO_METRIC`; or a misuse.
  */
 dibs_code dibs_receiver_init(void *storage,
                              size_t size,
@@ -2777,15 +2792,16 @@ dibs_code dibs_receiver_init(void *storage,
                              dibs_receiver **receiver);
 
 /**
- * Registers the surface anew: the next whole frame is compared with none before it. For an operator who knows that the
- * tissue was moved farther than `dibs_surface_limits.recovery`; until then no frame that far away is published.
+ * Registers the surface again: the next whole frame is not compared with an earlier one. For an operator who knows
+ * that the tissue was moved farther than `dibs_surface_limits.recovery`; until then no frame that far away is
+ * published.
  *
  * @return `DIBS_CODE_OK`, or a misuse.
  */
 dibs_code dibs_receiver_register(dibs_receiver *receiver);
 
 /**
- * Takes one packet, whole: a datagram, or the data of a CAN-FD message.
+ * Receives one whole packet: a datagram, or the data of a CAN-FD message.
  *
  * Cost: linear in the bytes.
  *
@@ -2794,8 +2810,8 @@ dibs_code dibs_receiver_register(dibs_receiver *receiver);
  * @param length    Its bytes.
  * @param now       The receiver's clock, in ms; wraps.
  * @param progress  Receives its outcome, or null.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` where the packet was not taken, which
- *         has been counted, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_PACKET_DAMAGED` to `DIBS_CODE_PACKET_REFUSED` if the packet was refused (and
+ *         counted), or a misuse.
  */
 dibs_code dibs_receiver_accept(dibs_receiver *receiver,
                                const uint8_t *packet,
@@ -2804,13 +2820,13 @@ dibs_code dibs_receiver_accept(dibs_receiver *receiver,
                                dibs_progress *progress);
 
 /**
- * Takes one byte of a stream of COBS frames, each ended by a zero: a serial line.
+ * Receives one byte of a stream of COBS frames, each ended by a zero, such as a serial line.
  *
  * @param receiver  The receiver.
  * @param byte      The byte.
  * @param now       The receiver's clock, in ms; wraps.
  * @param progress  Receives the outcome of the packet that the byte completes, or `DIBS_PROGRESS_NONE`; or null.
- * @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` where bytes between two zeros are no packet.
+ * @return As `dibs_receiver_accept`; `DIBS_CODE_FRAMING` if the bytes between two zeros are not a packet.
  */
 dibs_code dibs_receiver_byte(dibs_receiver *receiver,
                              uint8_t byte,
@@ -2818,15 +2834,15 @@ dibs_code dibs_receiver_byte(dibs_receiver *receiver,
                              dibs_progress *progress);
 
 /**
- * Does some of the work that is due: checks rows and triangles, and publishes a frame that keeps to its limits.
+ * Does some of the pending work: checks rows and triangles, and publishes a frame that is within its limits.
  *
- * Worth calling after each packet, and from time to time when the bus is quiet. Cost: linear in `work`.
+ * Call it after each packet, and from time to time when the bus is quiet. Cost: linear in `work`.
  *
  * @param receiver  The receiver.
  * @param work      Most rows and triangles that are checked or copied.
  * @param advance   Receives the outcome, or null.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` where the frame is refused,
- *         which has been counted; or a misuse.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_STRETCH_EXCEEDED`, `DIBS_CODE_SHRUNK` or `DIBS_CODE_TOO_FAST` if the frame is
+ *         refused (and counted); or a misuse.
  */
 dibs_code dibs_receiver_advance(dibs_receiver *receiver,
                                 uint32_t work,
@@ -2839,9 +2855,9 @@ dibs_code dibs_receiver_advance(dibs_receiver *receiver,
  * @param now       The receiver's clock, in ms.
  * @param safety    0 not reported, 1 nominal, 2 degraded, 3 safe.
  * @param framed    0 for a packet; otherwise a COBS frame with the zero that ends it, for a stream.
- * @param out       Receives it.
- * @param capacity  Bytes that there is room for: `DIBS_STATUS` are enough.
- * @param length    Receives its length.
+ * @param out       Receives the status.
+ * @param capacity  Size of `out` in bytes: `DIBS_STATUS` is enough.
+ * @param length    Receives the status's length.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
  */
 dibs_code dibs_receiver_status(dibs_receiver *receiver,
@@ -2853,27 +2869,27 @@ dibs_code dibs_receiver_status(dibs_receiver *receiver,
                                size_t *length);
 
 /**
- * Number of the frame that was published last, which wraps.
+ * Number of the latest published frame; wraps.
  *
  * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, or a misuse.
  */
 dibs_code dibs_receiver_epoch(dibs_receiver *receiver, uint32_t *epoch);
 
 /**
- * Position (mm) of a vertex in the frame that was published last, for a checksum of the published rows, or a log.
+ * Position (mm) of a vertex in the latest published frame, for a checksum of the published rows, or a log.
  *
- * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` before the first frame, `DIBS_CODE_ARGUMENT` outside the table, or a
+ *         misuse.
  */
 dibs_code dibs_receiver_position(dibs_receiver *receiver,
                                  uint32_t row,
                                  dibs_vec3 *position);
 
 /**
- * Name of an event, in English: published, abandoned, duplicate, heartbeat, and from the fifth on rejections by their
- * cause.
+ * Name of an event, in English: published, abandoned, duplicate, heartbeat, then rejections by their cause.
  *
- * @param event  Its place among the counters.
- * @return A static text; never null, also for a number that is no event.
+ * @param event  Its index among the counters.
+ * @return A static text; never null, even for a number that is not an event.
  */
 const char *dibs_event_name(uint32_t event);
 
@@ -2888,15 +2904,15 @@ dibs_code dibs_receiver_counters(dibs_receiver *receiver, uint32_t *counters);
 /**
  * The closest pair of a chain of tools and the surfaces of a scene.
  *
- * Exact within its accuracy, as `dibs_query_closest`. Query tools whose axes do not touch each other one by one: of such
- * tools, one deep inside a surface may be missed.
+ * Exact within its accuracy, as `dibs_query_closest`. Tools whose axes do not touch each other must be queried one by
+ * one: otherwise one deep inside a surface may be missed.
  *
- * Cost: the budget at most, for all pairs together, and a node test a pair.
+ * Cost: at most the budget, for all pairs together, and a node test a pair.
  *
  * @param scene    The scene.
  * @param options  Options, or null.
  * @param closest  Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
- * @return As `dibs_query_closest`, of any surface; `DIBS_CODE_ARGUMENT` for no surface, no tool, or too many.
+ * @return As `dibs_query_closest`, for any surface; `DIBS_CODE_ARGUMENT` for no surface, no tool, or too many.
  */
 dibs_code dibs_scene_closest(const dibs_scene *scene,
                              const dibs_options *options,
@@ -2910,7 +2926,7 @@ dibs_code dibs_scene_closest(const dibs_scene *scene,
  *
  * @param scene     The scene.
  * @param margin    In mm, at least 0.
- * @param options   Options, or null. A budget that runs out shows in the list's bound, which holds for all pairs.
+ * @param options   Options, or null. A budget that runs out lowers the list's bound, which holds for all pairs.
  * @param contacts  The list; empty after an error.
  * @param closest   Receives the closest pair, or null.
  * @return As `dibs_scene_closest`, `DIBS_CODE_MARGIN`, or `DIBS_CODE_TREE_NO_ADJACENCY`.
@@ -2922,7 +2938,7 @@ dibs_code dibs_scene_contacts(const dibs_scene *scene,
                               dibs_closest *closest);
 
 /**
- * The settings by default: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
+ * The default settings: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
  */
 dibs_sender_settings dibs_sender_settings_of(void);
 
@@ -2931,12 +2947,12 @@ dibs_sender_settings dibs_sender_settings_of(void);
  *
  * @param storage   `DIBS_SENDER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size      Bytes of the storage.
- * @param tree      The surface's tree: the controller's, or one built from the same mesh in the same way. Not used after
- *                  the call.
+ * @param tree      The surface's tree: the controller's, or one built from the same mesh in the same way. Not used
+ *                  after the call.
  * @param target    `udp:HOST:PORT`, `tcp:HOST:PORT`, `serial:PORT@BAUD` or `unix:PATH`, ended by a zero.
  * @param settings  How to send; or null for `dibs_sender_settings_of`.
  * @param sender    Receives the sender's address.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_TARGET` for a target that is none, or that cannot be opened; or a misuse.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_TARGET` for a target that is invalid or cannot be opened; or a misuse.
  */
 dibs_code dibs_sender_init(void *storage,
                            size_t size,
@@ -2946,18 +2962,19 @@ dibs_code dibs_sender_init(void *storage,
                            dibs_sender **sender);
 
 /**
- * Sends a frame, with heartbeats in between when due. From the third whole frame on over UDP, this thread allocates nothing.
+ * Sends a frame, with heartbeats between its packets when due. From the third whole frame on over UDP, this thread
+ * allocates nothing.
  *
  * @param sender     The sender.
- * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order; or of
- *                   each node that carries the surface.
+ * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order;
+ *                   or of each node that carries the surface.
  * @param count      Their number.
- * @param age        Time (ms) since the surface was so; or `DIBS_AGE_UNKNOWN`.
+ * @param age        Time (ms) since the surface was captured; or `DIBS_AGE_UNKNOWN`.
  * @param sent       Receives the frame's number and size; or null.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are no frame of the surface: nothing was sent;
- *         `DIBS_CODE_SENDER_LINE` where the connection broke: close the sender, and make another;
- *         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the whole
- *         sentence.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are not a frame of the surface: nothing was
+ *         sent; `DIBS_CODE_SENDER_LINE` if the connection broke: close the sender, and make another;
+ *         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the
+ *         full text.
  */
 dibs_code dibs_sender_send(dibs_sender *sender,
                            const float *positions,
@@ -2966,35 +2983,35 @@ dibs_code dibs_sender_send(dibs_sender *sender,
                            dibs_sent *sent);
 
 /**
- * Sends a heartbeat if one is due, and takes the statuses that have come. Does not wait. Call it a few times between two
- * heartbeats: without it the controller takes the link for lost, and no transit time is measured.
+ * Sends a heartbeat if one is due, and receives the statuses that have arrived. Does not wait. Call it a few times
+ * between two heartbeats: otherwise the controller considers the link lost, and no transit time is measured.
  *
  * @return As `dibs_sender_send`.
  */
 dibs_code dibs_sender_poll(dibs_sender *sender);
 
 /**
- * The last error of a sender, as a sentence.
+ * The text of a sender's last error.
  *
  * @param sender    The sender.
- * @param text      Receives the sentence, ended by a zero; empty before the first error.
- * @param capacity  Bytes that there is room for.
+ * @param text      Receives the zero-terminated text; empty before the first error.
+ * @param capacity  Size of `text` in bytes.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_CAPACITY`, or a misuse.
  */
 dibs_code dibs_sender_error(dibs_sender *sender, uint8_t *text, size_t capacity);
 
 /**
- * Reads the facts about a sender.
+ * Reads the state of a sender.
  *
  * @param sender    The sender.
- * @param facts     Receives the facts.
+ * @param facts     Receives the state.
  * @param counters  Room for `DIBS_EVENTS` numbers: the receiver's count of each event, in the order of
  *                  `dibs_event_name`, as its statuses report it; or null.
  */
 dibs_code dibs_sender_get_facts(dibs_sender *sender, dibs_sender_facts *facts, uint32_t *counters);
 
 /**
- * Ends the connection. The storage has no sender from then on.
+ * Ends the connection. The storage then holds no sender.
  *
  * @return `DIBS_CODE_OK`, or a misuse.
  */
@@ -3004,7 +3021,8 @@ dibs_code dibs_sender_close(dibs_sender *sender);
  * Makes a surface without a frame.
  *
  * @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, or `DIBS_GUARDED_SIZE(vertices)` for a guard, aligned to
- *                  `DIBS_ALIGNMENT`. Needs no initial value. For as long as its two ends and their frames are used.
+ *                  `DIBS_ALIGNMENT`. Needs no initial value. Must exist for as long as its two ends and their frames
+ *                  are used.
  * @param size      Bytes of the storage.
  * @param vertices  Rows of the surface: `rows` of the tree's facts.
  * @param surface   Receives the surface's address.
@@ -3015,8 +3033,8 @@ dibs_code dibs_surface_init(void *storage,
                             dibs_surface **surface);
 
 /**
- * Whether tool and surface come closer than a margin between two ticks, and when first, by conservative advancement: no time is
- * skipped at any speed. The distance is that to the surface itself, from either side.
+ * Whether tool and surface come closer than a margin between two ticks, and when first, by conservative advancement:
+ * no time is skipped at any speed. The distance is that to the surface itself, from either side.
  *
  * Cost: that of `dibs_tracker_closest` for each sample; the budget is for each.
  *
@@ -3024,7 +3042,8 @@ dibs_code dibs_surface_init(void *storage,
  * @param sweep    The motion.
  * @param options  Options, or null.
  * @param swept    Receives the result.
- * @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a share out of range.
+ * @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a share out of
+ *         range.
  */
 dibs_code dibs_tracker_sweep(dibs_tracker *tracker,
                              const dibs_sweep *sweep,
@@ -3034,8 +3053,8 @@ dibs_code dibs_tracker_sweep(dibs_tracker *tracker,
 /**
  * Makes a tracker on a tree, without a surface.
  *
- * @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`; `DIBS_TRACKER_SIZE(0)` are enough for
- *                 `dibs_tracker_closest_on` alone. Needs no initial value.
+ * @param storage  `DIBS_TRACKER_SIZE(vertices)` bytes, aligned to `DIBS_ALIGNMENT`; `DIBS_TRACKER_SIZE(0)` is enough
+ *                 for `dibs_tracker_closest_on` alone. Needs no initial value.
  * @param size     Bytes of the storage.
  * @param tree     The tree.
  * @param tracker  Receives the tracker's address.
@@ -3046,15 +3065,15 @@ dibs_code dibs_tracker_init(void *storage,
                             dibs_tracker **tracker);
 
 /**
- * Takes over a new surface: copies it, and measures how far it moved. Call it for each new frame, and release the frame
- * then; ticks with no new frame go without.
+ * Sets a new surface: copies it, and measures how far it moved. Call it for each new frame, then release the frame; it
+ * is not needed at ticks without a new frame.
  *
  * Cost: linear in the vertices.
  *
  * @param tracker  The tracker.
  * @param frame    The surface.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` of an empty frame, `DIBS_CODE_VERTEX_COUNT` (also where the storage has no
- *         room for copies), or a misuse. After an error the surface is the one before.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_NO_SURFACE` for an empty frame, `DIBS_CODE_VERTEX_COUNT` (also if the storage has
+ *         no room for copies), or a misuse. After an error the surface is the previous one.
  */
 dibs_code dibs_tracker_set_frame(dibs_tracker *tracker,
                                  dibs_frame *frame);
@@ -3062,7 +3081,7 @@ dibs_code dibs_tracker_set_frame(dibs_tracker *tracker,
 /**
  * The closest pair of the tool and the tracker's surface: the answer of `dibs_query_closest`, within its accuracy.
  *
- * Cost: the budget at most, and a number for each opened node.
+ * Cost: at most the budget, and one comparison for each opened node.
  *
  * @param tracker   The tracker.
  * @param tool      The tool.
@@ -3076,18 +3095,18 @@ dibs_code dibs_tracker_closest(dibs_tracker *tracker,
                                dibs_tracked *tracked);
 
 /**
- * The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without a copy of the
- * surface. The receiver has measured the frame's motion. The frame is held for the whole call, and released after it. For a
- * control tick that has no time for `dibs_tracker_set_frame`.
+ * The closest pair of the tool and the frame that a reader holds: the answer of `dibs_tracker_closest`, without
+ * copying the surface, because the receiver has measured the frame's motion. The frame is held during the whole call;
+ * release it afterwards. For a control tick that has no time for `dibs_tracker_set_frame`.
  *
- * Cost: the budget at most, and a number for each opened node.
+ * Cost: at most the budget, and one comparison for each opened node.
  *
  * @param tracker   The tracker.
  * @param frame     A reader's frame.
  * @param tool      The tool.
  * @param options   Options, or null.
  * @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
- * @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` of a frame of the caller's vertices.
+ * @return As `dibs_query_closest`; `DIBS_CODE_ARGUMENT` for a frame of the caller's vertices.
  */
 dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
                                   dibs_frame *frame,
@@ -3096,16 +3115,15 @@ dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
                                   dibs_tracked *tracked);
 
 /**
- * Fills the list with all locally closest pairs whose separation is at most `margin`, deepest first: that of
+ * Fills the list with all locally closest pairs with a separation of at most `margin`, deepest first: the list of
  * `dibs_query_contacts`.
  *
- * Cost: that of `dibs_tracker_closest`, and where the surface is within the margin a range search, which has no memory of
- * the last tick.
+ * Cost: that of `dibs_tracker_closest`, and and within the margin of the surface a range search without the last tick.
  *
  * @param tracker   The tracker.
  * @param tool      The tool.
  * @param margin    In mm, at least 0.
- * @param options   Options, or null. A budget that runs out shows in the list's bound.
+ * @param options   Options, or null. A budget that runs out lowers the list's bound.
  * @param contacts  The list; empty after an error.
  * @param tracked   Receives the closest pair, or null.
  * @return As `dibs_query_contacts`.
@@ -3118,17 +3136,17 @@ dibs_code dibs_tracker_contacts(dibs_tracker *tracker,
                                 dibs_tracked *tracked);
 
 /**
- * The closest pair of several, each a tracker, on its surface, with a tool: of a chain of tools, of several surfaces, or of
+ * The closest of several pairs, each a tracker with its surface and a tool: for a chain of tools, several surfaces, or
  * both. A pair that is certain to be farther than the closest is not searched.
  *
- * Cost: the budget at most, for all pairs together.
+ * Cost: at most the budget, for all pairs together.
  *
- * @param trackers  Addresses of the trackers, one for each pair. No tracker is there twice.
+ * @param trackers  Addresses of the trackers, one for each pair. No tracker may be listed twice.
  * @param tools     The tool of each pair, in the same order.
- * @param count     Pairs: 1 to `DIBS_TOOLS`.
+ * @param count     Number of pairs: 1 to `DIBS_TOOLS`.
  * @param options   Options, or null.
  * @param tracked   Receives the answer; nothing is written unless the code is `DIBS_CODE_OK`.
- * @return As `dibs_tracker_closest`, of any pair; `DIBS_CODE_ARGUMENT` for no pair or too many.
+ * @return As `dibs_tracker_closest`, for any pair; `DIBS_CODE_ARGUMENT` for no pair or too many.
  */
 dibs_code dibs_tracker_closest_of(dibs_tracker *const *trackers,
                                   const dibs_tool *tools,
@@ -3137,14 +3155,14 @@ dibs_code dibs_tracker_closest_of(dibs_tracker *const *trackers,
                                   dibs_tracked *tracked);
 
 /**
- * Validates the bytes of a tree, and makes the tree that every other object is made with.
+ * Validates the bytes of a tree, and makes the tree that all other objects need.
  *
  * Cost: linear in the bytes; once, at start-up.
  *
  * @param storage  `DIBS_TREE_SIZE` bytes, aligned to `DIBS_ALIGNMENT`, for as long as the tree is used.
  * @param size     Bytes of the storage.
- * @param bytes    The tree, in flash or in memory. Not copied: it stays unchanged for as long as the tree, and any
- *                 object made with it, is used. Aligned to 4 it is read faster.
+ * @param bytes    The tree, in flash or in memory. Not copied: it must not change for as long as the tree, or any
+ *                 object made with it, is used. It is read faster if aligned to 4.
  * @param length   Bytes of the tree.
  * @param tree     Receives the tree's address.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_TREE_LENGTH` to `DIBS_CODE_TREE_FORM`, or a misuse.
@@ -3156,22 +3174,22 @@ dibs_code dibs_tree_init(void *storage,
                          dibs_tree **tree);
 
 /**
- * Facts about the tree.
+ * Reads the properties of the tree.
  */
 dibs_code dibs_tree_get_facts(dibs_tree *tree, dibs_tree_facts *facts);
 
 /**
  * Rest position (mm) of the vertex in a row.
  *
- * @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_NO_REST_SHAPE` outside the table or where the tree was built without.
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_NO_REST_SHAPE` outside the table or if the tree was built without it.
  */
 dibs_code dibs_tree_rest_position(dibs_tree *tree,
                                   uint32_t row,
                                   dibs_vec3 *position);
 
 /**
- * Brings positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows, which
- * frames take. A frame in the file's order gives wrong distances without an error, unless it is measured.
+ * Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows,
+ * as a frame needs them. A frame in the file's order gives wrong distances without an error, unless it is measured.
  *
  * Cost: linear in the vertices.
  *
@@ -3179,10 +3197,10 @@ dibs_code dibs_tree_rest_position(dibs_tree *tree,
  * @param values  x, y and z of each vertex of the mesh's file, in that file's order.
  * @param count   Their number: `file_vertices` of the tree's facts.
  * @param rows    Receives x, y and z of each row. Must not overlap `values`.
- * @param room    Rows that fit there: at least `vertices` of the tree's facts.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` of another number than the file's; `DIBS_CODE_CAPACITY` of too little room;
- *         `DIBS_CODE_ARGUMENT` where the tree was built without its vertex order, or where nodes carry the surface: their order
- *         is the volume's; or a misuse.
+ * @param room    The number of rows that fit there: at least `vertices` of the tree's facts.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` for another number than the file's; `DIBS_CODE_CAPACITY` for too
+ *         little room; `DIBS_CODE_ARGUMENT` if the tree was built without its vertex order, or if nodes move the
+ *         surface (their order is the volume's); or a misuse.
  */
 dibs_code dibs_tree_to_rows(dibs_tree *tree,
                             const float *values,
@@ -3191,21 +3209,19 @@ dibs_code dibs_tree_to_rows(dibs_tree *tree,
                             uint32_t room);
 
 /**
- * Label of the triangle in a row, say of its tissue.
+ * Label of the triangle in a row, for example of its tissue.
  *
- * @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or where the tree was built without labels.
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or if the tree was built without labels.
  */
-dibs_code dibs_tree_label(dibs_tree *tree,
-                          uint32_t triangle,
-                          uint8_t *label);
+dibs_code dibs_tree_label(dibs_tree *tree, uint32_t triangle, uint8_t *label);
 
 /**
- * Compares the tree's header and places of sections, which are in memory, with its bytes. A scrub does not read that
- * memory: call this once a tick.
+ * Compares the tree's header and section offsets, which are copied to memory, with its bytes. A scrub does not check
+ * that copy: call this once a tick.
  *
  * Cost: some hundred instructions.
  *
- * @return `DIBS_CODE_OK`; `DIBS_CODE_TREE_CORRUPT` where the two differ: make the output safe; or a misuse.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_TREE_CORRUPT` if the two differ: make the output safe; or a misuse.
  */
 dibs_code dibs_tree_check(dibs_tree *tree);
 
@@ -3215,25 +3231,25 @@ dibs_code dibs_tree_check(dibs_tree *tree);
 dibs_code dibs_scrub_init(void *storage, size_t size, dibs_tree *tree, dibs_scrub **scrub);
 
 /**
- * Checks the next bytes, at most `most`, and at the end of a round compares the checksum.
+ * Checks the next `most` bytes, and at the end of a round compares the checksum.
  *
- * @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_CORRUPT` at the end of a round in which the bytes did not match: make the output
- *         safe.
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_TREE_CORRUPT` at the end of a round in which the bytes did not match: make the
+ *         output safe.
  */
 dibs_code dibs_scrub_step(dibs_scrub *scrub,
                           size_t most);
 
 /**
- * The point of the mesh's file that all coordinates of the tree count from: of vertices, tools and answers. Zero unless
- * the file's coordinates are so far from their own origin that single precision would lose them; then subtract it, in
- * double precision, from each point in the file's coordinates.
+ * The point of the mesh's file that all coordinates of the tree are relative to: those of vertices, tools and answers.
+ * Zero unless the file's coordinates are so far from their own origin that single precision would lose them; then
+ * subtract it, in double precision, from each point in the file's coordinates.
  */
 dibs_code dibs_tree_origin(dibs_tree *tree,
                            dibs_point *origin);
 
 /**
- * Checks that a program was compiled with this library's header: sizes of objects may differ between versions. A
- * program that is linked with a shared library does so before it makes an object.
+ * Checks that a program was compiled with this library's header, because sizes of objects may differ between versions.
+ * A program that is linked with a shared library calls this before it makes an object.
  *
  * @param version  `DIBS_VERSION`.
  * @return `DIBS_CODE_OK`, or `DIBS_CODE_VERSION`.
@@ -3247,12 +3263,12 @@ dibs_code dibs_check_version(uint32_t version);
  * @param size     Bytes of the storage.
  * @param surface  The surface.
  * @param writer   Receives the writer's address.
- * @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` where the surface has a receiver or a writer, or a misuse.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_TAKEN` if the surface has a receiver or a writer already, or a misuse.
  */
 dibs_code dibs_writer_init(void *storage, size_t size, dibs_surface *surface, dibs_writer **writer);
 
 /**
- * Starts a frame, and forgets an unfinished one.
+ * Starts a frame, and discards an unfinished one.
  *
  * @return `DIBS_CODE_OK`, or a misuse.
  */
@@ -3266,7 +3282,8 @@ dibs_code dibs_writer_begin(dibs_writer *writer);
  * @param writer     The writer.
  * @param positions  x, y and z (mm) of each vertex, in the tree's order of rows. Copied.
  * @param count      Their number.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` where the frame lacks fewer: nothing is stored; or a misuse.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` if these are more rows than the frame lacks: nothing is stored; or
+ *         a misuse.
  */
 dibs_code dibs_writer_push(dibs_writer *writer,
                            const float *positions,
@@ -3278,15 +3295,15 @@ dibs_code dibs_writer_push(dibs_writer *writer,
  * Cost: with a tree linear in its triangles, otherwise a few instructions.
  *
  * @param writer          The writer.
- * @param tree            The surface's tree, to measure the stretch, which makes queries cheaper; or null, and queries take
- *                        the tree's limit to hold.
+ * @param tree            The surface's tree, to measure the stretch, which makes queries cheaper; or null: queries
+ *                        then assume the tree's limit.
  * @param epoch           Number of the frame.
  * @param received        Its time on the reader's clock, in ms; wraps.
- * @param position_error  No vertex is farther (mm, at least 0) than this from where it is here.
- * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` while vertices are missing; `DIBS_CODE_HELD` while the published frame is
- *         read: nothing is lost, call again; `DIBS_CODE_STRETCH_EXCEEDED` where distances on this frame would be wrong, and
- *         the other codes of `dibs_frame_measure`; `DIBS_CODE_ARGUMENT` for an error that is negative or not finite; or a
- *         misuse.
+ * @param position_error  Largest error (mm, at least 0) of a vertex position.
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_VERTEX_COUNT` while vertices are missing; `DIBS_CODE_HELD` while the published
+ *         frame is read: nothing is lost, call again; `DIBS_CODE_STRETCH_EXCEEDED` if distances on this frame could be
+ *         wrong, and the other codes of `dibs_frame_measure`; `DIBS_CODE_ARGUMENT` for an error that is negative or
+ *         not finite; or a misuse.
  */
 dibs_code dibs_writer_publish(dibs_writer *writer,
                               dibs_tree *tree,
