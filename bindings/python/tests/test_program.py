@@ -112,6 +112,23 @@ class Program(WithProgram):
         with self.assertRaisesRegex(ValueError, "no groups of triangles"):
             dibs.read(ROOT / "dibs-build/tests/fixtures/gmsh_41.msh", groups=True)
 
+    def test_the_first_lines_of_the_readme_give_the_right_answer(self):
+        page = pathlib.Path(ROOT / "bindings/python/README.md").read_text(encoding="utf-8")
+        first, *_ = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+        scope = {}
+        exec(compile(first, "README.md", "exec"), scope)
+        answers, heart = scope["answers"], scope["heart"]
+        # Of the vertices alone: each is a point of the surface, and no point is farther from one than an edge.
+        for answer, (*axis, radius) in zip(answers, scope["capsules"]):
+            start, end = np.reshape(axis, (2, 3))
+            share = np.clip((1.1 * heart.vertices - start) @ (end - start) / np.sum((end - start) ** 2), 0, 1)
+            nearest = np.linalg.norm(1.1 * heart.vertices - start - share[:, None] * (end - start), axis=1).min() - radius
+            self.assertLessEqual(answer["interval"][0], nearest)
+            self.assertLess(nearest - answer["separation"], 3.0)
+        fields = re.findall(r"^\| (`.*?) \|", page, re.MULTILINE)
+        named = {name for row in fields[:9] for name in re.findall(r"`(\w+)`", row)}
+        self.assertEqual(named, set(dibs.ANSWER.names))
+
     def test_the_example_of_the_readme_draws_the_programs_answers(self):
         page = pathlib.Path(ROOT / "bindings/python/README.md").read_text(encoding="utf-8")
         *_, code = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
