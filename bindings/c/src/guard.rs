@@ -241,7 +241,7 @@ fn conclude<S>(
 /// budget. Each has the velocity of the surface there, so that `dibs_contacts_set_velocities` is not needed.
 ///
 /// Call it in place of `dibs_guard_closest`. Act on the list only where the answer's outcome is `DIBS_CODE_OK`, and for a
-/// constraint within the list's bound. Its accuracy covers what the pair's does.
+/// constraint with a margin below the list's bound. The list's accuracy includes the surface's error and age.
 ///
 /// Cost: that of `dibs_guard_closest`, and some hundred instructions a contact.
 ///

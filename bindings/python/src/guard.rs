@@ -263,7 +263,7 @@ impl Guard {
         let (origin, now) = (self.tree.origin, Millis(now));
         let tool = AnyTool::of(&bytes::doubles(tool), origin);
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
-        // A thread that waits for the list lets the one that has it come back to Python.
+        // It waits without Python's lock, which the list's holder needs to return.
         let list = self.contacts.lock_py_attached(py);
         let mut list = list.unwrap_or_else(PoisonError::into_inner);
         let contacts = &mut **list;

@@ -158,7 +158,7 @@ impl Tracker {
         if let Some(instructions) = instructions {
             options = options.budget(Budget::for_instructions(instructions, cost));
         }
-        // A thread that waits for the list lets the one that has it come back to Python.
+        // It waits without Python's lock, which the list's holder needs to return.
         let list = self.contacts.lock_py_attached(py);
         let mut list = list.unwrap_or_else(PoisonError::into_inner);
         let contacts = &mut **list;

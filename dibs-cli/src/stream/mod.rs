@@ -82,8 +82,9 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["motion", "unnamed_motion"])]
     device: Option<String>,
     /// Send every frame with the rigid pose that this OpenIGTLink device had last, in TRANSFORM, TDATA or QTDATA: the frame's
-    /// positions are those before it. For controllers that take posed frames. The age is that of the older of both, and a frame
-    /// counts as new where positions or pose have changed
+    /// positions are those before it. For controllers that take posed frames. A frame is as old as the older of its positions and
+    /// its pose. Either, where it equals the one before, counts as measured anew only if its message has another time: a source
+    /// states there when it measured, not when it sends
     #[arg(long, value_name = "TRACKED", conflicts_with_all = ["motion", "unnamed_motion"])]
     pose_device: Option<String>,
     /// Where to: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
