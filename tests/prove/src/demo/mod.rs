@@ -1,5 +1,6 @@
 //! `cargo xtask demo`: a beating heart streamed to the controller, while a simulated hand pushes the instrument against it.
 
+mod bridge;
 mod bus;
 pub mod check;
 mod contacts;
@@ -79,6 +80,9 @@ pub struct Options {
     /// computer and in C know no other.
     #[arg(long)]
     pub serial: bool,
+    /// The frames come from an OpenIGTLink source, by `dibs bridge`, 60 a second of the board's time.
+    #[arg(long, conflicts_with_all = ["host", "c", "serial", "faults"])]
+    pub bridge: bool,
     /// Puts faults of every kind on the bus, and silences it once for a while.
     #[arg(long)]
     pub faults: bool,
