@@ -10,6 +10,7 @@ mod igtl_age;
 mod igtl_messages;
 mod igtl_peers;
 mod igtl_pose;
+mod igtl_record;
 mod igtl_refused;
 mod live;
 #[cfg(target_os = "linux")]
