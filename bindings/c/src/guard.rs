@@ -242,7 +242,7 @@ fn conclude<S>(
 /// the same budget. Each has the velocity of the surface there, so `dibs_contacts_set_velocities` is not needed.
 ///
 /// Call it instead of `dibs_guard_closest`. Act on the list only if the answer's outcome is `DIBS_CODE_OK`, and in a
-/// constraint only up to the list's bound. Its accuracy covers the same errors as the pair's.
+/// constraint only up to the list's bound. The list's accuracy includes the surface's error and age.
 ///
 /// Cost: that of `dibs_guard_closest`, and some hundred instructions a contact.
 ///

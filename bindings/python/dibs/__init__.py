@@ -13,7 +13,7 @@ Lengths are in millimetres, in the coordinates of the mesh's file. Wrong values 
 
 from ._filter import Admitted, Filter, RigidMotion, Tracked, Tracker
 from ._guard import Answer, ForbiddenRegion, Force, ForceState, Guard, State
-from ._mesh import Mesh, MeshWarning, build, generate, read
+from ._mesh import Mesh, MeshWarning, Reading, build, generate, read
 from ._motion import Motion, MotionStretch, read_motion
 from ._stream import Sender, Sent, Totals
 from ._tools import capsules, spheres
@@ -36,6 +36,7 @@ __all__ = [
     "MeshWarning",
     "Motion",
     "MotionStretch",
+    "Reading",
     "RigidMotion",
     "Scene",
     "Sender",

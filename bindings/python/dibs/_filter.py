@@ -23,9 +23,10 @@ _TOOLS = 8
 _ROWS = 8
 
 
-def contacts_of(native: tuple[bytearray, float]) -> Contacts:
-    found, bound = native
-    return Contacts(np.frombuffer(found, CONTACT), np.array([bound], dtype=np.float32))
+def contacts_of(native: tuple[bytearray, float, float]) -> Contacts:
+    found, bound, accuracy = native
+    single = [np.array([number], dtype=np.float32) for number in (bound, accuracy)]
+    return Contacts(np.frombuffer(found, CONTACT), *single)
 
 
 class Tracked(Bound):
@@ -46,7 +47,7 @@ class Tracked(Bound):
 
     _instead = "send its `closest`"
 
-    def __init__(self, native: _dibs.Tracked, contacts: Optional[tuple[bytearray, float]]) -> None:
+    def __init__(self, native: _dibs.Tracked, contacts: Optional[tuple[bytearray, float, float]]) -> None:
         self._native = native
         self.closest = np.frombuffer(native.record(), ANSWER)[0]
         self.is_kept, self.fallback, self.moved = native.facts()

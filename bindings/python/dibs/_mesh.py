@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from typing import Any, Optional, Protocol, Union
+from typing import TYPE_CHECKING, Any, Optional, Protocol, TypedDict, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,9 @@ from . import _arrays, _dibs
 from ._arrays import Floats
 from ._motion import Motion, frames_of
 from ._tree import Tree
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Path = Union[str, "os.PathLike[str]"]
 
@@ -26,6 +29,24 @@ class HasFaces(Protocol):
     def vertices(self) -> Any: ...
     @property
     def faces(self) -> Any: ...
+
+
+class Reading(TypedDict, total=False):
+    """How a mesh is read."""
+
+    unit: Optional[str]
+    """The unit of its lengths, which become millimetres: "mm", "cm", "m", "in", "um". Without it the one that the file states
+    (glTF: metres; 3MF), else millimetres. Another unit than the stated one is refused."""
+    weld: Optional[float]
+    """Joins vertices that are at most so far apart; without it only triangle soup is welded."""
+    strict: bool
+    """Refuses degenerate and duplicate triangles instead of dropping them."""
+    largest_component: bool
+    """Takes the part with the most triangles alone."""
+    origin: Optional[npt.ArrayLike]
+    """The point that coordinates count from inside of the tree; by default near a mesh that is far from zero."""
+    orient: bool
+    """Turns triangles until the surface faces outwards."""
 
 
 class MeshWarning(UserWarning):
@@ -55,18 +76,12 @@ class Mesh:
         self,
         vertices: npt.ArrayLike,
         triangles: npt.ArrayLike,
-        *,
-        unit: Optional[str] = None,
-        weld: Optional[float] = None,
-        strict: bool = False,
-        largest_component: bool = False,
-        origin: Optional[npt.ArrayLike] = None,
-        orient: bool = False,
+        **reading: Unpack[Reading],
     ) -> None:
+        _refuse_unknown("Mesh", reading)
         points = _arrays.points("vertices", vertices)
         corners = _arrays.triangles(triangles, len(points))
-        reading = _reading(unit, weld, strict, largest_component, origin, orient, False)
-        self._take(_dibs.Mesh.of(points.tobytes(), corners.tobytes(), reading))
+        self._take(_dibs.Mesh.of(points.tobytes(), corners.tobytes(), _reading(reading, False)))
 
     def _take(self, native: _dibs.Mesh) -> None:
         self._native = native
@@ -113,45 +128,32 @@ def _restored(
     return Mesh._of(_dibs.Mesh.restored(positions, triangles, report, groups, faces, turned))
 
 
+def _refuse_unknown(caller: str, reading: Reading) -> None:
+    for name in reading.keys() - Reading.__annotations__.keys():
+        raise TypeError(f"{caller}() got an unexpected keyword argument '{name}'")
+
+
 def _reading(
-    unit: Optional[str],
-    weld: Optional[float],
-    strict: bool,
-    largest_component: bool,
-    origin: Optional[npt.ArrayLike],
-    orient: bool,
-    groups: bool,
+    reading: Reading, groups: bool
 ) -> tuple[Optional[str], Optional[float], bool, bool, Optional[list[float]], bool, bool]:
+    origin, weld = reading.get("origin"), reading.get("weld")
     place: Optional[list[float]] = None
     if origin is not None:
         place = _arrays.points("origin", _arrays.numbers("origin", origin)[np.newaxis])[0].tolist()
     if weld is not None:
         weld = _arrays.number("weld", weld)
-    return unit, weld, strict, largest_component, place, orient, groups
+    is_strict, is_largest = reading.get("strict", False), reading.get("largest_component", False)
+    return reading.get("unit"), weld, is_strict, is_largest, place, reading.get("orient", False), groups
 
 
-def read(
-    path: Path,
-    *,
-    unit: Optional[str] = None,
-    weld: Optional[float] = None,
-    strict: bool = False,
-    largest_component: bool = False,
-    origin: Optional[npt.ArrayLike] = None,
-    orient: bool = False,
-    groups: bool = False,
-) -> Mesh:
+def read(path: Path, *, groups: bool = False, **reading: Unpack[Reading]) -> Mesh:
     """Reads a mesh file: OBJ, STL, PLY, OFF, VTK (.vtk, .vtp, .vtu), glTF, Gmsh or 3MF, told apart by content.
 
-    `unit` ("mm", "cm", "m", "in", "um") is the unit of its lengths, which are converted to millimetres; by default the
-    one that the file states (glTF: metres; 3MF), else millimetres. Another unit than the stated one is refused. `weld`
-    joins vertices that are at most this far apart; by default only triangle soup is welded. `strict` refuses degenerate
-    and duplicate triangles instead of dropping them. `orient` flips triangles until the surface faces outwards.
-    `groups` makes labels of the file's groups: OBJ's g and usemtl, Gmsh's physical groups, VTK's cell data label,
-    labels or RegionId.
+    `groups` makes labels of the file's groups: OBJ's g and usemtl, Gmsh's physical groups, VTK's cell data label, labels or
+    RegionId. The other arguments are those of `Reading`: `unit`, `weld`, `strict`, `largest_component`, `origin`, `orient`.
     """
-    reading = _reading(unit, weld, strict, largest_component, origin, orient, groups)
-    return Mesh._of(_dibs.Mesh.read(os.fspath(path), reading))
+    _refuse_unknown("read", reading)
+    return Mesh._of(_dibs.Mesh.read(os.fspath(path), _reading(reading, groups)))
 
 
 def build(
@@ -164,13 +166,8 @@ def build(
     nodes: Optional[npt.ArrayLike] = None,
     tetrahedra: Optional[npt.ArrayLike] = None,
     bind_within: float = 0.0,
-    unit: Optional[str] = None,
-    weld: Optional[float] = None,
-    strict: bool = False,
-    largest_component: bool = False,
-    origin: Optional[npt.ArrayLike] = None,
-    orient: bool = False,
     groups: bool = False,
+    **reading: Unpack[Reading],
 ) -> Tree:
     """Builds the tree of a mesh, which is a file, a `Mesh`, arrays of vertices and triangles, or an object with
     `vertices` and `faces` (trimesh).
@@ -182,14 +179,7 @@ def build(
     nearest tetrahedron within `bind_within` (mm). The other arguments are those of `read`. `MeshWarning` reports
     unusual properties of the mesh.
     """
-    reading: dict[str, Any] = {
-        "unit": unit,
-        "weld": weld,
-        "strict": strict,
-        "largest_component": largest_component,
-        "origin": origin,
-        "orient": orient,
-    }
+    _refuse_unknown("build", reading)
     if isinstance(source, Mesh):
         # An array has no truth value.
         given = groups or any(value is not None and value is not False for value in reading.values())

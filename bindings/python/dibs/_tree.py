@@ -81,6 +81,8 @@ class Contacts(NamedTuple):
     bound: npt.NDArray[np.float32]
     """For each pose: every contact with a separation below this is listed. It is the margin, unless there were too many
     contacts, or the budget ended."""
+    accuracy: npt.NDArray[np.float32]
+    """For each pose: no separation is too high by more than this (mm). A guard's includes the surface's error and age."""
 
 
 def _tests(budget: Optional[int]) -> int:
@@ -125,8 +127,8 @@ class Scene:
         if label is not None and not (isinstance(label, (int, np.integer)) and 0 <= label <= 255):
             raise ValueError(f"label: {label!r} is no whole number from 0 to 255")
         native = _dibs.contacts(self._natives, _tools.poses(tools).native, margin, _tests(budget), label)
-        found, bound = native
-        return Contacts(np.frombuffer(found, CONTACT), np.frombuffer(bound, "<f4"))
+        found, bound, accuracy = native
+        return Contacts(np.frombuffer(found, CONTACT), np.frombuffer(bound, "<f4"), np.frombuffer(accuracy, "<f4"))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Scene, (self.surfaces,)

@@ -19,8 +19,9 @@ use pyo3::sync::MutexExt;
 use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::record::push_answer;
+use crate::surface::List;
 use crate::tool::AnyTool;
-use crate::tracker::{Admitted, Filter, List, Listed, Tracked, listed, motion, named, record};
+use crate::tracker::{Admitted, Filter, Listed, Tracked, listed, motion, named, record};
 use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, error, invalid};
 

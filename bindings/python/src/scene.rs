@@ -34,7 +34,7 @@ pub fn query<'py>(
     Ok(PyByteArray::new(py, &found.concat()))
 }
 
-/// The contacts of each pose, and for each pose the bound below which the list is complete.
+/// The contacts of each pose, and for each pose the bound below which the list is complete, and the list's accuracy.
 #[pyfunction]
 pub fn contacts<'py>(
     py: Python<'py>,
@@ -43,11 +43,12 @@ pub fn contacts<'py>(
     margin: f32,
     budget: u32,
     label: Option<u8>,
-) -> PyResult<[Bound<'py, PyByteArray>; 2]> {
+) -> PyResult<[Bound<'py, PyByteArray>; 3]> {
     let scene = Scene::new(surfaces, budget);
     let found = in_blocks(py, tools, |chunk| scene.touch(chunk, (margin, label)))?;
-    let (records, bounds): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-    Ok([records, bounds].map(|bytes| PyByteArray::new(py, &bytes.concat())))
+    let of_all =
+        |part: usize| found.iter().flat_map(|chunk| &chunk[part]).copied().collect::<Vec<_>>();
+    Ok([0, 1, 2].map(|part| PyByteArray::new(py, &of_all(part))))
 }
 
 /// Answers chunks of poses on all cores, without holding Python's lock.
@@ -109,34 +110,36 @@ impl Scene {
         Ok(records)
     }
 
-    /// The records of each pose's contacts, deepest first, and its bound.
+    /// The records of each pose's contacts, deepest first, its bound, and its accuracy.
     fn touch(
         &self,
         chunk: Chunk<'_>,
         (margin, label): (f32, Option<u8>),
-    ) -> Result<(Vec<u8>, Vec<u8>), String> {
-        let mut all: Vec<(Vec<Contact>, f32)> = vec![(Vec::new(), margin); chunk.len()];
+    ) -> Result<[Vec<u8>; 3], String> {
+        let mut all: Vec<(Vec<Contact>, f32, f32)> = vec![(Vec::new(), margin, 0.0); chunk.len()];
         for (number, surface) in self.surfaces() {
-            surface.contacts(chunk, self.budget, (margin, label), |pose, tool, found, bound| {
-                let (contacts, least) = &mut all[pose];
-                for contact in found {
+            surface.contacts(chunk, self.budget, (margin, label), |pose, tool, found| {
+                let (contacts, bound, accuracy) = &mut all[pose];
+                for contact in found.iter() {
                     let mut contact = *contact;
                     (contact.surface, contact.tool) = (number, tool);
                     contacts.push(contact);
                 }
-                *least = least.min(bound);
+                *bound = bound.min(found.bound());
+                *accuracy = accuracy.max(found.accuracy());
             })?;
         }
-        let (mut records, mut bounds) = (Vec::new(), Vec::new());
-        for (pose, (mut contacts, bound)) in (chunk.first()..).zip(all) {
+        let [mut records, mut bounds, mut accuracies] = [const { Vec::new() }; 3];
+        for (pose, (mut contacts, bound, accuracy)) in (chunk.first()..).zip(all) {
             contacts.sort_by(|one, other| one.separation.total_cmp(&other.separation));
             for contact in &contacts {
                 let tree = Arc::as_ref(&self.surfaces[contact.surface].get().tree);
                 push_contact(&mut records, pose as u32, contact, tree);
             }
             bounds.extend(bound.to_le_bytes());
+            accuracies.extend(accuracy.to_le_bytes());
         }
-        Ok((records, bounds))
+        Ok([records, bounds, accuracies])
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dibs_build::glam::Vec3;
 use dibs_build::{SurfaceRows, largest_stretch};
 use dibs_nostd::{
-    Budget, Contact, Contacts, Index, MeasuredStretch, Options, Proximity, Query, QueryError, Tree,
+    Budget, Contacts, Index, MeasuredStretch, Options, Proximity, Query, QueryError, Tree,
 };
 use pyo3::prelude::*;
 
@@ -17,6 +17,9 @@ const STACK: usize = dibs_nostd::format::MAX_STACK;
 
 /// Largest number of contacts of a tool and a surface.
 pub const MOST_CONTACTS: usize = 64;
+
+/// A list of contacts of a tool and a surface.
+pub type List = Contacts<MOST_CONTACTS, 16_384>;
 
 /// A tree with the positions and velocities of its vertices.
 #[pyclass(frozen, module = "dibs._dibs")]
@@ -69,20 +72,19 @@ impl Surface {
         Ok(())
     }
 
-    /// Finds the contacts of each tool, or only those of a label. `found` receives them with the pose, the tool's
-    /// index, and the bound below which the list is complete.
+    /// Finds the contacts of each tool, or only those of a label. `found` receives their list with the tool's pose and index.
     pub fn contacts(
         &self,
         chunk: Chunk<'_>,
         budget: Budget,
         (margin, label): (f32, Option<u8>),
-        mut found: impl FnMut(usize, usize, &mut dyn Iterator<Item = &Contact>, f32),
+        mut found: impl FnMut(usize, usize, &List),
     ) -> Result<(), String> {
         let (rows, mut options) = (&self.rows, self.options(budget));
         if let Some(label) = label {
             options = options.contacts_of(label);
         }
-        let mut contacts = Box::new(Contacts::<MOST_CONTACTS, 16_384>::new());
+        let mut contacts = Box::new(List::new());
         of_any_width!(self.tree.view(), tree => {
             let mut query = query_of(tree)?;
             for (pose, number, numbers) in chunk.tools() {
@@ -100,7 +102,7 @@ impl Surface {
                 if let Some(velocities) = &self.velocities {
                     contacts.move_with(velocities.as_slice()).map_err(of_rows)?;
                 }
-                found(pose, number, &mut contacts.iter(), contacts.bound());
+                found(pose, number, &contacts);
             }
         });
         Ok(())

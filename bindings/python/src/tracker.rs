@@ -6,7 +6,7 @@ use dibs_build::SurfaceRows;
 use dibs_build::glam::DVec3;
 use dibs_nostd::filter::{self, FilterError, Motion, MotionRow, Uncertainty};
 use dibs_nostd::{
-    Budget, Capsule, Contacts, Cost, Fallback, Index, MovingTable, Odometer, Options, Proximity,
+    Budget, Capsule, Cost, Fallback, Index, MovingTable, Odometer, Options, Proximity,
     TrackerAnswer,
 };
 use pyo3::prelude::*;
@@ -14,7 +14,7 @@ use pyo3::sync::MutexExt;
 use pyo3::types::PyByteArray;
 
 use crate::record::{push_answer, push_contact};
-use crate::surface::{MOST_CONTACTS, Surface};
+use crate::surface::{List, Surface};
 use crate::tool::AnyTool;
 use crate::tree::{Owned, Tree, View};
 use crate::{bytes, invalid};
@@ -119,16 +119,13 @@ pub struct Tracker {
     tree: Arc<Owned>,
 }
 
-/// A list of contacts.
-pub type List = Contacts<MOST_CONTACTS, 16_384>;
-
-/// The records and the bound of a list.
-pub type Listed<'py> = (Bound<'py, PyByteArray>, f32);
+/// A list's records, its bound, and its accuracy.
+pub type Listed<'py> = (Bound<'py, PyByteArray>, f32, f32);
 
 pub fn listed<'py>(py: Python<'py>, list: &List, tree: &Owned) -> Listed<'py> {
     let mut records = Vec::new();
     list.iter().for_each(|found| push_contact(&mut records, 0, found, tree));
-    (PyByteArray::new(py, &records), list.bound())
+    (PyByteArray::new(py, &records), list.bound(), list.accuracy())
 }
 
 #[pymethods]

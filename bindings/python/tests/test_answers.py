@@ -142,8 +142,8 @@ class Answers(unittest.TestCase):
         self.assertEqual(single.dtype, dibs.ANSWER)
         self.assertEqual(single, answers[7])
         self.assertEqual(TREE.query(tools[:0]).shape, (0,))
-        found, bound = TREE.contacts(tools[:0], 5)
-        self.assertEqual((len(found), len(bound)), (0, 0))
+        found, bound, accuracy = TREE.contacts(tools[:0], 5)
+        self.assertEqual((len(found), len(bound), len(accuracy)), (0, 0, 0))
         answers["separation"] = 0
 
     def test_another_librarys_mesh_is_taken_as_it_is(self):

@@ -26,6 +26,9 @@ TRIANGLE = [[0, 0, 0], [9, 0, 0], [0, 9, 0]]
 
 CASES = [
     # Meshes.
+    (TypeError, "build() got an unexpected keyword argument 'streach'", lambda: dibs.build(HEART, streach=1.5)),
+    (TypeError, "read() got an unexpected keyword argument 'units'", lambda: dibs.read("no.ply", units="mm")),
+    (TypeError, "Mesh() got an unexpected keyword argument 'wield'", lambda: dibs.Mesh(VERTICES, TRIANGLES, wield=1)),
     (ValueError, "vertices: the shape is (3,); give (points, 3)", lambda: dibs.build([1, 2, 3], TRIANGLES)),
     (ValueError, "vertices: nan at [3, 1] is not a finite number", lambda: dibs.build(NAN, TRIANGLES)),
     (TypeError, "vertices: an array of numbers is needed, not of <U1", lambda: dibs.build([["a", "b", "c"]], [[0, 1, 2]])),

@@ -2,6 +2,8 @@
 
 import pathlib
 import re
+import subprocess
+import sys
 import unittest
 
 import numpy as np
@@ -12,6 +14,25 @@ from subjects import ASIDE, BEAT, HEART, OTHER, TREE
 PERIOD = 30
 WALL = dibs.ForbiddenRegion(stiffness=1.0, damping=0.002, max_force=5.0, margin=5.0)
 SPHERE = [100.0, 0.0, 30.0, 2.5]
+
+# Threads that ask for the contacts of one guard, or of one tracker: while one has the list, another waits for it.
+SHARED = """
+import sys, threading
+import dibs
+mesh, _ = dibs.generate("heart", 320)
+tree = dibs.build(mesh)
+tool = [100.0, 0.0, 30.0, 2.5]
+if sys.argv[1] == "guard":
+    guard = dibs.Guard(tree, 300.0, 80, automatic=True, without_transit=True)
+    ask = lambda: guard.contacts(tool, 12.0, 0)
+else:
+    tracker = dibs.Tracker(tree)
+    ask = lambda: tracker.closest(tool, tree.rest, margin=12.0)
+threads = [threading.Thread(target=lambda: [ask() for _ in range(2_000)]) for _ in range(4)]
+[thread.start() for thread in threads]
+[thread.join() for thread in threads]
+print("done")
+"""
 
 
 def cobs(packet):
@@ -119,11 +140,14 @@ class Guards(unittest.TestCase):
             if tick % PERIOD == 0:
                 loop.send()
             loop.now += 1
-            answer, (found, bound) = loop.guard.contacts(tool, 12.0, loop.now)
+            answer, (found, bound, accuracy) = loop.guard.contacts(tool, 12.0, loop.now)
             if tick % 100 == 99 and answer.closest is not None:
                 truth = OTHER.contacts(tool, 12.0, surface=loop.frame)
                 self.assertEqual(len(found), len(truth.found))
                 self.assertAlmostEqual(float(bound[0]), float(truth.bound[0]), places=3)
+                # As the pair's, it includes the surface's age.
+                self.assertGreaterEqual(accuracy[0], answer.closest["accuracy"])
+                self.assertGreater(accuracy[0], answer.margin + truth.accuracy[0] / 2)
                 for field in ["separation", "point_on_surface", "normal"]:
                     np.testing.assert_allclose(found[field], truth.found[field], atol=1e-3)
                 listed += len(found)
@@ -133,6 +157,13 @@ class Guards(unittest.TestCase):
         few = Loop(OTHER, HEART.vertices + ASIDE, budget=40)
         few.send()
         self.assertLess(few.guard.contacts(tool, 12.0, few.now)[1].bound[0], 12)
+
+    def test_threads_share_a_list_of_contacts(self):
+        for name in ["guard", "tracker"]:
+            # In a process of its own: one that hangs holds Python's lock, and with it the test's own clock.
+            with self.subTest(name):
+                shared = subprocess.run([sys.executable, "-c", SHARED, name], timeout=60, check=True, stdout=subprocess.PIPE)
+                self.assertEqual(shared.stdout.split(), [b"done"])
 
     def test_a_frame_of_this_process_is_that_of_packets(self):
         answers = []

@@ -1,7 +1,9 @@
 """What goes to another process."""
 
 import pickle
+import tempfile
 import unittest
+from pathlib import Path
 
 import dibs
 import numpy as np
@@ -34,6 +36,21 @@ class Pickle(unittest.TestCase):
             self.assertEqual(dibs.build(copy).blob, dibs.build(mesh).blob)
         self.assertGreater(again(welded).report["position_error"], 0)
         self.assertEqual(again(metres).report["unit"], "m")
+
+    def test_a_mesh_keeps_its_groups(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "heart.obj"
+            corners = [f"v {x} {y} {z}" for x, y, z in self.mesh.vertices]
+            faces = [f"f {a} {b} {c}" for a, b, c in self.mesh.triangles + 1]
+            lines = [*corners, "g atria", *faces[:100], "g ventricles", *faces[100:]]
+            path.write_text("\n".join(lines), encoding="utf-8")
+            mesh = dibs.read(path, groups=True)
+        copy = again(mesh)
+        self.assertEqual([(group["name"], group["triangles"]) for group in copy.groups], [("atria", 100), ("ventricles", 220)])
+        self.assertEqual(copy.groups, mesh.groups)
+        np.testing.assert_array_equal(copy.labels, mesh.labels)
+        self.assertEqual(len(np.unique(copy.labels)), 2)
+        self.assertEqual(dibs.build(copy).blob, dibs.build(mesh).blob)
 
     def test_a_surface_is_that_of_its_moment(self):
         positions = np.array(self.motion.frames[3])

@@ -55,7 +55,7 @@ class Program(WithProgram):
             reasons = [dibs.SIDE_REASONS[reason] or None for reason in mine["side_reason"]]
             self.assertEqual(reasons, [answer["side_reason"] for answer in answers])
 
-            found, bound = TREE.contacts(tools, 30, surface=BEAT.frames[9])
+            found, bound, _ = TREE.contacts(tools, 30, surface=BEAT.frames[9])
             self.compare({"contacts_bound": bound}, answers, ["contacts_bound"])
             contacts = [contact for answer in answers for contact in answer["contacts"]]
             self.assertGreater(len(contacts), 30)
@@ -77,7 +77,7 @@ class Program(WithProgram):
         self.compare(mine[exact], [answers[pose] for pose in exact], ["separation", "lower", "accuracy", "tool"])
         names = np.array(["heart.dibs", "other.dibs"])
         self.assertEqual(names[mine["surface"]].tolist(), [answer["tree"] for answer in answers])
-        found, bound = scene.contacts(tools, 30)
+        found, bound, _ = scene.contacts(tools, 30)
         self.compare({"contacts_bound": bound}, answers, ["contacts_bound"])
         contacts = [contact for answer in answers for contact in answer["contacts"]]
         self.compare(found, contacts, ["separation", "point_on_surface", "tool"])

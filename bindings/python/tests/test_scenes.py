@@ -55,21 +55,24 @@ class Scenes(unittest.TestCase):
         surfaces = [TREE.surface(BEAT.frames[3]), OTHER.rest]
         # A budget that some pairs exceed gives them bounds of their own.
         budget = 1_080
-        found, bound = dibs.Scene(surfaces).contacts(tools, 25, budget=budget)
+        found, bound, accuracy = dibs.Scene(surfaces).contacts(tools, 25, budget=budget)
         pairs = [[surface.contacts(tools[:, tool], 25, budget=budget) for tool in range(3)] for surface in surfaces]
         self.assertGreater(len(np.unique(found[["surface", "tool"]])), 5)
         for pose in range(200):
             expected = sorted(
                 (contact["separation"], number, tool)
                 for number, tools_of in enumerate(pairs)
-                for tool, (contacts, _) in enumerate(tools_of)
+                for tool, (contacts, *_) in enumerate(tools_of)
                 for contact in contacts[contacts["pose"] == pose]
             )
             mine = found[found["pose"] == pose]
             self.assertEqual(expected, sorted(zip(mine["separation"], mine["surface"], mine["tool"])))
             self.assertTrue((np.diff(mine["separation"]) >= 0).all())
-        least = np.min([bounds for tools_of in pairs for _, bounds in tools_of], axis=0)
+        least = np.min([one.bound for tools_of in pairs for one in tools_of], axis=0)
         np.testing.assert_array_equal(bound, least)
+        most = np.max([one.accuracy for tools_of in pairs for one in tools_of], axis=0)
+        np.testing.assert_array_equal(accuracy, most)
+        self.assertTrue((0 < accuracy).any() and (accuracy < 1e-2).all())
         self.assertGreater(len(np.unique(least)), 3)
 
     def test_contacts_move_as_the_surface_does(self):
@@ -126,7 +129,7 @@ class Budgets(unittest.TestCase):
     def test_contacts_below_the_bound_are_all_listed(self):
         tools = capsules(300)
         whole = TREE.contacts(tools, 15).found
-        found, bound = TREE.contacts(tools, 15, budget=620)
+        found, bound, _ = TREE.contacts(tools, 15, budget=620)
         self.assertTrue((bound < 15).any() and np.isfinite(bound).any())
         # Inside, the only contact is the deepest pair. A budget that ends leaves its point open, but not its depth.
         pairs, short = TREE.query(tools), TREE.query(tools, budget=620)

@@ -12,9 +12,6 @@ use std::time::{Duration, Instant};
 /// The assumed time from the first frame to the second: that of 30 frames a second.
 const FIRST_GAP: Duration = Duration::from_millis(33);
 
-/// Positions, and the rigid pose of the whole surface.
-type Rows = (Vec<Vec3>, Option<RigidPose>);
-
 /// A frame of a source that fits the tree.
 pub struct Parsed {
     /// In the mesh's order.
@@ -122,21 +119,22 @@ impl Shared {
     }
 
     fn fill(&self, mut next: impl FnMut() -> Result<Option<Parsed>>, keeps_all: bool) {
-        // The last positions and pose, their arrival time, the arrival time of the first equal frame, and its age then.
-        let mut last: Option<(Rows, Instant, Instant, Duration)> = None;
+        // The last positions, their arrival time, the arrival time of the first equal frame, and its age then.
+        let mut last: Option<(Vec<Vec3>, Instant, Instant, Duration)> = None;
         let end = loop {
             let Parsed { positions, pose, came, age } = match next() {
                 Ok(Some(parsed)) => parsed,
                 Ok(None) => break Ok(()),
                 Err(error) => break Err(error),
             };
-            let rows = (positions.clone(), pose);
             let (first, age) = match (age, &last) {
-                (Age::Delay(_), Some((before, _, first, age))) if *before == rows => (*first, *age),
+                (Age::Delay(_), Some((before, _, first, age))) if *before == positions => {
+                    (*first, *age)
+                }
                 (Age::Delay(age) | Age::Stated(age), _) => (came, age),
             };
             let gap = last.as_ref().map_or(FIRST_GAP, |(_, last, ..)| came - *last);
-            last = Some((rows, came, first, age));
+            last = Some((positions.clone(), came, first, age));
             let frame = Frame { positions, pose, came, first, age, gap };
             let mut place = self.place();
             if keeps_all {

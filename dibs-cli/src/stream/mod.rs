@@ -83,7 +83,8 @@ pub struct Args {
     device: Option<String>,
     /// Send every frame with the latest rigid pose of this OpenIGTLink device, from TRANSFORM, TDATA or QTDATA: the
     /// frame's positions are those before the pose is applied. For controllers that accept posed frames. The age is
-    /// that of the older of the two, and a frame counts as new if positions or pose have changed
+    /// that of the older of the two. Positions or a pose that equal the ones before count as new only if their message
+    /// has another time: a source states there when it measured, not when it sends
     #[arg(long, value_name = "TRACKED", conflicts_with_all = ["motion", "unnamed_motion"])]
     pose_device: Option<String>,
     /// The receiver's address: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or

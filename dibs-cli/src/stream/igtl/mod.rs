@@ -8,6 +8,7 @@ mod delay;
 mod exchange;
 mod matching;
 mod message;
+mod part;
 mod peer;
 mod pose;
 #[cfg(test)]
@@ -22,9 +23,11 @@ use super::place::Place;
 use anyhow::Result;
 use content::{Content, Kind};
 use delay::Delay;
+use dibs_build::glam::Vec3;
 use dibs_nostd::RigidPose;
 use exchange::Cause;
 use message::{BodyError, Header};
+use part::Part;
 use peer::{Door, Ended, Peer};
 use pose::PoseError;
 use std::sync::Arc;
@@ -38,9 +41,11 @@ pub struct Igtl {
     peer: Option<Peer>,
     /// If given, only this device's positions are accepted.
     device: Option<String>,
-    /// If given, the device whose pose every frame gets, and its last pose.
+    /// If given, the device whose pose every frame gets.
     pose_device: Option<String>,
-    pose: Option<Known>,
+    /// The last pose, and the last positions of frames that have one.
+    pose: Option<Part<RigidPose>>,
+    positions: Option<Part<Vec<Vec3>>>,
     place: Place,
     topology: Topology,
     exchange: Arc<Exchange>,
@@ -52,13 +57,6 @@ pub struct Igtl {
     heard: Instant,
     /// Whether a message has arrived on this connection.
     has_message: bool,
-}
-
-/// A pose, its arrival time, and its delay then.
-struct Known {
-    pose: RigidPose,
-    came: Instant,
-    delay: Duration,
 }
 
 /// Largest size of a message with poses: of more than a thousand instruments.
@@ -87,6 +85,7 @@ impl Igtl {
             device,
             pose_device,
             pose: None,
+            positions: None,
             place,
             topology,
             exchange,
@@ -185,7 +184,7 @@ impl Igtl {
         }
     }
 
-    /// Reads a body of at most `most` bytes, needed for `what`, and parses its content.
+    /// Reads a body of at most `most` bytes, and parses its content. `what` names the content in a refusal.
     fn body<T>(
         &mut self,
         peer: &mut Peer,
@@ -212,14 +211,14 @@ impl Igtl {
         peer.report(&self.exchange);
     }
 
-    /// The message's type, if it may contain the requested pose.
+    /// The message's type, if it may contain that device's pose.
     fn pose_of(&self, header: &Header) -> Option<pose::Kind> {
-        let wanted = self.pose_device.as_ref()?;
+        let device = self.pose_device.as_ref()?;
         let kind = pose::Kind::of(&header.kind)?;
-        (!kind.is_of_device() || header.device == *wanted).then_some(kind)
+        (!kind.is_of_device() || header.device == *device).then_some(kind)
     }
 
-    /// Reads the pose of a message. Returns whether it contains the requested one.
+    /// Reads the pose of a message. Returns whether it contains that device's.
     fn read_pose(
         &mut self,
         header: &Header,
@@ -231,7 +230,8 @@ impl Igtl {
         let device = self.pose_device.as_deref().unwrap_or_default();
         let read = kind.read(content, device).map_err(|error| match error {
             PoseError::Layout => {
-                (Cause::Layout, "its size is not that of its type".to_owned())
+                let why = format!("its content has {} bytes, and should have {}", content.len(), kind.size());
+                (Cause::Layout, why)
             }
             PoseError::NoRotation => {
                 let why =
@@ -242,7 +242,8 @@ impl Igtl {
         let Some(pose) = read else { return Ok(false) };
         let placed = self.place.pose(&pose.rotation, pose.shift);
         let pose = placed.map_err(|error| (Cause::Pose, error.to_string()))?;
-        self.pose = Some(Known { pose, came, delay: self.delay.of(came, header.time) });
+        let (time, delay) = (header.time, self.delay.of(came, header.time));
+        Part::replace(&mut self.pose, Part { value: pose, time, came, delay });
         Ok(true)
     }
 
@@ -282,14 +283,15 @@ impl Igtl {
         let Some(device) = &self.pose_device else {
             return Ok(Parsed { positions, pose: None, came, age: Age::Delay(delay) });
         };
-        let Some(known) = &self.pose else {
+        let part = Part { value: positions.clone(), time: header.time, came, delay };
+        Part::replace(&mut self.positions, part);
+        let (Some(pose), Some(known)) = (&self.pose, &self.positions) else {
             let why = format!("no pose of device \"{device}\" has come before it");
             return Err((Cause::Pose, why));
         };
-        // A frame is as old as the older of its two parts.
-        let pose_age = came.saturating_duration_since(known.came) + known.delay;
-        let age = Age::Delay(delay.max(pose_age));
-        Ok(Parsed { positions, pose: Some(known.pose), came, age })
+        // A frame is as old as its older part.
+        let age = Age::Stated(known.age(came).max(pose.age(came)));
+        Ok(Parsed { positions, pose: Some(pose.value), came, age })
     }
 }
 

@@ -3,13 +3,16 @@
 use super::message::take;
 use dibs_build::glam::{DMat3, DQuat, DVec3};
 
-/// Size of a name, and of an element of TDATA and QTDATA after it, which starts with a type and a reserved byte.
-const NAME: usize = 20;
-const MATRIX: usize = 2 + 48;
-const QUATERNION: usize = 2 + 28;
+/// Size of a pose as matrix and shift, and as shift and quaternion.
+const MATRIX: usize = 48;
+const QUATERNION: usize = 28;
 
-/// Tolerance for the numbers of a rotation, which sources round.
-const OFF: f64 = 1e-3;
+/// Bytes before it in an element of TDATA and QTDATA: a name, and after that the type and a reserved byte.
+const NAME: usize = 20;
+const BEFORE: usize = NAME + 2;
+
+/// Tolerance for each number of a rotation matrix, and for a quaternion's length: sources round.
+const TOLERANCE: f64 = 1e-3;
 
 /// Types of messages that contain poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,14 +55,23 @@ impl Kind {
         matches!(self, Self::Transform)
     }
 
+    /// The right size of a content, in words.
+    pub fn size(self) -> String {
+        match self {
+            Self::Transform => format!("{MATRIX}"),
+            Self::Tracks => format!("{} for each instrument", BEFORE + MATRIX),
+            Self::Quaternions => format!("{} for each instrument", BEFORE + QUATERNION),
+        }
+    }
+
     /// The pose of a device; `None` if the content only has other devices' poses.
     pub fn read(self, content: &[u8], device: &str) -> Result<Option<Pose>, PoseError> {
         match self {
-            Self::Transform if content.len() != 48 => Err(PoseError::Layout),
+            Self::Transform if content.len() != MATRIX => Err(PoseError::Layout),
             Self::Transform => of_matrix(content).map(Some),
-            Self::Tracks => named(content, NAME + MATRIX, device)?.map(of_matrix).transpose(),
+            Self::Tracks => named(content, BEFORE + MATRIX, device)?.map(of_matrix).transpose(),
             Self::Quaternions => {
-                named(content, NAME + QUATERNION, device)?.map(of_quaternion).transpose()
+                named(content, BEFORE + QUATERNION, device)?.map(of_quaternion).transpose()
             }
         }
     }
@@ -75,7 +87,7 @@ fn named<'a>(content: &'a [u8], size: usize, name: &str) -> Result<Option<&'a [u
         let given = element[..NAME].split(|&byte| byte == 0).next().unwrap_or_default();
         given == name.as_bytes()
     };
-    Ok(elements.find(has_name).map(|element| &element[NAME + 2..]))
+    Ok(elements.find(has_name).map(|element| &element[BEFORE..]))
 }
 
 fn numbers<const N: usize>(mut bytes: &[u8]) -> Result<[f64; N], PoseError> {
@@ -98,7 +110,7 @@ fn of_matrix(bytes: &[u8]) -> Result<Pose, PoseError> {
     }
     let rotation = DQuat::from_mat3(&matrix).normalize();
     // False for numbers that are not finite.
-    let is_one = DMat3::from_quat(rotation).abs_diff_eq(matrix, OFF);
+    let is_one = DMat3::from_quat(rotation).abs_diff_eq(matrix, TOLERANCE);
     is_one.then_some(Pose { rotation, shift }).ok_or(PoseError::NoRotation)
 }
 
@@ -106,7 +118,7 @@ fn of_matrix(bytes: &[u8]) -> Result<Pose, PoseError> {
 fn of_quaternion(bytes: &[u8]) -> Result<Pose, PoseError> {
     let [a, b, c, x, y, z, w] = numbers(bytes)?;
     let (shift, rotation) = (DVec3::new(a, b, c), DQuat::from_xyzw(x, y, z, w));
-    let is_one = (rotation.length() - 1.0).abs() <= OFF && shift.is_finite();
+    let is_one = (rotation.length() - 1.0).abs() <= TOLERANCE && shift.is_finite();
     is_one.then(|| Pose { rotation: rotation.normalize(), shift }).ok_or(PoseError::NoRotation)
 }
 

@@ -2,9 +2,10 @@
 
 // Requirement: B-10
 
+use std::fs;
 use std::io::Write;
 use std::net::TcpListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use dibs_build::glam::Vec3;
@@ -37,24 +38,83 @@ time.sleep(60)
 #[test]
 #[ignore = "needs DIBS_PYIGTL, a Python with pyigtl 0.3.4 and numpy"]
 fn frames_of_pyigtl_arrive() {
-    let python = std::env::var("DIBS_PYIGTL").expect("DIBS_PYIGTL: a Python with pyigtl");
-    for kind in ["POLYDATA", "POINT"] {
-        arrive(Command::new(&python).args(["-c", SERVER]), kind);
-    }
+    pyigtl();
 }
 
 #[test]
 #[ignore = "needs g++ and Debian's libopenigtlink-dev 1.11"]
 fn frames_of_the_cpp_library_arrive() {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/stream/igtl_server.cpp");
+    cpp_library();
+}
+
+#[test]
+#[ignore = "needs the registry of crates, to build a program of the crate openigtlink-rust"]
+fn frames_of_the_rust_crate_arrive() {
+    rust_crate();
+}
+
+/// A library whose frames arrived.
+pub struct Peer {
+    pub name: &'static str,
+    pub version: String,
+    /// The types of its messages.
+    pub kinds: &'static [&'static str],
+}
+
+pub fn pyigtl() -> Peer {
+    let python = std::env::var("DIBS_PYIGTL").expect("DIBS_PYIGTL: a Python with pyigtl");
+    let kinds = &["POLYDATA", "POINT"];
+    kinds.iter().for_each(|kind| arrive(Command::new(&python).args(["-c", SERVER]), kind));
+    let version = "import importlib.metadata as found; print(found.version('pyigtl'))";
+    let version = said(Command::new(&python).args(["-c", version]));
+    Peer { name: "pyigtl", version, kinds }
+}
+
+pub fn cpp_library() -> Peer {
     let folder = tempfile::tempdir().unwrap();
     let server = folder.path().join("server");
     let mut compiler = Command::new("g++");
-    compiler.args(["-std=c++17", "-I/usr/include/openigtlink", "-o"]).args([&server, &source]);
+    compiler.args(["-std=c++17", "-I/usr/include/openigtlink", "-o"]);
+    compiler.args([&server, &own("igtl_server.cpp")]);
     assert!(compiler.arg("-lOpenIGTLink").status().unwrap().success());
-    for kind in ["POLYDATA", "POINT", "NDARRAY"] {
-        arrive(&mut Command::new(&server), kind);
-    }
+    let kinds = &["POLYDATA", "POINT", "NDARRAY"];
+    kinds.iter().for_each(|kind| arrive(&mut Command::new(&server), kind));
+    let version =
+        said(Command::new("dpkg-query").args(["-W", "-f", "${Version}", "libopenigtlink-dev"]));
+    Peer { name: "Debian's libopenigtlink", version, kinds }
+}
+
+pub fn rust_crate() -> Peer {
+    const VERSION: &str = "0.4.1";
+    // A package of its own: none of the product's depends on the crate, or on what that depends on.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("igtl-rust");
+    let manifest = format!(
+        "[package]\nname = \"igtl-server\"\nversion = \"0.0.0\"\nedition = \"2021\"\n[dependencies]\n\
+         openigtlink-rust = \"={VERSION}\"\n[workspace]\n"
+    );
+    fs::create_dir_all(folder.join("src")).unwrap();
+    fs::write(folder.join("Cargo.toml"), manifest).unwrap();
+    fs::copy(own("igtl_server.rs"), folder.join("src/main.rs")).unwrap();
+    let mut cargo = Command::new("cargo");
+    cargo.args(["build", "--quiet", "--target-dir", "target"]).current_dir(&folder);
+    assert!(cargo.status().unwrap().success());
+    let server = folder.join("target/debug/igtl-server");
+    // Its POLYDATA is not the protocol's.
+    let kinds = &["POINT", "NDARRAY"];
+    kinds.iter().for_each(|kind| arrive(&mut Command::new(&server), kind));
+    Peer { name: "crate openigtlink-rust", version: VERSION.to_owned(), kinds }
+}
+
+/// A file beside this one.
+fn own(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cli/stream").join(name)
+}
+
+/// What a command says.
+pub fn said(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
 /// Every frame of a server's messages reaches the receiver as it was.

@@ -6,9 +6,12 @@
 // Requirements: B-09, P-08
 
 mod igtl;
+mod igtl_age;
 mod igtl_messages;
 mod igtl_peers;
 mod igtl_pose;
+mod igtl_record;
+mod igtl_refused;
 mod live;
 #[cfg(target_os = "linux")]
 mod memory;

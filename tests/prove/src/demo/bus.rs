@@ -21,13 +21,15 @@ use super::session::accept;
 const FRAME_RATE: f32 = 60.0;
 
 /// Bytes in flight to the board's Ethernet controller, whose buffer holds seven large packets.
-const WINDOW: u32 = 5 * MTU as u32;
+pub const WINDOW: u32 = 5 * MTU as u32;
 
 /// The kind of bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bus {
     Serial,
     Ethernet,
+    /// Ethernet, whose frames come by the program `dibs`.
+    Bridge,
 }
 
 impl Bus {
@@ -35,7 +37,7 @@ impl Bus {
     pub const fn trust(self) -> &'static Trust {
         match self {
             Self::Serial => &Trust::SERIAL,
-            Self::Ethernet => &Trust::ETHERNET,
+            Self::Ethernet | Self::Bridge => &Trust::ETHERNET,
         }
     }
 
@@ -44,7 +46,7 @@ impl Bus {
     pub const fn answer(self) -> u32 {
         match self {
             Self::Serial => TICK_RATE / 20,
-            Self::Ethernet => TICK_RATE / 40,
+            Self::Ethernet | Self::Bridge => TICK_RATE / 40,
         }
     }
 
@@ -52,7 +54,7 @@ impl Bus {
     pub fn frames(self, motion: &Motion, rate: f32) -> (Vec<Vec<Vec3>>, f32) {
         let parts = match self {
             Self::Serial => 1,
-            Self::Ethernet => (FRAME_RATE / rate).ceil().max(1.0) as u32,
+            Self::Ethernet | Self::Bridge => (FRAME_RATE / rate).ceil().max(1.0) as u32,
         };
         let next = motion.frames.iter().cycle().skip(1);
         let frames = motion.frames.iter().zip(next).flat_map(|(now, next)| {
@@ -74,11 +76,15 @@ impl Bus {
                     end: qemu::Bus::Serial(path),
                 })
             }
-            Self::Ethernet => {
+            Self::Ethernet | Self::Bridge => {
                 // The emulator listens at a port that was free a moment ago.
                 let port = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?.local_addr()?.port();
                 let backend = format!("user,hostfwd=udp:127.0.0.1:{port}-:{}", network::PORT);
-                Ok(Opened { socket: Socket::Ethernet(port), end: qemu::Bus::Ethernet(backend) })
+                let socket = match self {
+                    Self::Bridge => Socket::Bridge(port),
+                    _ => Socket::Ethernet(port),
+                };
+                Ok(Opened { socket, end: qemu::Bus::Ethernet(backend) })
             }
         }
     }
@@ -93,7 +99,16 @@ pub struct Opened {
 enum Socket {
     Serial(UnixListener),
     Ethernet(u16),
+    Bridge(u16),
     Wire(Wire),
+}
+
+/// What sends frames to the controller.
+pub enum Feed {
+    /// The demo's own sender, on this line.
+    Own(Line),
+    /// The program `dibs`, to this port.
+    Bridge(u16),
 }
 
 impl Opened {
@@ -105,22 +120,24 @@ impl Opened {
     }
 
     /// The sender's end, once the controller has started.
-    pub fn connect(self, controller: &mut Child, link: &Arc<Link>) -> Result<Line> {
-        match self.socket {
+    pub fn connect(self, controller: &mut Child, link: &Arc<Link>) -> Result<Feed> {
+        let line = match self.socket {
+            Socket::Bridge(port) => return Ok(Feed::Bridge(port)),
             Socket::Serial(listener) => {
                 let socket = accept(&listener, controller)?;
                 let (reader, handle) = (socket.try_clone()?, socket.try_clone()?);
                 // The timeout lets the reading thread check whether it is still needed.
                 socket.set_read_timeout(Some(std::time::Duration::from_millis(50)))?;
                 let hang_up = move || drop(handle.shutdown(std::net::Shutdown::Both));
-                Ok(Line::stream(paced(socket, link, 0), reader, hang_up))
+                Line::stream(paced(socket, link, 0), reader, hang_up)
             }
-            Socket::Wire(wire) => wire.line(link),
+            Socket::Wire(wire) => wire.line(link)?,
             Socket::Ethernet(port) => {
                 let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
                 socket.connect((Ipv4Addr::LOCALHOST, port))?;
-                Ok(Line::udp_paced(socket, |datagrams| paced(datagrams, link, WINDOW))?)
+                Line::udp_paced(socket, |datagrams| paced(datagrams, link, WINDOW))?
             }
-        }
+        };
+        Ok(Feed::Own(line))
     }
 }

@@ -61,7 +61,11 @@ impl Machine {
                 let footprint = Footprint::read(&program)?;
                 // In defmt's encoding: `defmt-print -e FIRMWARE < log.defmt`.
                 let (log, toolchain) = ("log.defmt", cross.describe());
-                let bus = if options.serial { Bus::Serial } else { Bus::Ethernet };
+                let bus = match options {
+                    Options { serial: true, .. } => Bus::Serial,
+                    Options { bridge: true, .. } => Bus::Bridge,
+                    _ => Bus::Ethernet,
+                };
                 Ok(Self::Board { program, log, footprint, toolchain, emulator, bus, robot })
             }
             Err(error) if options.board_only => Err(error),
@@ -154,6 +158,7 @@ impl Machine {
                 let bus = match bus {
                     Bus::Serial => "serial line",
                     Bus::Ethernet => "UDP over Ethernet",
+                    Bus::Bridge => "UDP over Ethernet by `dibs bridge`",
                 };
                 format!("Cortex-M7 (mps2-an500) in {emulator}, {bus}; built by {toolchain}")
             }

@@ -1,5 +1,6 @@
 //! `cargo xtask demo`: a beating heart streamed to the controller, while a simulated hand pushes the instrument against it.
 
+mod bridge;
 mod bus;
 pub mod check;
 mod contacts;
@@ -78,6 +79,9 @@ pub struct Options {
     /// computer and in C support no other bus.
     #[arg(long)]
     pub serial: bool,
+    /// Takes the frames from an OpenIGTLink source through `dibs bridge`, 60 per second of the board's time.
+    #[arg(long, conflicts_with_all = ["host", "c", "serial", "faults"])]
+    pub bridge: bool,
     /// Injects faults of every kind into the bus, and cuts it once for a while.
     #[arg(long)]
     pub faults: bool,

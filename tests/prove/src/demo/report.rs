@@ -12,6 +12,7 @@ use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
 use dibs_nostd::{Fallback, QueryError, Unavailable};
 use serde::Serialize;
+use serde_json::Value;
 use xtask::qemu;
 
 use super::check;
@@ -38,6 +39,8 @@ pub struct Report {
     freshness: Freshness,
     /// The faults on the bus.
     faults: Option<Faults>,
+    /// The totals of `dibs bridge`, if frames came through it.
+    bridge: Option<Value>,
     /// The states caused by a silent line.
     silence: Option<Silence>,
     /// Events on the bus, by their names in the wire protocol.
@@ -153,6 +156,7 @@ impl Report {
             frames_rejected: last.rejected,
             freshness: Freshness::of(outcome),
             faults: outcome.faults.clone(),
+            bridge: outcome.bridge.clone(),
             silence: Silence::of(outcome),
             bus_events: events(&summary),
             ticks: summary.ticks,
@@ -253,7 +257,7 @@ impl Report {
             let recovered = self.silence.as_ref().and_then(|silence| silence.recovered_after);
             promise(self.silence.is_some(), "the silent line did not make it safe".to_owned());
             promise(recovered.is_some(), "it did not recover from the silence".to_owned());
-        } else {
+        } else if self.bridge.is_none() {
             promise(rejected == 0, format!("{rejected} packets or frames were rejected"));
             // The last frame may have been in flight when the run ended.
             promise(published + 1 >= sent, format!("{published} of {sent} frames were published"));
@@ -404,7 +408,14 @@ impl Report {
             );
             row("tree in flash", format!("checked {rounds} times"));
         }
-        row("took", format!("{:.1} s", self.real_seconds));
+        if let Some(bridge) = &self.bridge {
+            row("bridge", format!("{} frames; {}", bridge["frames"], bridge["timing"]));
+        }
+        let time = f64::from(self.ticks) / f64::from(TICK_RATE);
+        row(
+            "took",
+            format!("{:.1} s, {:.2} of real time", self.real_seconds, time / self.real_seconds),
+        );
         row("report and pictures", folder.display().to_string());
         println!();
     }

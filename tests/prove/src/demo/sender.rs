@@ -20,7 +20,7 @@ use super::faults::Plan;
 use super::scene::Scene;
 
 /// Time between two polls of the telemetry.
-const PAUSE: Duration = Duration::from_micros(300);
+pub const PAUSE: Duration = Duration::from_micros(300);
 
 /// Real time in which a byte arrives, unless it was lost.
 const ARRIVAL: Duration = Duration::from_millis(500);
@@ -57,6 +57,11 @@ impl Link {
     /// All frames, in no order.
     pub fn all(&self) -> Vec<Sent> {
         self.lock().values().cloned().collect()
+    }
+
+    /// Takes a frame that is about to be sent.
+    pub fn record(&self, epoch: u32, rows: Vec<Vec3>, captured: u32) {
+        self.lock().insert(epoch, Sent { rows: Arc::new(rows), captured });
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<u32, Sent>> {
@@ -127,10 +132,7 @@ pub fn send(
     line: Line,
     faults: Option<&Plan>,
 ) -> Result<Vec<(Fault, u64)>> {
-    let order = match scene.tree.index_bits() {
-        16 => SurfaceOrder::of(&scene.tree.tree::<u16>()?),
-        _ => SurfaceOrder::of(&scene.tree.tree::<u32>()?),
-    };
+    let order = order(scene)?;
     let settings = Settings { session: 1, ..Settings::default() };
     let line = match faults {
         Some(plan) => FaultyLine::new(line, plan.seed, Plan::KINDS, Plan::RATE),
@@ -142,6 +144,14 @@ pub fn send(
     let mut sender = sender.with_clock(move || Duration::from_millis(clock.now().into()));
     send_all(scene, bus, link, &mut sender, faults)?;
     Ok(sender.transport().counts().to_vec())
+}
+
+/// The order of the surface's rows.
+pub fn order(scene: &Scene) -> Result<SurfaceOrder> {
+    Ok(match scene.tree.index_bits() {
+        16 => SurfaceOrder::of(&scene.tree.tree::<u16>()?),
+        _ => SurfaceOrder::of(&scene.tree.tree::<u32>()?),
+    })
 }
 
 fn send_all(
@@ -179,7 +189,7 @@ fn send_all(
         let captured = link.now();
         let frame = sender.prepare(positions).context("the motion cannot be sent")?;
         if let Some((epoch, held)) = sender.held() {
-            link.lock().insert(epoch, Sent { rows: Arc::new(held.to_vec()), captured });
+            link.record(epoch, held.to_vec(), captured);
         }
         match sender.transmit(frame) {
             Ok(_) => (),

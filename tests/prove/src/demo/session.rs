@@ -15,10 +15,12 @@ use controller::TICK_RATE;
 use controller::telemetry::{MAX_FRAMED, Network, Push, Record, Summary, Tick};
 use dibs_nostd::wire::Deframer;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::Value;
 use xtask::process::shown;
 use xtask::{qemu, workspace};
 
-use super::bus::{Bus, Opened};
+use super::bridge;
+use super::bus::{Bus, Feed, Opened};
 use super::check::{Checked, Compared, check, compare};
 use super::contacts::Touches;
 use super::debugger::{Bits, flip};
@@ -65,6 +67,8 @@ pub struct Outcome {
     pub faults: Option<Faults>,
     /// Number of frames sent by a flood.
     pub flood: u64,
+    /// The totals of `dibs bridge`, if frames came through it.
+    pub bridge: Option<Value>,
     /// The last known tick when memory was changed, if it was.
     pub flipped_at: Option<u32>,
     /// Ticks requested.
@@ -120,13 +124,16 @@ pub fn run(
     let start = Instant::now();
     let mut child = Guard(command.spawn().with_context(|| format!("cannot start `{shown}`"))?);
     let link = Arc::new(Link::default());
-    let line = bus.connect(&mut child.0, &link)?;
+    let feed = bus.connect(&mut child.0, &link)?;
     let telemetry = accept(&telemetry_socket, &mut child.0)?;
 
     let (to_check, answers) = mpsc::channel::<Tick>();
     let (listened, sent, checked, flooded) = thread::scope(|scope| {
         let flood = flood.as_ref().map(|(wire, seed)| scope.spawn(|| wire.flood(&link, *seed)));
-        let sender = scope.spawn(|| send(scene, machine.bus(), &link, line, faults));
+        let sender = scope.spawn(|| match feed {
+            Feed::Own(line) => Ok((send(scene, machine.bus(), &link, line, faults)?, None)),
+            Feed::Bridge(port) => Ok((Vec::new(), Some(bridge::send(scene, &link, port)?))),
+        });
         let checker = scope.spawn(|| {
             answers.into_iter().map(|tick| check(scene, &link, &tick)).collect::<Result<Vec<_>>>()
         });
@@ -142,7 +149,7 @@ pub fn run(
         _ => error,
     };
     let Heard { ticks, pushes, network, summary, flipped_at } = listened.map_err(ended)?;
-    let injected = sent?;
+    let (injected, bridge) = sent?;
     let mut compared = Vec::new();
     for tick in &ticks {
         compare(&link, tick, &mut compared);
@@ -167,6 +174,7 @@ pub fn run(
         hand,
         faults: faults.map(|plan| Faults::new(plan, injected)),
         flood: flooded?,
+        bridge,
         flipped_at,
         ticks_asked,
         frames_sent: link.frames_sent.load(Ordering::Relaxed),
@@ -187,7 +195,7 @@ impl Drop for Guard {
     }
 }
 
-fn joined<T>(result: thread::Result<Result<T>>) -> Result<T> {
+pub fn joined<T>(result: thread::Result<Result<T>>) -> Result<T> {
     result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
 }
 
