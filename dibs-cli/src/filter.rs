@@ -10,6 +10,7 @@ use dibs_nostd::{Capsule, Cost, Index, MovingSurface, Odometer, Options, Tracker
 
 use crate::query::STACK;
 use crate::recorded::{Moving, Recorded};
+use crate::stand_off::{self, StandOff};
 use crate::tool::{self, ToolSpec};
 use crate::tree_file::{self, AnyTree};
 use crate::{output, overwrite};
@@ -34,6 +35,7 @@ const ROUNDED: f64 = 1e-4;
 Examples:
   dibs filter heart.dibs --motion heart.pc2 --path commands.csv --stand-off 1 --json
   dibs filter heart.dibs --motion heart.pc2 --path commands.csv --stand-off 1 --age 40 --registration 0.5
+  dibs filter heart.dibs --motion heart.pc2 --path commands.csv --stand-off 1 --stand-off 2=3
 
 The tool begins at the first line's pose. Each line is the pose that is commanded for the end of its tick; what is
 admitted is where the next tick begins. The motion is the tissue's, straight from frame to frame, played over and over.
@@ -47,9 +49,9 @@ pub struct Args {
     /// input
     #[arg(long, value_name = "TOOLS")]
     path: PathBuf,
-    /// Least separation of tool and tissue
-    #[arg(long, value_name = "MM")]
-    stand_off: f32,
+    /// Least separation of tool and tissue; a further `LABEL=MM` is a larger one from the triangles of a label
+    #[arg(long, value_name = "[LABEL=]MM", required = true)]
+    stand_off: Vec<StandOff>,
     /// Largest speed of the tissue; by default its largest speed in the motion
     #[arg(long, value_name = "MM/S")]
     tissue_speed: Option<f32>,
@@ -198,7 +200,6 @@ fn filter<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let tissue = args.tissue_speed.unwrap_or_else(|| fastest(&recorded));
     let age = args.age.unwrap_or(1_000.0 / rate);
     for (name, value) in [
-        ("--stand-off", args.stand_off),
         ("--tissue-speed", tissue),
         ("--age", age as f32),
         ("--registration", args.registration),
@@ -208,8 +209,7 @@ fn filter<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
             bail!("{name} is {value}: give a number of at least 0");
         }
     }
-    let filter = Filter::new(args.stand_off, robot)
-        .map_err(|_| anyhow!("--robot-speed is {robot}: give a speed above 0"))?
+    let filter = stand_off::filter(&args.stand_off, robot, (tree, &args.moving.tree))?
         .approach(args.approach / 1_000.0)?
         .budget(args.budget, Cost::M7_CAPSULE);
     // Rounded up.
@@ -302,7 +302,7 @@ impl Sums {
 
 struct Session<'t, I> {
     tracker: Tracker<'t, I, STACK, OPENED>,
-    filter: Filter,
+    filter: Filter<{ stand_off::LABELS }>,
     uncertainty: Uncertainty,
     period: f32,
     at: Axis,

@@ -18,6 +18,7 @@ mod nodes;
 mod overwrite;
 mod query;
 mod recorded;
+mod stand_off;
 mod stream;
 mod stretch;
 mod tool;

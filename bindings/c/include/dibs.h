@@ -74,6 +74,11 @@
 #define DIBS_FILTER_ROWS 8
 
 /**
+ * Most labels with a stand-off of their own.
+ */
+#define DIBS_FILTER_LABELS 4
+
+/**
  * Bytes of a frame's storage.
  */
 #define DIBS_FRAME_SIZE 192
@@ -1548,6 +1553,20 @@ typedef struct {
 } dibs_verdict;
 
 /**
+ * A larger stand-off, from the triangles of a label.
+ */
+typedef struct {
+  /**
+   * At most 255.
+   */
+  uint32_t label;
+  /**
+   * Least separation (mm) of every tool from these triangles; at least the filter's.
+   */
+  float stand_off;
+} dibs_stand_off_of;
+
+/**
  * A filter of commands. `dibs_filter_of` makes one from two numbers.
  */
 typedef struct {
@@ -1581,6 +1600,15 @@ typedef struct {
    * As in `dibs_options`.
    */
   float depth_tolerance;
+  /**
+   * Labels with a stand-off of their own: at most `DIBS_FILTER_LABELS`. Each stand-off above the filter's counts as one
+   * more tool for every tool, up to `DIBS_FILTER_TOOLS` in all, and the tree must have labels.
+   */
+  uint32_t label_count;
+  /**
+   * Those labels.
+   */
+  dibs_stand_off_of labels[DIBS_FILTER_LABELS];
 } dibs_filter;
 
 /**
@@ -2438,7 +2466,8 @@ dibs_filter dibs_filter_of(float stand_off, float speed);
  * @param admitted     Receives the motion to execute, and its reason; nothing is written after an error.
  * @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range;
  *         `DIBS_CODE_NOT_FINITE` for a command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too
- *         many, too many rows, or a frame of the caller's vertices; the errors of `dibs_tracker_closest`; or a misuse.
+ *         many, too many rows or labels, a label's stand-off for a tree without labels, or a frame of the caller's
+ *         vertices; the errors of `dibs_tracker_closest`; or a misuse.
  */
 dibs_code dibs_filter_admit(const dibs_filter *filter,
                             dibs_tracker *const *trackers,

@@ -114,7 +114,13 @@ inline Code closest_of(Span<dibs_tracker *const> trackers, Tools tools, dibs_tra
 }
 /** A filter of commands: the motion nearest to a commanded one that keeps a chain of tools out of the tissue. */
 struct Filter : dibs_filter {
-    Filter(float stand_off, float speed) : dibs_filter(dibs_filter_of(stand_off, speed)) {}
+    Filter(float stand_off, float speed, Span<const dibs_stand_off_of> of_labels = {})
+        : dibs_filter(dibs_filter_of(stand_off, speed)) {
+        label_count = uint32_t(of_labels.size());
+        for (size_t at = 0; at < of_labels.size() && at < DIBS_FILTER_LABELS; at++) {
+            labels[at] = of_labels.data()[at];
+        }
+    }
     /** On the trackers' own surfaces, or on a reader's `frame`. */
     Code admit(Span<dibs_tracker *const> trackers, Tools tools, const dibs_motion &command, float period,
                const dibs_uncertainty &uncertainty, dibs_admitted &admitted, Span<const dibs_motion_row> rows = {},

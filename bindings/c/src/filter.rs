@@ -1,6 +1,6 @@
 //! The filter of commands: the motion closest to a commanded one that keeps a chain of tools out of the tissue.
 
-use bytemuck::AnyBitPattern;
+use bytemuck::{AnyBitPattern, Pod, Zeroable};
 use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, MovingSurface, Options};
@@ -18,6 +18,19 @@ pub const DIBS_FILTER_TOOLS: usize = 8;
 
 /// Most rows that a caller may add.
 pub const DIBS_FILTER_ROWS: usize = 8;
+
+/// Most labels with a stand-off of their own.
+pub const DIBS_FILTER_LABELS: usize = 4;
+
+/// A larger stand-off, from the triangles of a label.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct dibs_stand_off_of {
+    /// At most 255.
+    pub label: u32,
+    /// Least separation (mm) of every tool from these triangles; at least the filter's.
+    pub stand_off: f32,
+}
 
 /// A filter of commands. `dibs_filter_of` makes one from two numbers.
 #[derive(Clone, Copy, AnyBitPattern)]
@@ -39,11 +52,16 @@ pub struct dibs_filter {
     pub cost: u32,
     /// As in `dibs_options`.
     pub depth_tolerance: f32,
+    /// Labels with a stand-off of their own: at most `DIBS_FILTER_LABELS`. Each stand-off above the filter's counts as one
+    /// more tool for every tool, up to `DIBS_FILTER_TOOLS` in all, and the tree must have labels.
+    pub label_count: u32,
+    /// Those labels.
+    pub labels: [dibs_stand_off_of; DIBS_FILTER_LABELS],
 }
 
 impl dibs_filter {
     /// Converts it to the core's filter.
-    pub(crate) fn read(self) -> Result<Filter, dibs_code> {
+    pub(crate) fn read(self) -> Result<Filter<DIBS_FILTER_LABELS>, dibs_code> {
         if !(self.depth_tolerance >= 0.0) {
             return Err(dibs_code::Argument);
         }
@@ -55,6 +73,15 @@ impl dibs_filter {
         let filter = Filter::new(self.stand_off, self.speed)?;
         let filter = if self.lever == 0.0 { filter } else { filter.lever(self.lever)? };
         let filter = filter.approach(self.approach)?;
+        let mut labels = [(0, self.stand_off); DIBS_FILTER_LABELS];
+        if self.label_count as usize > labels.len() {
+            return Err(dibs_code::Argument);
+        }
+        let given = self.labels.iter().take(self.label_count as usize);
+        for (place, &dibs_stand_off_of { label, stand_off }) in labels.iter_mut().zip(given) {
+            *place = (u8::try_from(label).map_err(|_| dibs_code::Argument)?, stand_off);
+        }
+        let filter = filter.stand_off_of(labels)?;
         Ok(filter.budget(self.instructions, *cost_of(self.cost)?).options(options))
     }
 }
@@ -67,7 +94,19 @@ impl dibs_filter {
 pub extern "C" fn dibs_filter_of(stand_off: f32, speed: f32) -> dibs_filter {
     let (instructions, cost) = (200_000, dibs_cost::M7Capsule as u32);
     let (lever, approach, depth_tolerance) = (0.0, 0.0, 0.0);
-    dibs_filter { stand_off, speed, lever, approach, instructions, cost, depth_tolerance }
+    let labels = [dibs_stand_off_of { label: 0, stand_off: 0.0 }; DIBS_FILTER_LABELS];
+    let label_count = 0;
+    dibs_filter {
+        stand_off,
+        speed,
+        lever,
+        approach,
+        instructions,
+        cost,
+        depth_tolerance,
+        label_count,
+        labels,
+    }
 }
 
 /// The motion of a rigid instrument in a period: its reference point moves in a straight line, and the instrument
@@ -181,7 +220,7 @@ impl From<Admitted> for dibs_admitted {
 
 /// The arguments of a filter's tick, except its tools.
 struct Command<'r> {
-    filter: Filter,
+    filter: Filter<DIBS_FILTER_LABELS>,
     motion: Motion,
     period: f32,
     uncertainty: Uncertainty,
@@ -221,7 +260,8 @@ impl Command<'_> {
 /// @param admitted     Receives the motion to execute, and its reason; nothing is written after an error.
 /// @return `DIBS_CODE_OK`, whatever the reason; `DIBS_CODE_FILTER` for a number out of its range;
 ///         `DIBS_CODE_NOT_FINITE` for a command or a row that is not finite; `DIBS_CODE_ARGUMENT` for no tool or too
-///         many, too many rows, or a frame of the caller's vertices; the errors of `dibs_tracker_closest`; or a misuse.
+///         many, too many rows or labels, a label's stand-off for a tree without labels, or a frame of the caller's
+///         vertices; the errors of `dibs_tracker_closest`; or a misuse.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_filter_admit(
     filter: *const dibs_filter,

@@ -16,6 +16,9 @@ use crate::programs::{include, library, run, tool};
 
 const TICKS: usize = 1_500;
 
+/// A label with a stand-off of its own.
+const VESSEL: u8 = 2;
+
 /// Ticks of a frame.
 const HELD: usize = 60;
 
@@ -46,7 +49,9 @@ fn bits(line: &mut String, values: &[f32]) {
 fn admitted_motions_have_the_same_bits() {
     let folder = tempfile::tempdir().expect("a folder");
     let generate::MovingMesh { mesh, motion } = generate::heart(1_000).expect("a size");
-    let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
+    let is_vessel = |rows: &[u32; 3]| mesh.positions[rows[0] as usize].y > 30.0;
+    let labels = mesh.triangles.iter().map(|rows| if is_vessel(rows) { VESSEL } else { 0 });
+    let built = Builder::new().stretch(1.5).labels(labels.collect()).build(&mesh).expect("a tree");
     let tree = Tree::<u16>::from_bytes(built.blob()).expect("a tree");
     let frames: Vec<Vec<Vec3>> =
         motion.frames.iter().map(|frame| built.to_rows(frame)).take(TICKS / HELD).collect();
@@ -81,10 +86,13 @@ fn admitted_motions_have_the_same_bits() {
         let filter = filter.budget(instructions, Cost::M7_CAPSULE);
         let filter = if tick % 3 == 2 { filter.approach(0.02).expect("a time") } else { filter };
         let filter = if tick % 7 == 6 { filter.lever(50.0).expect("a lever") } else { filter };
+        let of_vessel = if tick % 4 == 3 { 1.0 } else { 3.0 };
+        let by_label = filter.stand_off_of([(VESSEL, of_vessel)]).expect("at least the filter's");
         let mut pairs = [(&mut first, surface, &tools[0]), (&mut second, surface, &tools[1])];
         let tissue = Uncertainty::new(20.0).error(0.05);
         let rows = &[row][..rows];
-        let admitted = filter.admit(&mut pairs, &command, 0.001, &tissue, rows).expect("an answer");
+        let admitted = by_label.admit(&mut pairs, &command, 0.001, &tissue, rows);
+        let admitted = admitted.expect("an answer");
         let number = [
             Reason::Commanded,
             Reason::Nearest,

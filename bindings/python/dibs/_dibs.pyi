@@ -72,7 +72,16 @@ class Tracked:
     ) -> tuple[bool, Optional[Literal["start", "surface", "jump", "full"]], Optional[float]]: ...
 
 class Filter:
-    def __init__(self, tree: Tree, stand_off: float, speed: float, lever: Optional[float], approach: float, instructions: int) -> None: ...
+    def __init__(
+        self,
+        tree: Tree,
+        stand_off: float,
+        of_labels: list[tuple[int, float]],
+        speed: float,
+        lever: Optional[float],
+        approach: float,
+        instructions: int,
+    ) -> None: ...
     def admit(
         self,
         surface: Surface,

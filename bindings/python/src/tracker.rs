@@ -220,11 +220,14 @@ impl Tracked {
 /// Translation and rotation, least separation, reason, queries, instructions.
 pub type Admitted = ([f32; 3], [f32; 3], f32, &'static str, u32, u32);
 
+/// Most labels with a stand-off of their own.
+const LABELS: usize = 7;
+
 /// A filter of commands.
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Filter {
     ticks: Mutex<OnTree>,
-    filter: filter::Filter,
+    filter: filter::Filter<LABELS>,
     tree: Arc<Owned>,
 }
 
@@ -234,6 +237,7 @@ impl Filter {
     fn new(
         tree: &Tree,
         stand_off: f32,
+        of_labels: Vec<(u8, f32)>,
         speed: f32,
         lever: Option<f32>,
         approach: f32,
@@ -246,6 +250,15 @@ impl Filter {
         };
         let filter = filter.approach(approach).map_err(named)?;
         let filter = filter.budget(instructions, Cost::M7_CAPSULE);
+        let mut labels = [(0, stand_off); LABELS];
+        let found = of_labels.len();
+        if found > LABELS {
+            return Err(invalid(format!(
+                "stand_off_of: {found} labels, and {LABELS} have a place"
+            )));
+        }
+        labels.iter_mut().zip(of_labels).for_each(|(place, of_label)| *place = of_label);
+        let filter = filter.stand_off_of(labels).map_err(named)?;
         Ok(Self { ticks: on(tree), filter, tree: Arc::clone(&tree.0) })
     }
 
@@ -301,7 +314,7 @@ impl Filter {
 }
 
 impl Filter {
-    pub const fn filter(&self) -> &filter::Filter {
+    pub const fn filter(&self) -> &filter::Filter<LABELS> {
         &self.filter
     }
 }
@@ -338,6 +351,7 @@ pub fn named(error: FilterError) -> PyErr {
         FilterError::Command => invalid("command: it is too large"),
         FilterError::Row { row } => invalid(format!("rows: row {row} is not finite")),
         FilterError::Rows { .. } => invalid(format!("rows: {error}")),
+        FilterError::Unlabelled => invalid("stand_off_of: the tree has no labels"),
         _ => invalid(error),
     }
 }

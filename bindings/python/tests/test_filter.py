@@ -105,6 +105,24 @@ class Filters(WithProgram):
         self.assertLess(chain[0, 0] - ASIDE[0], 90)
         self.assertGreater(OTHER.query(chain)["lower"].min(), 0.98)
 
+    def test_a_label_has_a_larger_stand_off(self):
+        """The side that the shaft is pushed into is a vessel."""
+        is_vessel = (HEART.vertices[HEART.triangles][..., 0] > 0).all(axis=1)
+        tree = dibs.build(HEART, labels=2 * is_vessel.astype(np.uint8))
+
+        def least(of):
+            guard, tool, nearest = dibs.Filter(tree, 1.0, 200.0, stand_off_of=of), TOOL, np.inf
+            for _ in range(400):
+                admitted = guard.admit(tool, dibs.RigidMotion(tool[:3], [-0.1, 0, 0]), PERIOD, tree)
+                self.assertNotEqual(admitted.reason, "no safe motion")
+                nearest = min(nearest, admitted.least_separation)
+                tool = admitted.motion.apply(tool)
+            return nearest
+
+        self.assertEqual(least({}), least({0: 3.0}))
+        self.assertAlmostEqual(least({}), 1.0, delta=0.02)
+        self.assertAlmostEqual(least({2: 3.0}), 3.0, delta=0.05)
+
     def test_a_start_inside_is_said(self):
         guard = dibs.Filter(TREE, 1.0, 200.0)
         inside = [56, 3, 60, 56, 3, 61, 2]
@@ -125,6 +143,12 @@ class Filters(WithProgram):
             ("stand_off", ValueError, lambda: dibs.Filter(TREE, -1, 200)),
             ("stand_off", ValueError, lambda: dibs.Filter(TREE, nan, 200)),
             ("stand_off", ValueError, lambda: dibs.Filter(TREE, 1e300, 200)),
+            ("stand_off_of", TypeError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of=[(2, 3)])),
+            ("stand_off_of", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={256: 3})),
+            ("stand_off_of[2]", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={2: 0.5})),
+            ("stand_off_of[2]", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={2: nan})),
+            ("stand_off_of", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={at: 3 for at in range(8)})),
+            ("stand_off_of", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={2: 3}).admit(TOOL, motion, PERIOD, TREE)),
             ("speed", ValueError, lambda: dibs.Filter(TREE, 1, 0)),
             ("speed", TypeError, lambda: dibs.Filter(TREE, 1, "fast")),
             ("lever", ValueError, lambda: dibs.Filter(TREE, 1, 200, lever=0.5)),

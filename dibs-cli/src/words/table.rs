@@ -23,7 +23,7 @@ pub const WORDS: &[Row] = &[
     ("surface", "SURFACE", "the surface between frames", "track"),
     ("full", "", "remember nothing from tick to tick", "track"),
     ("budget", "N", "instructions of a tick", "track filter"),
-    ("stand-off", "MM", "least separation of tool and tissue", "filter"),
+    ("stand-off", "[LABEL=]MM", "least separation of tool and tissue", "filter"),
     ("tissue-speed", "MM/S", "largest speed of the tissue", "filter"),
     ("robot-speed", "MM/S", "largest speed of the robot", "filter"),
     ("age", "MS", "time by which the surface is behind", "filter"),

@@ -87,6 +87,33 @@ fn admitted_poses_keep_the_stand_off() {
     }
 }
 
+/// The side that the shaft is pushed into is a vessel: it stops 2 mm farther from there.
+#[test]
+fn a_label_has_a_larger_stand_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    heart(folder);
+    let mesh = dibs_build::read(folder.join("heart.ply")).unwrap().mesh;
+    let is_right = |rows: &[u32; 3]| rows.iter().all(|&row| mesh.positions[row as usize].x > 0.0);
+    let labels: Vec<u8> = mesh.triangles.iter().map(|rows| 2 * u8::from(is_right(rows))).collect();
+    let text: String = labels.iter().map(|label| format!("{label}\n")).collect();
+    write(folder.join("tissues.txt"), text).unwrap();
+    succeeds(folder, "build heart.ply -o heart.dibs --stretch 1.5 --labels tissues.txt");
+    write(folder.join("commands.csv"), push(800)).unwrap();
+    let least = |options: &str| {
+        let separations = lines(folder, options).into_iter().map(|line| {
+            assert_ne!(line["reason"], "no safe motion", "{line}");
+            line["least_separation"].as_f64().unwrap()
+        });
+        separations.fold(f64::INFINITY, f64::min)
+    };
+    let (bare, vessel, other) = (least(""), least("--stand-off 2=3"), least("--stand-off 0=3"));
+    assert_eq!(bare.to_bits(), other.to_bits());
+    assert!((0.98..1.1).contains(&bare), "{bare}");
+    // What is certain of the whole surface, farther than its own stand-off, is less by a tick's step of 0.1 mm at most.
+    assert!((1.85..2.1).contains(&(vessel - bare)), "{bare} {vessel}");
+}
+
 #[test]
 fn a_start_inside_is_no_pass() {
     let folder = tempfile::tempdir().unwrap();
@@ -113,6 +140,11 @@ fn bad_input_is_named() {
     for (options, named) in [
         ("--stand-off -1", "--stand-off is -1"),
         ("--stand-off nan", "--stand-off is NaN"),
+        ("--stand-off 1 --stand-off 2", "give one without a label, and not 2"),
+        ("--stand-off 2=3", "give one without a label, and not 0"),
+        ("--stand-off 1 --stand-off 2=3", "no triangle of heart.dibs has this label"),
+        ("--stand-off 1 --stand-off 2=0.5", "--stand-off is 2=0.5: give at least 1"),
+        ("--stand-off 1 --stand-off 2=nan", "--stand-off is 2=NaN: give at least 1"),
         ("--stand-off 1 --rate 0", "--rate is 0"),
         ("--stand-off 1 --rate nan", "--rate is NaN"),
         ("--stand-off 1 --rate -5", "--rate is -5"),
@@ -124,6 +156,13 @@ fn bad_input_is_named() {
     ] {
         let error = fails(folder, &format!("{line} {options}"));
         assert!(error.contains(named), "{options}: {error}");
+    }
+    // What is no stand-off at all is a mistake of the line, as with every option.
+    for (of_label, named) in [("256=3", "256: no label from 0 to 255"), ("2=x", "x: no number")] {
+        let output = dibs(folder, &format!("{line} --stand-off 1 --stand-off {of_label}"));
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{error}");
+        assert!(error.contains(named), "{of_label}: {error}");
     }
     for (second, named) in [
         ("capsule:0,0,90,0,0,95,2", "tool 2: is another tool"),

@@ -217,11 +217,11 @@ impl Placed {
     ///
     /// A translation has the rounding of its turned vector. A rotation moves a point by the error of its vector times
     /// the arm; an error of the reference point adds that error times the angle.
-    pub(super) fn error_of_motion<T: Tool>(
+    pub(super) fn error_of_motion<T: Tool, const LABELS: usize>(
         &self,
         tool: &T,
         motion: &Motion,
-        (filter, period): (&Filter, f32),
+        (filter, period): (&Filter<LABELS>, f32),
     ) -> f32 {
         let (shift, turn) = filter.most(tool, motion, period);
         let mut arm = 0.0;

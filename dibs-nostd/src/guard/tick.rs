@@ -170,9 +170,9 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     /// [filter](crate::filter) for the consequences. Nothing is admitted in the safe state.
     ///
     /// Cost: that of [`closest`](Self::closest) plus that of [`Filter::admit`].
-    pub fn admit<T: Tool>(
+    pub fn admit<T: Tool, const LABELS: usize>(
         &mut self,
-        filter: &Filter,
+        filter: &Filter<LABELS>,
         tool: &T,
         command: &Motion,
         now: Millis,

@@ -30,6 +30,8 @@ pub use contacts::{Contact, ContactIter, Contacts};
 pub use cost::Cost;
 pub use options::{Budget, Options};
 pub use proximity::{Interval, Proximity};
+#[cfg(feature = "control")]
+pub(crate) use search::OfLabel;
 pub use side::{NoSide, Side};
 pub use swept::{Sweep, SweepAnswer};
 pub use tracker::{Fallback, Tracker, TrackerAnswer};

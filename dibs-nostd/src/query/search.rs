@@ -17,6 +17,8 @@ mod ties;
 mod wide;
 
 pub(super) use super::memory::waiting::Waiting;
+#[cfg(feature = "control")]
+pub(crate) use near::OfLabel;
 pub(super) use tick::{Outcome, Tick};
 pub(super) use ties::Ties;
 #[cfg(feature = "wide")]

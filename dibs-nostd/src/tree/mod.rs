@@ -342,6 +342,12 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
+    /// Whether the tree was built with labels.
+    #[cfg(feature = "control")]
+    pub(crate) const fn has_labels(&self) -> bool {
+        !self.sections.labels.is_empty()
+    }
+
     /// Pin, geodesic radius (mm, rounded up) and link of a node, for programs that walk the tree; `None` outside the
     /// table. Row 0 is the root.
     #[must_use]

@@ -2,10 +2,11 @@
 
 mod asked;
 mod glide;
+mod truth;
 mod walk;
 mod world;
 
 pub use asked::{Asked, Listener, Settings};
 pub use glide::{Glided, glide, glide_told};
-pub use walk::{Episode, Tally, walk, walk_told};
-pub use world::{Course, Scene, scenes};
+pub use walk::{Episode, Tally, walk, walk_by_label, walk_told};
+pub use world::{Course, Scene, labelled_scenes, scenes};

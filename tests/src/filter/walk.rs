@@ -7,11 +7,11 @@ use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertaint
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Cost, MovingSurface, Odometer, Tracker};
 use fastrand::Rng;
-use glam::{DQuat, DVec3, Vec3};
+use glam::Vec3;
 
+use super::truth::Truth;
 use super::{Asked, Course, Listener, Scene, Settings};
 use crate::deform::unit;
-use crate::oracle::least_distance;
 
 /// Number of times in a tick at which the true separation is computed.
 const INSTANTS: u32 = 5;
@@ -82,6 +82,8 @@ pub struct Tally {
     pub cries: u64,
     /// Ticks near the surface.
     pub near: u64,
+    /// Ticks near a label whose stand-off leaves less room than that of the whole surface.
+    pub near_label: u64,
     /// Most instructions of a tick.
     pub most_instructions: u32,
     /// Sum of the instructions.
@@ -104,6 +106,7 @@ impl AddAssign for Tally {
         self.unsafe_ticks += other.unsafe_ticks;
         self.below += other.below;
         self.near += other.near;
+        self.near_label += other.near_label;
         self.cries += other.cries;
         self.most_instructions = self.most_instructions.max(other.most_instructions);
         self.instructions += other.instructions;
@@ -113,38 +116,6 @@ impl AddAssign for Tally {
             *one += more;
         }
         self.worst = self.worst.max(other.worst);
-    }
-}
-
-/// The true surface in a tick, and the tools.
-struct Truth<'a> {
-    scene: &'a Scene,
-    course: Course,
-    start: f64,
-    period: f64,
-    radii: [f32; 2],
-}
-
-impl Truth<'_> {
-    /// The least separation of any tool at a fraction of the tick.
-    fn separation(&self, axes: &[[Vec3; 2]; 2], motion: &Motion, share: f64, by_arc: bool) -> f64 {
-        let time = self.start + share * self.period;
-        let rows: Vec<DVec3> = self.scene.rest.iter().map(|&p| self.course.at(p, time)).collect();
-        let about = motion.about.as_dvec3();
-        let turn = |share: f64| DQuat::from_scaled_axis(motion.rotation.as_dvec3() * share);
-        let at = |point: Vec3, share: f64| {
-            about + turn(share) * (point.as_dvec3() - about) + motion.translation.as_dvec3() * share
-        };
-        let place = |point: Vec3| {
-            if by_arc { at(point, share) } else { point.as_dvec3().lerp(at(point, 1.0), share) }
-        };
-        let mut least = f64::INFINITY;
-        for (axis, radius) in axes.iter().zip(self.radii) {
-            let [start, end] = axis.map(place);
-            let triangles = self.scene.triangles.iter().map(|t| t.map(|v| rows[v as usize]));
-            least = least.min(least_distance(start, end, triangles) - f64::from(radius));
-        }
-        least
     }
 }
 
@@ -168,6 +139,21 @@ pub fn walk_told(
     seed: u64,
     listener: &mut impl Listener,
 ) -> Tally {
+    walk_by_label(scene, episode, [], seed, listener)
+}
+
+/// The same, with stand-offs of labels, each by how much it is larger than the filter's.
+///
+/// # Panics
+/// If a query fails.
+#[must_use]
+pub fn walk_by_label<const LABELS: usize>(
+    scene: &Scene,
+    episode: &Episode,
+    labels: [(u8, f32); LABELS],
+    seed: u64,
+    listener: &mut impl Listener,
+) -> Tally {
     listener.walk(&Settings {
         stand_off: episode.stand_off,
         robot: episode.robot,
@@ -181,13 +167,17 @@ pub fn walk_told(
     let filter = Filter::new(episode.stand_off, episode.robot).expect("in range");
     let filter = filter.budget(episode.instructions, Cost::M7_CAPSULE);
     let filter = filter.approach(episode.approach).expect("in range");
+    let stand_offs = labels.map(|(label, more)| (label, episode.stand_off + more));
+    let filter = filter.stand_off_of(stand_offs).expect("in range");
+    let labels = labels.map(|(label, more)| (label, f64::from(more)));
+    let most_more = labels.iter().fold(0.0, |most: f64, &(_, more)| most.max(more));
     let mut trackers = [(); 2].map(|()| Follower::new(&tree).expect("deep enough"));
     let course = Course::any(scene, f64::from(episode.tissue), &mut rng);
     let radii = [0.5 + 2.0 * rng.f32(), 1.0];
     // A tip of 10 mm on a shaft of 40 mm at an angle.
     let outward = (scene.from - scene.middle).normalize();
     let lean = (outward + 0.6 * unit(&mut rng)).normalize();
-    let from = scene.from + outward * (episode.stand_off + radii[0] + 2.0);
+    let from = scene.from + outward * (episode.stand_off + radii[0] + 2.0 + most_more as f32);
     let mut joints = [from, from + lean * 10.0, from + lean * 10.0 + outward * 40.0];
     let most = episode.robot * episode.period as f32;
     let mut tally = Tally::default();
@@ -247,7 +237,8 @@ pub fn walk_told(
         let tools =
             [0, 1].map(|at| Capsule::new(axes[at][0], axes[at][1], radii[at]).expect("finite"));
         let mut command = Motion::new(joints[0], goal.normalize_or_zero() * most, spin * most);
-        let truth = Truth { scene, course, start, period: episode.period, radii };
+        let period = episode.period;
+        let truth = Truth { scene, course, start, period, radii, labels: &labels };
         if episode.climbs {
             // The worst of a few commands, by the separation that results from the admitted motion.
             let mut worst = f64::INFINITY;
@@ -260,7 +251,7 @@ pub fn walk_told(
                 let mut trackers = trackers.clone();
                 let admitted =
                     ask(&filter, &mut trackers, &surface, &tools, &tried, (episode, &uncertainty));
-                let apart = truth.separation(&axes, &admitted.motion, 1.0, true);
+                let apart = truth.separations(&axes, &admitted.motion, 1.0, true).room;
                 if apart < worst {
                     (worst, command) = (apart, tried);
                 }
@@ -279,8 +270,8 @@ pub fn walk_told(
     tally
 }
 
-fn ask(
-    filter: &Filter,
+fn ask<const LABELS: usize>(
+    filter: &Filter<LABELS>,
     trackers: &mut [Follower<'_>; 2],
     surface: &impl MovingSurface,
     tools: &[Capsule; 2],
@@ -325,20 +316,21 @@ impl Tally {
         let certified = f64::from(admitted.least_separation);
         let stand_off = f64::from(episode.stand_off);
         // If the separation is large, there is nothing to check unless the tool came much closer.
-        let end = truth.separation(axes, motion, 1.0, by_arc);
+        let end = truth.separations(axes, motion, 1.0, by_arc);
         let moved = axes.iter().flatten().map(|&p| motion.apply(p).distance(p)).fold(0.0, f32::max);
         let moved = f64::from(moved) + f64::from(episode.tissue) * episode.period;
         let mut least = end;
-        self.near += u64::from(end < stand_off + 5.0);
-        if end - moved < stand_off.max(certified) {
+        self.near += u64::from(end.whole < stand_off + 5.0);
+        self.near_label += u64::from(end.room < end.whole && end.room < stand_off + 0.5);
+        if end.room - moved < stand_off || end.whole - moved < certified {
             for instant in 0..INSTANTS {
                 let share = f64::from(instant) / f64::from(INSTANTS);
-                least = least.min(truth.separation(axes, motion, share, by_arc));
+                least = least.or_less(truth.separations(axes, motion, share, by_arc));
             }
         }
         // The accuracy of queries here is below a micrometre.
-        self.uncertain += u64::from(least < certified - 1e-3);
-        let lacks = stand_off - least;
+        self.uncertain += u64::from(least.whole < certified - 1e-3);
+        let lacks = stand_off - least.room;
         self.below += u64::from(says && lacks > SLACK);
         if !says {
             self.worst = self.worst.max(lacks);

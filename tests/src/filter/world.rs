@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
+use dibs_nostd::TriangleRow;
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
@@ -18,6 +19,8 @@ pub struct Scene {
     pub rest: Vec<Vec3>,
     /// Its triangles.
     pub triangles: Vec<[u32; 3]>,
+    /// Their labels, if it has some.
+    pub labels: Vec<u8>,
     /// Where tools start: outside the surface.
     pub from: Vec3,
     /// Middle of the region to walk in.
@@ -31,11 +34,28 @@ pub struct Scene {
 /// Stretch that the trees are built for.
 const STRETCH: f32 = 2.0;
 
-fn scene(name: &'static str, mesh: &Mesh, from: Vec3, middle: Vec3) -> Scene {
-    let tree = Builder::new().stretch(STRETCH).build(mesh).expect("a valid mesh");
+fn scene(
+    name: &'static str,
+    mesh: &Mesh,
+    [from, middle]: [Vec3; 2],
+    label: Option<fn(Vec3) -> u8>,
+) -> Scene {
+    let builder = Builder::new().stretch(STRETCH);
+    let builder = match label {
+        None => builder,
+        Some(label) => {
+            let corners = |rows: &[u32; 3]| rows.map(|row| mesh.positions[row as usize]);
+            let centre = |rows| corners(rows).iter().sum::<Vec3>() / 3.0 - middle;
+            builder.labels(mesh.triangles.iter().map(|rows| label(centre(rows))).collect())
+        }
+    };
+    let tree = builder.build(mesh).expect("a valid mesh");
     let rest = tree.to_rows(&mesh.positions);
-    let triangles = surfaces::triangles(&tree.tree::<u16>().expect("16-bit indices"));
-    Scene { name, tree, rest, triangles, from, middle, closes: false, is_convex: false }
+    let view = tree.tree::<u16>().expect("16-bit indices");
+    let triangles = surfaces::triangles(&view);
+    let labels = (0..).map_while(|row| view.label(TriangleRow(row))).collect();
+    let (closes, is_convex) = (false, false);
+    Scene { name, tree, rest, triangles, labels, from, middle, closes, is_convex }
 }
 
 /// A wall, a corner, a groove, a gap, a gap that closes, a spike, a plate thinner than the stand-off, a ball, a heart and a folded brain.
@@ -44,6 +64,20 @@ fn scene(name: &'static str, mesh: &Mesh, from: Vec3, middle: Vec3) -> Scene {
 /// Never: the meshes are valid.
 #[must_use]
 pub fn scenes() -> Vec<Scene> {
+    scenes_of(None)
+}
+
+/// The same, with a label for each triangle, by its middle as seen from the region's.
+///
+/// # Panics
+/// Never: the meshes are valid.
+#[must_use]
+pub fn labelled_scenes(label: fn(Vec3) -> u8) -> Vec<Scene> {
+    scenes_of(Some(label))
+}
+
+fn scenes_of(label: Option<fn(Vec3) -> u8>) -> Vec<Scene> {
+    let scene = |name, mesh: &Mesh, from, middle| scene(name, mesh, [from, middle], label);
     let gap = || sheet(12, 40.0, |x, _| 30.0 * ((x.abs() - 3.5) / 3.0).clamp(0.0, 1.0));
     let plate = || {
         let (positions, triangles) =

@@ -8,6 +8,7 @@ mod cut_short;
 mod differential;
 mod few_places;
 mod filter;
+mod filter_of_labels;
 mod flat;
 mod hand;
 mod held;

@@ -80,6 +80,9 @@ int main(int argc, char **argv) {
         filter.approach = tick % 3 == 2 ? 0.02f : 0.0f;
         filter.instructions = tick % 5 == 4 ? 30000 : 200000;
         filter.lever = tick % 7 == 6 ? 50.0f : 0.0f;
+        /* A larger stand-off from the vessel. */
+        filter.label_count = tick % 4 == 3 ? 0 : 1;
+        filter.labels[0] = (dibs_stand_off_of){.label = 2, .stand_off = 3.0f};
         dibs_admitted admitted;
         must(dibs_filter_admit(&filter, trackers, NULL, tools, 2, &command, 0.001f, &uncertainty, &row, rows, &admitted));
         printf("%u %u %u", admitted.reason, admitted.queries, admitted.instructions);

@@ -35,8 +35,9 @@
 //!
 //! # Promise
 //!
-//! Unless the reason is [`Reason::NoSafeMotion`], no separation is below the stand-off less 0.01 mm at any instant of
-//! the period, and none is below [`Admitted::least_separation`]; to the accuracy of a query. This requires that
+//! Unless the reason is [`Reason::NoSafeMotion`], no separation is below the stand-off, nor one from a label's triangles
+//! below theirs, less 0.01 mm at any instant of the period, and none is below [`Admitted::least_separation`]; to the
+//! accuracy of a query. This requires that
 //!
 //! - the robot executes the admitted motion: its points move in straight lines, or turn about the reference point;
 //! - at the start the tissue is within the surface's position error and the [`Uncertainty`] of the searched surface,
@@ -60,14 +61,18 @@
 //! motion reaches them. After four motions the next are shortened towards the smallest one that the rows allow, which
 //! is rest unless the surface approaches.
 //!
+//! A label with a [stand-off of its own](Filter::stand_off_of) is searched as a surface of its own.
+//!
 //! *Nearest* means the least sum of the squares of the translation and of the rotation times a [lever](Filter::lever).
 
 // Requirements: C-05, C-06
 
 mod answer;
+mod known;
 mod motion;
 mod nearest;
 mod pair;
+mod part;
 mod path;
 mod row;
 mod session;
@@ -77,10 +82,12 @@ use crate::math::sqrt::sqrt;
 use crate::{Cost, Index, MovingSurface, Options, Tool, Tracker};
 pub use answer::{Admitted, FilterError, Reason};
 pub use motion::Motion;
+use part::Part;
 pub use row::MotionRow;
 use session::Session;
 pub use uncertainty::Uncertainty;
 
+/// Most pairs of tool and surface, and of tool and a label's part of one.
 const MOST_PAIRS: usize = 8;
 
 /// By how much (mm) a verified separation may be below the stand-off.
@@ -91,10 +98,11 @@ const LEAST_LEVER: f32 = 1.0;
 /// Instructions of a tick's queries by default.
 const INSTRUCTIONS: u32 = 200_000;
 
-/// A filter of commands. See the [module](self).
+/// A filter of commands. See the [module](self). `LABELS` is the number of [stand-offs of labels](Self::stand_off_of).
 #[derive(Clone, Copy, Debug)]
-pub struct Filter {
+pub struct Filter<const LABELS: usize = 0> {
     stand_off: f32,
+    of_labels: [Part; LABELS],
     /// mm/s.
     speed: f32,
     /// mm; `None` for the size of the tools.
@@ -116,6 +124,7 @@ impl Filter {
     pub fn new(stand_off: f32, speed: f32) -> Result<Self, FilterError> {
         Ok(Self {
             stand_off: checked("stand_off", stand_off, stand_off >= 0.0)?,
+            of_labels: [],
             speed: checked("speed", speed, speed > 0.0)?,
             lever: None,
             approach: 0.0,
@@ -123,6 +132,38 @@ impl Filter {
             cost: Cost::M7_CAPSULE,
             options: Options::new(),
         })
+    }
+}
+
+impl<const LABELS: usize> Filter<LABELS> {
+    /// The same with a stand-off (mm, at least the filter's) from the triangles of each of these
+    /// [labels](crate::Tree::label): 3 from a vessel where 1 is enough elsewhere. Every tool keeps the filter's stand-off from the whole
+    /// surface. A nearer label with a smaller one hides none that is farther with a larger one.
+    ///
+    /// Each that is larger than the filter's counts as a further pair of every tool and surface. It takes a search of the
+    /// label's triangles near the tool, wherever the surface is near enough for the label to matter.
+    ///
+    /// ```
+    /// # use dibs_nostd::filter::Filter;
+    /// const VESSEL: u8 = 2;
+    /// let filter = Filter::new(1.0, 200.0)?.stand_off_of([(VESSEL, 3.0)])?;
+    /// # let _: Filter<1> = filter;
+    /// # Ok::<(), dibs_nostd::filter::FilterError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`FilterError::Parameter`] if one is less than the filter's, or not finite.
+    pub fn stand_off_of<const N: usize>(
+        self,
+        labels: [(u8, f32); N],
+    ) -> Result<Filter<N>, FilterError> {
+        let mut of_labels = [Part { label: 0, more: 0.0 }; N];
+        for (place, (label, stand_off)) in of_labels.iter_mut().zip(labels) {
+            checked("stand_off_of", stand_off, stand_off >= self.stand_off)?;
+            *place = Part { label, more: stand_off - self.stand_off };
+        }
+        let Self { stand_off, speed, lever, approach, instructions, cost, options, .. } = self;
+        Ok(Filter { stand_off, of_labels, speed, lever, approach, instructions, cost, options })
     }
 
     /// The same with a lever (mm, at least 1): a rotation by one radian counts as much as a translation by this length. By
@@ -191,8 +232,15 @@ impl Filter {
         if !command.is_finite() {
             return Err(FilterError::Command);
         }
-        if pairs.is_empty() || pairs.len() > MOST_PAIRS {
-            return Err(FilterError::Pairs { found: pairs.len(), most: MOST_PAIRS });
+        let found = pairs.len().saturating_mul(self.layers().count());
+        if pairs.is_empty() || found > MOST_PAIRS {
+            return Err(FilterError::Pairs { found, most: MOST_PAIRS });
+        }
+        let is_labelled = |(tracker, ..): &(&mut Tracker<'_, I, STACK, OPENED, RANGE>, &S, &T)| {
+            tracker.tree().has_labels()
+        };
+        if LABELS > 0 && found > pairs.len() && !pairs.iter().any(is_labelled) {
+            return Err(FilterError::Unlabelled);
         }
         let lever = self.lever_of(pairs.iter().map(|(_, _, tool)| *tool), command);
         Session::new(self, command, period, uncertainty, (rows, lever))?.run(pairs)
@@ -221,7 +269,7 @@ impl Filter {
     pub(crate) fn most<T: Tool>(&self, tool: &T, motion: &Motion, period: f32) -> (f32, f32) {
         let most = self.speed * period;
         let lever = self.lever_of(core::iter::once(tool), motion);
-        (most, session::most_turn(most, lever))
+        (most, motion::most_turn(most, lever))
     }
 }
 

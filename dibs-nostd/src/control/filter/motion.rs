@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::known::smaller;
 use super::nearest::Vector;
 use crate::math::sqrt::sqrt;
 
@@ -23,7 +24,7 @@ pub struct Motion {
 }
 
 /// Largest angle (rad) of a period.
-pub(super) const MOST_TURN: f32 = 0.5;
+const MOST_TURN: f32 = 0.5;
 
 impl Motion {
     /// A translation. Its reference point is the origin, about which a filter may turn the instrument: use
@@ -84,6 +85,27 @@ impl Motion {
 pub(super) fn shortened(vector: Vec3, most: f32) -> Vec3 {
     let length = sqrt(vector.length_squared());
     if length > most * (1.0 + 8.0 * f32::EPSILON) { vector * (most / length) } else { vector }
+}
+
+/// Largest angle (rad) of a period.
+pub(super) fn most_turn(most: f32, lever: f32) -> f32 {
+    smaller(most / lever, MOST_TURN)
+}
+
+/// The largest fraction of a step, at most 1, after which a point that starts within `most` of the origin still is.
+pub(super) fn inside(start: Vec3, step: Vec3, most: f32) -> f32 {
+    let (square, along) = (step.length_squared(), start.dot(step));
+    let room = most * most - start.length_squared();
+    if start.distance_squared(-step) <= most * most || !(square > 0.0) {
+        return 1.0;
+    }
+    let root = along * along + square * room;
+    // Written so that NaN gives 0.
+    if room > 0.0 && root > 0.0 {
+        smaller((sqrt(root) - along) / square * (1.0 - 8.0 * f32::EPSILON), 1.0)
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use crate::math::round::sum_down;
-use crate::query::{NoSide, Proximity, Side};
+use crate::math::sqrt::sqrt;
+use crate::query::{NoSide, OfLabel, Proximity, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Options, Tool, Tracker};
 
@@ -16,6 +17,14 @@ pub(super) trait Pair {
 
     /// The closest pair of the tool with its axis at other ends.
     fn closest(&mut self, ends: [Vec3; 2], options: &Options) -> Result<Proximity, QueryError>;
+
+    /// The same of a label's triangles, within a distance (mm) of the axis.
+    fn closest_of_label(
+        &mut self,
+        ends: [Vec3; 2],
+        within: (u8, f32),
+        options: &Options,
+    ) -> Result<OfLabel, QueryError>;
 }
 
 impl<I: Index, S, T: Tool, const STACK: usize, const OPENED: usize, const RANGE: usize> Pair
@@ -36,11 +45,53 @@ where
         let tool = tool.with_axis(ends);
         Ok(tracker.closest(*surface, &tool, options)?.closest)
     }
+
+    fn closest_of_label(
+        &mut self,
+        ends: [Vec3; 2],
+        within: (u8, f32),
+        options: &Options,
+    ) -> Result<OfLabel, QueryError> {
+        let (tracker, surface, tool) = self;
+        tracker.closest_of_label(*surface, &tool.with_axis(ends), within, options)
+    }
+}
+
+/// The closest pair of a tool and a surface, or a label's part of it.
+#[derive(Clone, Copy)]
+pub(super) struct Found {
+    /// A lower bound on the axis' distance; negative inside, and negative infinity where nothing is certain.
+    pub distance: f32,
+    pub axis_parameter: f32,
+    /// Out of the surface; zero where that is not known.
+    pub direction: Vec3,
+    pub node_tests: u32,
+    pub triangle_tests: u32,
+}
+
+impl Found {
+    /// Of a whole surface. A tool that `is_outside` at the start of its path needs no side later.
+    #[inline(always)]
+    pub fn of(found: &Proximity, radius: f32, is_outside: bool) -> Self {
+        let distance = distance(found, radius, is_outside);
+        let &Proximity { axis_parameter, direction, node_tests, triangle_tests, .. } = found;
+        Self { distance, axis_parameter, direction, node_tests, triangle_tests }
+    }
+
+    /// Of a label's part.
+    pub fn of_label(found: &OfLabel) -> Self {
+        let &OfLabel { distance, pair, node_tests, triangle_tests } = found;
+        let (axis_parameter, direction) = pair.map_or((0.0, Vec3::ZERO), |pair| {
+            let towards = pair.on_axis - pair.on_surface;
+            (pair.axis_parameter, towards / sqrt(towards.length_squared()))
+        });
+        Self { distance, axis_parameter, direction, node_tests, triangle_tests }
+    }
 }
 
 /// A lower bound on the axis' distance; negative inside, and negative infinity if nothing is certain. A tool that
 /// `is_outside` at the start of its path needs no side later: it would have to touch the surface first.
-pub(super) fn distance(found: &Proximity, radius: f32, is_outside: bool) -> f32 {
+fn distance(found: &Proximity, radius: f32, is_outside: bool) -> f32 {
     let lower = match found.side {
         Side::Outside | Side::Inside | Side::Crossing => found.lower,
         // Without a solid there is no inside.

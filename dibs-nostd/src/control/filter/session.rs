@@ -3,9 +3,11 @@
 use glam::Vec3;
 use heapless::Vec;
 
-use super::motion::{MOST_TURN, shortened};
+use super::known::{Known, State, larger, smaller};
+use super::motion::{inside, most_turn, shortened};
 use super::nearest::{Vector, add};
-use super::pair::{Pair, distance};
+use super::pair::{Found, Pair};
+use super::part::Part;
 use super::row::Rows;
 use super::{
     Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty,
@@ -13,7 +15,6 @@ use super::{
 };
 use crate::Budget;
 use crate::math::sqrt::sqrt;
-use crate::query::Proximity;
 
 /// Number of motions tried in full, and of shortened ones after that.
 const WHOLE: u32 = 4;
@@ -25,49 +26,16 @@ const ROUNDING: f32 = 16.0 / 16_777_216.0;
 /// With fewer node tests a query is not worth its base cost.
 const LEAST_TESTS: u32 = 32;
 
-/// A pair's distance at a pose.
-#[derive(Clone, Copy)]
-struct Known {
-    ends: [Vec3; 2],
-    /// Lower bound on the axis' distance from the surface; negative inside.
-    distance: f32,
-}
-
-impl Known {
-    /// Upper bound on the motion of the axis to other ends, rounded up.
-    fn moved(&self, ends: &[Vec3; 2]) -> f32 {
-        let mut most = 0.0;
-        for (from, to) in self.ends.iter().zip(ends) {
-            let square = from.distance_squared(*to);
-            if square > most {
-                most = square;
-            }
-        }
-        sqrt(most) * (1.0 + 8.0 * f32::EPSILON)
-    }
-
-    /// A lower bound on the distance at other ends.
-    fn distance_at(&self, ends: &[Vec3; 2]) -> f32 {
-        self.distance - self.moved(ends)
-    }
-}
-
-/// A pair in this tick.
-struct State {
-    start: Known,
-    /// The last pose searched after the start.
-    end: Option<Known>,
-    /// The distance minus this is a lower bound on the separation at the start.
-    reach: f32,
-    /// The least distance allowed during the motion.
-    least: f32,
-}
+/// Motions (mm) of a period within which a wall is near.
+const NEAR: f32 = 4.0;
 
 /// A motion, and its distances from the tissue.
 #[derive(Clone, Copy)]
 struct Candidate {
     motion: Motion,
-    /// Least separation during the motion, and at its end.
+    /// Least separation from the whole surface during the motion.
+    separation: f32,
+    /// The same, or that from a label's part less what its stand-off is larger, during the motion and at its end.
     least: f32,
     last: f32,
     /// Upper bound (mm) on the motion of a point of an axis.
@@ -76,16 +44,17 @@ struct Candidate {
     is_admissible: bool,
 }
 
-pub(super) struct Session<'f> {
-    filter: &'f Filter,
+pub(super) struct Session<'f, const LABELS: usize> {
+    filter: &'f Filter<LABELS>,
     command: Vector,
     /// The command was beyond the robot's speed.
     is_cut: bool,
     about: Vec3,
     lever: f32,
     rows: Rows,
+    /// Of each pair, then of each pair with one label's part after another.
     states: Vec<State, MOST_PAIRS>,
-    /// Each pair's distance at the end that its rows require.
+    /// Of each of these, the distance at the end that its rows require.
     wanted: Vec<f32, MOST_PAIRS>,
     /// Limit (mm) on the motion of the reference point, and on that of the lever's end by rotation.
     most: f32,
@@ -98,9 +67,9 @@ pub(super) struct Session<'f> {
     instructions: u32,
 }
 
-impl<'f> Session<'f> {
+impl<'f, const LABELS: usize> Session<'f, LABELS> {
     pub fn new(
-        filter: &'f Filter,
+        filter: &'f Filter<LABELS>,
         command: &Motion,
         period: f32,
         uncertainty: &Uncertainty,
@@ -132,8 +101,10 @@ impl<'f> Session<'f> {
 
     pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<Admitted, FilterError> {
         let rest = Motion { about: self.about, ..Motion::translation(Vec3::ZERO) };
-        for pair in pairs.iter_mut() {
-            self.start(pair, &rest)?;
+        for part in self.filter.layers() {
+            for (number, pair) in pairs.iter_mut().enumerate() {
+                self.start(pair, (number, part), &rest)?;
+            }
         }
         let stand_still = self.verify(pairs, &rest)?;
         let mut best = stand_still;
@@ -180,27 +151,46 @@ impl<'f> Session<'f> {
         let is_kept = found.least >= self.filter.stand_off - EPSILON;
         Admitted {
             motion: found.motion,
-            least_separation: found.least,
+            least_separation: found.separation,
             reason: if is_kept { reason } else { Reason::NoSafeMotion },
             queries: self.queries,
             instructions: self.instructions,
         }
     }
 
-    /// Searches a pair at its current pose.
-    fn start<P: Pair>(&mut self, pair: &mut P, rest: &Motion) -> Result<(), FilterError> {
+    /// Searches a pair at its current pose, or a part of its surface.
+    fn start<P: Pair>(
+        &mut self,
+        pair: &mut P,
+        (number, part): (usize, Option<Part>),
+        rest: &Motion,
+    ) -> Result<(), FilterError> {
         let (ends, radius) = (pair.ends(), pair.radius());
         let mut size = radius;
         for end in ends {
             size += end.abs().max_element();
         }
         let reach = radius + self.margin + ROUNDING * (size + self.most);
-        let found = self.search(pair, ends)?;
-        let distance = found.map_or(f32::NEG_INFINITY, |found| distance(&found, radius, false));
+        let reach = part.map_or(reach, |part| reach + part.more);
         let kept = reach + self.filter.stand_off;
+        // No part of the surface is nearer than all of it.
+        let whole = self.states.get(number).map(|state| state.start.distance);
+        let near = kept + self.grow + NEAR * self.most;
+        let found = match (part, whole) {
+            (Some(part), Some(whole)) if whole > 0.0 && whole < near => {
+                self.search(pair, ends, false, Some((part.label, near)))?
+            }
+            (Some(_), _) => None,
+            (None, _) => self.search(pair, ends, false, None)?,
+        };
+        let least_known = whole.filter(|_| part.is_some()).unwrap_or(f32::NEG_INFINITY);
+        let distance = found.map_or(least_known, |found| larger(found.distance, least_known));
         // Where nothing is known, nothing is admitted.
         let is_below = distance < kept && distance > f32::NEG_INFINITY;
         let least = if is_below { distance } else { kept };
+        // What is not certainly outside of the whole surface is kept out by that.
+        let is_out = part.is_none() || distance > 0.0;
+        let least = if is_out { least } else { f32::NEG_INFINITY };
         let farthest = distance + self.most;
         let wanted = kept + self.grow;
         let wanted = if is_below && farthest < wanted { farthest } else { wanted };
@@ -209,7 +199,7 @@ impl<'f> Session<'f> {
             if room > 0.0 && room < f32::INFINITY { distance - room * self.share } else { wanted };
         let number = self.states.len();
         if let Some(found) = found
-            && distance < wanted + 4.0 * self.most
+            && distance < wanted + NEAR * self.most
         {
             self.add_wall(number, &found, (ends, distance), rest);
         }
@@ -223,7 +213,7 @@ impl<'f> Session<'f> {
     fn add_wall(
         &mut self,
         number: usize,
-        found: &Proximity,
+        found: &Found,
         ([start, end], distance): ([Vec3; 2], f32),
         at: &Motion,
     ) {
@@ -279,77 +269,108 @@ impl<'f> Session<'f> {
     ) -> Result<Candidate, FilterError> {
         let mut found = Candidate {
             motion: *motion,
+            separation: f32::INFINITY,
             least: f32::INFINITY,
             last: f32::INFINITY,
             moved: 0.0,
             is_admissible: true,
         };
-        for (number, pair) in pairs.iter_mut().enumerate() {
-            let Some(&State { start, end, reach, least }) = self.states.get(number) else {
-                continue;
-            };
-            let ends = start.ends.map(|end| motion.apply(end));
-            let moved = start.moved(&ends);
-            found.moved = larger(found.moved, moved);
-            let mut arc = 0.0;
-            for end in start.ends {
-                let height = motion.arc(sqrt(end.distance_squared(self.about)));
-                if height > arc {
-                    arc = height;
-                }
+        for (layer, part) in self.filter.layers().enumerate() {
+            let first = layer * pairs.len();
+            for (number, pair) in pairs.iter_mut().enumerate() {
+                self.verify_pair(pair, (number, first + number, part), &mut found)?;
             }
-            let mut last = start.distance_at(&ends);
-            if let Some(end) = end {
-                last = larger(last, end.distance_at(&ends));
-            }
-            let grow = self.grow;
-            let on_path = |last| path::least(start.distance, last, moved, grow) - arc;
-            let is_enough = |nearest: f32| nearest >= least - EPSILON;
-            let mut nearest = on_path(last);
-            // At rest the start's search suffices.
-            if !is_enough(nearest)
-                && moved > 0.0
-                && let Some(found) = self.search(pair, ends)?
-            {
-                let searched = distance(&found, pair.radius(), start.distance > 0.0);
-                last = larger(last, searched);
-                nearest = on_path(last);
-                let known = Known { ends, distance: last };
-                if let Some(state) = self.states.get_mut(number) {
-                    state.end = Some(known);
-                }
-                if !is_enough(nearest)
-                    && let Some(wanted) = self.wanted.get_mut(number)
-                {
-                    // The end is far enough, but the middle is not.
-                    let lacks = least - nearest;
-                    if last >= *wanted - EPSILON && lacks < moved {
-                        *wanted += 2.0 * lacks;
-                    }
-                    self.add_wall(number, &found, (ends, searched), motion);
-                }
-            }
-            found.is_admissible &= is_enough(nearest);
-            found.least = smaller(found.least, nearest - reach);
-            found.last = smaller(found.last, last - grow - reach);
         }
         Ok(found)
     }
 
-    /// The closest pair with the axis at these ends, within the remaining budget; `None` if that is too small.
+    /// The same for one pair, or a part of its surface, whose state is `at` a place.
+    fn verify_pair<P: Pair>(
+        &mut self,
+        pair: &mut P,
+        (number, at, part): (usize, usize, Option<Part>),
+        found: &mut Candidate,
+    ) -> Result<(), FilterError> {
+        let Some(&state) = self.states.get(at) else { return Ok(()) };
+        let State { start, reach, least, .. } = state;
+        let motion = found.motion;
+        let ends = start.ends.map(|end| motion.apply(end));
+        let moved = start.moved(&ends);
+        found.moved = larger(found.moved, moved);
+        let mut arc = 0.0;
+        for end in start.ends {
+            let height = motion.arc(sqrt(end.distance_squared(self.about)));
+            if height > arc {
+                arc = height;
+            }
+        }
+        let mut last = state.distance_at(&ends);
+        if part.is_some()
+            && let Some(whole) = self.states.get(number)
+        {
+            last = larger(last, whole.distance_at(&ends));
+        }
+        let grow = self.grow;
+        let on_path = |last| path::least(start.distance, last, moved, grow) - arc;
+        let is_enough = |nearest: f32| nearest >= least - EPSILON;
+        let mut nearest = on_path(last);
+        // From there on the path is far enough, whatever is between its ends.
+        let near = part.map(|part| (part.label, least + moved + 2.0 * (grow + arc)));
+        // At rest the start's search suffices.
+        if !is_enough(nearest)
+            && moved > 0.0
+            && let Some(searched) = self.search(pair, ends, start.distance > 0.0, near)?
+        {
+            last = larger(last, searched.distance);
+            nearest = on_path(last);
+            let known = Known { ends, distance: last };
+            if let Some(state) = self.states.get_mut(at) {
+                state.end = Some(known);
+            }
+            if !is_enough(nearest)
+                && let Some(wanted) = self.wanted.get_mut(at)
+            {
+                // The end is far enough, but the middle is not.
+                let lacks = least - nearest;
+                if last >= *wanted - EPSILON && lacks < moved {
+                    *wanted += 2.0 * lacks;
+                }
+                self.add_wall(at, &searched, (ends, searched.distance), &motion);
+            }
+        }
+        found.is_admissible &= is_enough(nearest);
+        found.least = smaller(found.least, nearest - reach);
+        found.last = smaller(found.last, last - grow - reach);
+        if part.is_none() {
+            found.separation = smaller(found.separation, nearest - reach);
+        }
+        Ok(())
+    }
+
+    /// The closest pair with the axis at these ends, or that of a label's triangles within a distance, within the remaining
+    /// budget; `None` if that is too small. A tool that `is_outside` at the start of its path needs no side later.
     fn search<P: Pair>(
         &mut self,
         pair: &mut P,
         ends: [Vec3; 2],
-    ) -> Result<Option<Proximity>, FilterError> {
+        is_outside: bool,
+        near: Option<(u8, f32)>,
+    ) -> Result<Option<Found>, FilterError> {
         let Filter { instructions, cost, options, .. } = self.filter;
         let left = instructions.saturating_sub(self.instructions);
         let budget = Budget::for_instructions(left, cost);
         if budget.tests() < LEAST_TESTS {
             return Ok(None);
         }
-        let found = pair.closest(ends, &options.signed().budget(budget))?;
-        let Proximity { node_tests, triangle_tests, .. } = found;
+        let options = options.signed().budget(budget);
+        let found = match near {
+            // Without labels that is not compiled.
+            Some(near) if LABELS > 0 => {
+                Found::of_label(&pair.closest_of_label(ends, near, &options)?)
+            }
+            _ => Found::of(&pair.closest(ends, &options)?, pair.radius(), is_outside),
+        };
+        let Found { node_tests, triangle_tests, .. } = found;
         // The root's test is included in the base cost.
         let spent = cost.instructions(node_tests.saturating_sub(1), triangle_tests);
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);
@@ -357,41 +378,4 @@ impl<'f> Session<'f> {
         self.queries += 1;
         Ok(Some(found))
     }
-}
-
-/// Largest angle (rad) of a period.
-pub(super) fn most_turn(most: f32, lever: f32) -> f32 {
-    smaller(most / lever, MOST_TURN)
-}
-
-/// The largest fraction of a step, at most 1, after which a point that starts within `most` of the origin still is.
-fn inside(start: Vec3, step: Vec3, most: f32) -> f32 {
-    let (square, along) = (step.length_squared(), start.dot(step));
-    let room = most * most - start.length_squared();
-    if start.distance_squared(-step) <= most * most || !(square > 0.0) {
-        return 1.0;
-    }
-    let root = along * along + square * room;
-    // Written so that NaN gives 0.
-    if room > 0.0 && root > 0.0 {
-        smaller((sqrt(root) - along) / square * (1.0 - 8.0 * f32::EPSILON), 1.0)
-    } else {
-        0.0
-    }
-}
-
-/// The smaller number; NaN if either is.
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b {
-        a
-    } else if b <= a {
-        b
-    } else {
-        f32::NAN
-    }
-}
-
-/// The larger number; NaN if `a` is.
-fn larger(a: f32, b: f32) -> f32 {
-    if b > a { b } else { a }
 }

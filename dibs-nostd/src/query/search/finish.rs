@@ -11,6 +11,12 @@ use crate::query::{NoSide, Proximity, Side};
 use crate::{Coverage, Index, QueryError, Tool, TriangleRow, VertexTable};
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
+    /// The error (mm) of a distance, without that of the table's positions.
+    #[inline(always)]
+    pub(super) fn accuracy(&self) -> f32 {
+        ACCURACY * self.scale + FLOOR + self.tree.position_error()
+    }
+
     /// The answer, given the lower bound `lower` of the unexplored subtrees.
     pub(super) fn finish(&self, lower: f32) -> Result<Proximity, QueryError> {
         let NearestPin { row: pin, distance: pin_distance } = self.nearest_pin;
@@ -42,7 +48,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         Ok(Proximity {
             separation,
             lower: if left < separation { left } else { separation },
-            accuracy: ACCURACY * self.scale + FLOOR + self.tree.position_error(),
+            accuracy: self.accuracy(),
             side: Side::Undefined(NoSide::NotAsked),
             coverage: Coverage::Assumed,
             axis_distance,

@@ -12,6 +12,18 @@ use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Budget, Index, Options, VertexTable};
 
+/// How far a label's triangles are from a tool's axis.
+#[cfg(feature = "control")]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OfLabel {
+    /// None of them is nearer.
+    pub distance: f32,
+    /// The closest one that was tested, if one was within the limit.
+    pub pair: Option<AxisPair>,
+    pub node_tests: u32,
+    pub triangle_tests: u32,
+}
+
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// A search over a range, with the budget of `options`.
     ///
@@ -47,6 +59,30 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             None => least_standing(&heights, ridge),
         };
         Ok((least, self.meter.made()))
+    }
+
+    /// The closest of a label's triangles within `limit`.
+    #[cfg(feature = "control")]
+    #[cold]
+    pub fn closest_of_label(self, label: u8, limit: f32) -> Result<OfLabel, QueryError> {
+        let (accuracy, tilt) = (self.accuracy(), self.tilt_slack);
+        let limit = limit + 2.0 * accuracy;
+        let (mut nearest, mut closest) = (limit, None);
+        let visit = |_, pair: &AxisPair| {
+            let distance = sqrt(pair.distance_squared);
+            if distance < nearest {
+                (nearest, closest) = (distance, Some(*pair));
+            }
+            nearest
+        };
+        let (beyond, tests) = self.each_low(limit, (0.0, Some(label)), visit)?;
+        // A triangle that stands for its lowest corner may be lower by the rounding of its tilt.
+        let square = beyond * beyond - tilt;
+        // A bound below zero is none, and neither is one that is not a number.
+        let beyond = if beyond > 0.0 && square > 0.0 { sqrt(square) } else { 0.0 };
+        let nearest = if beyond < nearest { beyond } else { nearest };
+        let Tests { node_tests, triangle_tests } = tests;
+        Ok(OfLabel { distance: nearest - accuracy, pair: closest, node_tests, triangle_tests })
     }
 
     /// Visits the triangles of the waiting subtrees. If the budget runs out, returns a lower bound on the distance of

@@ -5,6 +5,8 @@
 mod contacts;
 mod direction;
 mod kept;
+#[cfg(feature = "control")]
+mod part;
 mod several;
 #[cfg(test)]
 mod tests;

@@ -68,7 +68,7 @@ const CONTACTS: &[Gives] =
 const ADMIT: &[Gives] = &[
     ("Unavailable", TRUST),
     ("QueryError", Only(&["Position", "Uncovered", "Corrupt", "OtherTree", "OtherFrame"])),
-    ("FilterError", Only(&["Parameter", "Command", "Query", "Untrusted"])),
+    ("FilterError", Only(&["Parameter", "Command", "Pairs", "Unlabelled", "Query", "Untrusted"])),
 ];
 /// For a constraint whose state is safe with this cause.
 const FORCE: &[Gives] = &[("Unavailable", All)];
@@ -291,6 +291,6 @@ pub const NEVER: &[(&str, &[&str], &str)] = &[
         &["Order", "Untrippable", "Recovery"],
         "refused where a limit is made, before a guard has it",
     ),
-    ("FilterError", &["Row", "Rows", "Pairs"], "a guard passes one pair, and no rows"),
+    ("FilterError", &["Row", "Rows"], "a guard passes no rows"),
     ("StretchError", &["VertexCount"], "`start` compares the number of rows"),
 ];

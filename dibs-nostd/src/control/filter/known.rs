@@ -1,0 +1,72 @@
+//! Distances that a tick's queries found, and what they say of other poses.
+
+use glam::Vec3;
+
+use crate::math::sqrt::sqrt;
+
+/// A pair's distance at a pose.
+#[derive(Clone, Copy)]
+pub(super) struct Known {
+    /// Ends of the axis.
+    pub ends: [Vec3; 2],
+    /// Lower bound on the axis' distance from the surface; negative inside.
+    pub distance: f32,
+}
+
+impl Known {
+    /// Upper bound on the motion of the axis to other ends, rounded up.
+    pub fn moved(&self, ends: &[Vec3; 2]) -> f32 {
+        let mut most = 0.0;
+        for (from, to) in self.ends.iter().zip(ends) {
+            let square = from.distance_squared(*to);
+            if square > most {
+                most = square;
+            }
+        }
+        sqrt(most) * (1.0 + 8.0 * f32::EPSILON)
+    }
+
+    /// A lower bound on the distance at other ends.
+    pub fn distance_at(&self, ends: &[Vec3; 2]) -> f32 {
+        self.distance - self.moved(ends)
+    }
+}
+
+/// A pair in this tick, or a part of its surface.
+#[derive(Clone, Copy)]
+pub(super) struct State {
+    pub start: Known,
+    /// The last pose searched after the start.
+    pub end: Option<Known>,
+    /// The distance minus this is a lower bound on the separation at the start.
+    pub reach: f32,
+    /// The least distance allowed during the motion.
+    pub least: f32,
+}
+
+impl State {
+    /// What both poses say of the distance at other ends.
+    pub fn distance_at(&self, ends: &[Vec3; 2]) -> f32 {
+        let at = self.start.distance_at(ends);
+        match self.end {
+            Some(end) => larger(at, end.distance_at(ends)),
+            None => at,
+        }
+    }
+}
+
+/// The larger number; NaN if `a` is.
+pub(super) fn larger(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+/// The smaller number; NaN if either is.
+pub(super) fn smaller(a: f32, b: f32) -> f32 {
+    if a < b {
+        a
+    } else if b <= a {
+        b
+    } else {
+        f32::NAN
+    }
+}
