@@ -3012,8 +3012,28 @@ dibs_code dibs_sender_send(dibs_sender *sender,
                            dibs_sent *sent);
 
 /**
- * Sends a heartbeat if one is due, and receives the statuses that have arrived. Does not wait. Call it a few times
- * between two heartbeats: otherwise the controller considers the link lost, and no transit time is measured.
+ * The same as `dibs_sender_send`, with the mesh as a whole elsewhere. For a `dibs_bus`; a `dibs_receiver` refuses such frames.
+ *
+ * @param sender     The sender.
+ * @param positions  As for `dibs_sender_send`: those of the mesh's own frame.
+ * @param count      Their number.
+ * @param pose       The pose, read during the call.
+ * @param age        Time (ms) since the surface was so, and there: of the older of the two. A source that has stopped
+ *                   cannot be told from a mesh that moves as a whole, so it must be stated.
+ * @param sent       Receives the frame's number and size; or null.
+ * @return As `dibs_sender_send`; `DIBS_CODE_SENDER_FRAME` also for numbers that are no pose, and `DIBS_CODE_ARGUMENT` for
+ *         `DIBS_AGE_UNKNOWN`.
+ */
+dibs_code dibs_sender_send_at(dibs_sender *sender,
+                              const float *positions,
+                              uint32_t count,
+                              const dibs_pose *pose,
+                              uint32_t age,
+                              dibs_sent *sent);
+
+/**
+ * Sends a heartbeat if one is due, and takes the statuses that have come. Does not wait. Call it a few times between two
+ * heartbeats: without it the controller takes the link for lost, and no transit time is measured.
  *
  * @return As `dibs_sender_send`.
  */

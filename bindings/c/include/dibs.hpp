@@ -216,6 +216,10 @@ struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
     Code send(Span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent *sent = nullptr) {
         return dibs_sender_send(*this, positions.data(), uint32_t(positions.size() / 3), age, sent);
     }
+    /** The same, with the mesh as a whole at a pose. */
+    Code send_at(std::span<const float> positions, const dibs_pose &pose, uint32_t age, dibs_sent *sent = nullptr) {
+        return dibs_sender_send_at(*this, positions.data(), uint32_t(positions.size() / 3), &pose, age, sent);
+    }
     Code poll() { return dibs_sender_poll(*this); }
 };
 /** Frames of positions that the caller has. */

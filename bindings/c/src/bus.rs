@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::glam::Quat;
+use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::guard::{Bus, Rows};
 use dibs_nostd::wire::{Event, NoMac};
 use dibs_nostd::{Advance, Millis, Progress, ReceiveError, TreeBytes, VertexTable};
@@ -199,6 +199,12 @@ pub struct dibs_pose {
     pub shift: dibs_vec3,
 }
 
+impl From<dibs_pose> for (Quat, Vec3) {
+    fn from(pose: dibs_pose) -> Self {
+        (Quat::from_array(pose.rotation), pose.shift.into())
+    }
+}
+
 /// The same as `dibs_bus_frame`, with a rigid pose of the whole mesh, for example from a tracker of the patient: tools,
 /// answers and commands are then in world coordinates. Without a pose the mesh is where its file has it.
 ///
@@ -224,9 +230,8 @@ pub extern "C" fn dibs_bus_frame_at(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (pose, mut bus, rows) = (pose.get()?, bus.open()?, rows(positions, count)?);
-        let pose = (Quat::from_array(pose.rotation), pose.shift.into());
         let (captured, now) = (Millis(captured), Millis(now));
-        let _ = with_bus!(&mut bus.0, |bus| bus.frame_at(rows, pose, captured, now))?;
+        let _ = with_bus!(&mut bus.0, |bus| bus.frame_at(rows, pose.into(), captured, now))?;
         Ok(())
     })
 }

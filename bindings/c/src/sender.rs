@@ -5,12 +5,14 @@ use std::string::{String, ToString};
 use std::time::Duration;
 use std::vec::Vec;
 
-use dibs_nostd::glam::Vec3;
+use dibs_nostd::RigidPose;
+use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{Content, Event};
 use dibs_stream::transport::{Line, Target};
 use dibs_stream::{SendError, Sender, Sent, Settings, SurfaceOrder};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage, text};
+use crate::bus::dibs_pose;
 use crate::code::dibs_code;
 use crate::frame::rows;
 use crate::receiver::DIBS_EVENTS;
@@ -195,20 +197,56 @@ pub extern "C" fn dibs_sender_send(
     age: u32,
     sent: *mut dibs_sent,
 ) -> dibs_code {
-    dibs_code::of(|| {
-        let (sent, mut sender, rows) =
-            (sent.check_if_any()?, sender.open()?, rows(positions, count)?);
-        let dibs_sender { sender: own, positions, .. } = &mut *sender;
-        positions.clear();
-        positions.extend(rows.iter().copied().map(Vec3::from_array));
-        let outcome = match age {
-            DIBS_AGE_UNKNOWN => own.send(positions),
-            age => own.send_captured(positions, Duration::from_millis(age.into())),
-        };
-        let outcome = outcome.map_err(|error| sender.keep(&error))?;
-        Place::set_if_any(sent, outcome.into());
-        Ok(())
-    })
+    dibs_code::of(|| send(sender, positions, count, None, age, sent))
+}
+
+/// The same as `dibs_sender_send`, with the mesh as a whole elsewhere. For a `dibs_bus`; a `dibs_receiver` refuses such frames.
+///
+/// @param sender     The sender.
+/// @param positions  As for `dibs_sender_send`: those of the mesh's own frame.
+/// @param count      Their number.
+/// @param pose       The pose, read during the call.
+/// @param age        Time (ms) since the surface was so, and there: of the older of the two. A source that has stopped
+///                   cannot be told from a mesh that moves as a whole, so it must be stated.
+/// @param sent       Receives the frame's number and size; or null.
+/// @return As `dibs_sender_send`; `DIBS_CODE_SENDER_FRAME` also for numbers that are no pose, and `DIBS_CODE_ARGUMENT` for
+///         `DIBS_AGE_UNKNOWN`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_send_at(
+    sender: *mut dibs_sender,
+    positions: *const f32,
+    count: u32,
+    pose: *const dibs_pose,
+    age: u32,
+    sent: *mut dibs_sent,
+) -> dibs_code {
+    dibs_code::of(|| send(sender, positions, count, Some(pose.get()?), age, sent))
+}
+
+fn send(
+    sender: *mut dibs_sender,
+    positions: *const f32,
+    count: u32,
+    pose: Option<dibs_pose>,
+    age: u32,
+    sent: *mut dibs_sent,
+) -> Result<(), dibs_code> {
+    let (sent, mut sender, rows) = (sent.check_if_any()?, sender.open()?, rows(positions, count)?);
+    let dibs_sender { sender: own, positions, .. } = &mut *sender;
+    positions.clear();
+    positions.extend(rows.iter().copied().map(Vec3::from_array));
+    let ago = (age != DIBS_AGE_UNKNOWN).then_some(Duration::from_millis(age.into()));
+    let outcome = match (pose.map(<(Quat, Vec3)>::from), ago) {
+        (None, None) => own.send(positions),
+        (None, Some(ago)) => own.send_captured(positions, ago),
+        (Some(_), None) => return Err(dibs_code::Argument),
+        (Some((rotation, shift)), Some(ago)) => RigidPose::new(rotation, shift)
+            .map_err(SendError::from)
+            .and_then(|pose| own.send_at(positions, pose, ago)),
+    };
+    let outcome = outcome.map_err(|error| sender.keep(&error))?;
+    Place::set_if_any(sent, outcome.into());
+    Ok(())
 }
 
 /// Sends a heartbeat if one is due, and receives the statuses that have arrived. Does not wait. Call it a few times

@@ -1,6 +1,6 @@
 //! A sender in C, whose frames a bus of the same program receives over UDP.
 
-// Requirement: P-06
+// Requirements: F-08, P-06
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,8 @@ use crate::programs::{include, library, run, tool};
 
 /// The mesh's file has its vertices in another order than the tree's rows, and one that no triangle has. All frames arrive in
 /// the tree's order. From the third frame on the sending thread allocates nothing. A frame of another length, or with NaN, is
-/// refused with a sentence.
+/// refused with a sentence. With a pose each they are answered as by
+/// a call, bit for bit, and numbers that are no pose are refused, too.
 #[test]
 fn frames_go_from_c_to_a_bus() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -57,4 +58,5 @@ fn frames_go_from_c_to_a_bus() {
     let said = run(Command::new(program).args([tree, sent, expected]));
     assert!(said.contains(" 0 failures"), "{said}");
     assert!(said.contains("12 frames received, 0 allocations"), "{said}");
+    assert!(said.contains("12 poses received"), "{said}");
 }

@@ -86,3 +86,18 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
     if not least <= number <= most:
         raise ValueError(f"{name}: {number} is not from {least} to {most}")
     return number
+
+
+def pose(value: tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[list[float], list[float]]:
+    """A rotation and a shift."""
+    try:
+        rotation, shift = value
+    except (TypeError, ValueError):
+        raise ValueError("pose: give a rotation (x, y, z, w) and a shift (x, y, z), not a matrix") from None
+    parts = []
+    for name, given, count in (("rotation", rotation, 4), ("shift", shift, 3)):
+        array = numbers(name, given)
+        if array.shape != (count,):
+            raise ValueError(f"{name}: the shape is {array.shape}; give {count} numbers")
+        parts.append(array.tolist())
+    return parts[0], parts[1]

@@ -189,7 +189,7 @@ class Guard(Remade):
         mesh is where its file has it."""
         now = _now(now)
         when = now if captured is None else _arrays.whole("captured", captured, 0, _WRAP - 1)
-        placed = None if pose is None else _pose(pose)
+        placed = None if pose is None else _arrays.pose(pose)
         self._native.frame(_arrays.points("positions", positions).tobytes(), placed, when, now)
 
     def work(self, most: int = 1_000) -> Advance:
@@ -264,17 +264,3 @@ def _bytes(name: str, value: Any) -> bytes:
     if not isinstance(value, (bytes, bytearray, memoryview)):
         raise TypeError(f"{name}: bytes are needed, not {type(value).__name__}")
     return bytes(value)
-
-
-def _pose(pose: tuple[npt.ArrayLike, npt.ArrayLike]) -> tuple[list[float], list[float]]:
-    try:
-        rotation, shift = pose
-    except (TypeError, ValueError):
-        raise ValueError("pose: give a rotation (x, y, z, w) and a shift (x, y, z), not a matrix") from None
-    numbers = []
-    for name, given, count in (("rotation", rotation, 4), ("shift", shift, 3)):
-        array = _arrays.numbers(name, given)
-        if array.shape != (count,):
-            raise ValueError(f"{name}: the shape is {array.shape}; give {count} numbers")
-        numbers.append(array.tolist())
-    return numbers[0], numbers[1]

@@ -76,16 +76,24 @@ class Sender(Bound):
         self._tree = tree
         self._native = _dibs.Sender(tree._native, to, unit, mtu, choices, _tags(key, receiver, challenge))
 
-    def send(self, positions: npt.ArrayLike, *, age: Optional[float] = None) -> Sent:
+    def send(
+        self,
+        positions: npt.ArrayLike,
+        *,
+        age: Optional[float] = None,
+        pose: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None,
+    ) -> Sent:
         """Sends a frame: positions of the mesh's vertices, captured `age` seconds ago.
 
-        Without `age` a frame counts as captured now, unless it equals the last one in every bit.
+        Without `age` a frame counts as captured now, unless it equals the last one in every bit. `pose` is as for
+        `Guard.frame`, its shift in the positions' unit; then `age` is that of the older of the two, and must be given.
         """
         points = _arrays.points("positions", positions)
         count = self._tree._vertices
         if count is not None and len(points) != count:
             raise ValueError(f"positions: {len(points)} positions, and the mesh has {count} vertices")
-        return Sent(*self._native.send(points.tobytes(), age))
+        placed = None if pose is None else _arrays.pose(pose)
+        return Sent(*self._native.send(points.tobytes(), age, placed))
 
     def poll(self) -> None:
         """Sends a heartbeat if one is due, and receives the receiver's statuses. Does not block."""

@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use dibs_build::glam::{DQuat, DVec3, Vec3};
+use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::constraint::{ConstraintForce, ConstraintState, SpringDamper};
 use dibs_nostd::failsafe::LimitError;
 use dibs_nostd::filter::FilterError;
@@ -23,7 +23,7 @@ use crate::surface::List;
 use crate::tool::AnyTool;
 use crate::tracker::{Admitted, Filter, Listed, Tracked, listed, motion, named, record};
 use crate::tree::{Owned, Tree, View, of_any_width};
-use crate::{bytes, error, invalid};
+use crate::{bytes, error, invalid, pose};
 
 /// Enough for any tree.
 const STACK: usize = dibs_nostd::format::MAX_STACK;
@@ -178,18 +178,12 @@ impl Guard {
         &self,
         py: Python<'_>,
         positions: &[u8],
-        pose: Option<([f64; 4], [f64; 3])>,
+        pose: Option<pose::Given>,
         captured: u32,
         now: u32,
     ) -> PyResult<()> {
         let (origin, captured, now) = (self.tree.origin, Millis(captured), Millis(now));
-        let pose = pose.map(|(rotation, shift)| {
-            // The pose is given in the file's coordinates and converted to the tree's, which are relative to its
-            // origin.
-            let rotation = DQuat::from_array(rotation);
-            let shift = DVec3::from(shift) + (rotation.normalize() * origin - origin);
-            (rotation.as_quat(), shift.as_vec3())
-        });
+        let pose = pose.map(|pose| pose::local(pose, origin));
         let outcome = py.detach(|| {
             let local = |position: DVec3| (position - origin).as_vec3();
             let positions: Vec<Vec3> = bytes::points(positions).into_iter().map(local).collect();

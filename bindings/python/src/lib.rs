@@ -8,6 +8,7 @@ mod error;
 mod guard;
 mod mesh;
 mod motion;
+mod pose;
 mod record;
 mod scene;
 mod sender;

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use dibs_build::Unit;
 use dibs_build::glam::DVec3;
+use dibs_nostd::RigidPose;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{AesCmac, Content, Counters, Event, Mac};
 use dibs_stream::transport::{Line, Target, Transport};
@@ -15,7 +16,7 @@ use pyo3::types::PyBytes;
 
 use crate::mesh::unit;
 use crate::tree::{Tree, of_any_width};
-use crate::{bytes, error, invalid};
+use crate::{bytes, error, invalid, pose};
 
 /// A line; or a collection of packets for a caller who transports them.
 enum Outlet {
@@ -42,6 +43,12 @@ impl Transport for Outlet {
 /// A sender with any packet size.
 trait AnySender: Send {
     fn send(&mut self, positions: &[Vec3], age: Option<Duration>) -> Result<Sent, SendError>;
+    fn send_at(
+        &mut self,
+        positions: &[Vec3],
+        pose: RigidPose,
+        age: Duration,
+    ) -> Result<Sent, SendError>;
     fn poll(&mut self) -> Result<(), SendError>;
     fn totals(&self) -> Totals;
     /// Whether frames can be sent.
@@ -59,6 +66,15 @@ impl<const MTU: usize, M: Mac + Send> AnySender for dibs_stream::Sender<Outlet, 
             Some(age) => self.send_captured(positions, age),
             None => self.send(positions),
         }
+    }
+
+    fn send_at(
+        &mut self,
+        positions: &[Vec3],
+        pose: RigidPose,
+        age: Duration,
+    ) -> Result<Sent, SendError> {
+        self.send_at(positions, pose, age)
     }
 
     fn poll(&mut self) -> Result<(), SendError> {
@@ -139,19 +155,34 @@ impl Sender {
         Ok(Self { sender: Mutex::new(sender), origin: tree.0.origin, unit })
     }
 
-    /// Returns the frame's number, kind, rows, packets, bytes and error.
+    /// Positions, the time since they were so, and the mesh's rotation and shift. Returns the frame's number, kind, rows,
+    /// packets, bytes and error.
+    #[pyo3(signature = (positions, age, pose))]
     fn send(
         &self,
         py: Python<'_>,
         positions: &[u8],
         age: Option<f64>,
+        pose: Option<pose::Given>,
     ) -> PyResult<(u32, &'static str, usize, usize, usize, f32)> {
         let age = age.map(seconds).transpose()?;
+        let millimetres = self.unit.millimetres();
+        let at = pose.map(|(rotation, shift)| {
+            let pose = (rotation, shift.map(|along| along * millimetres));
+            let age = age.ok_or_else(|| invalid("age: with a pose it must be given; a source that stopped cannot be told from a mesh that moves as a whole"))?;
+            PyResult::Ok((pose::local(pose, self.origin), age))
+        });
+        let at = at.transpose()?;
         let sent = py.detach(|| {
-            let millimetres = self.unit.millimetres();
             let local = |position: DVec3| (position * millimetres - self.origin).as_vec3();
             let positions: Vec<Vec3> = bytes::points(positions).into_iter().map(local).collect();
-            self.lock().send(&positions, age)
+            match at {
+                None => self.lock().send(&positions, age),
+                Some(((rotation, shift), age)) => {
+                    let pose = RigidPose::new(rotation, shift)?;
+                    self.lock().send_at(&positions, pose, age)
+                }
+            }
         });
         let Sent { epoch, content, rows, packets, bytes, error } =
             sent.map_err(|error| error::send(&error))?;

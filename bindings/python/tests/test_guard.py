@@ -2,6 +2,7 @@
 
 import pathlib
 import re
+import socket
 import subprocess
 import sys
 import unittest
@@ -14,6 +15,9 @@ from subjects import ASIDE, BEAT, HEART, OTHER, TREE
 PERIOD = 30
 WALL = dibs.ForbiddenRegion(stiffness=1.0, damping=0.002, max_force=5.0, margin=5.0)
 SPHERE = [100.0, 0.0, 30.0, 2.5]
+# A pose: a rotation by twice the angle whose sine is 0.6, and a shift.
+TURN, SHIFT = [0.0, 0.0, 0.6, 0.8], np.array([200.0, -30.0, 50.0])
+ROTATION = np.array([[0.28, -0.96, 0.0], [0.96, 0.28, 0.0], [0.0, 0.0, 1.0]])
 
 # Threads that ask for the contacts of one guard, or of one tracker: while one has the list, another waits for it.
 SHARED = """
@@ -81,9 +85,7 @@ class Loop:
 
 class Guards(unittest.TestCase):
     def test_a_frame_may_have_a_pose(self):
-        turn, shift = [0.0, 0.0, 0.6, 0.8], np.array([200.0, -30.0, 50.0])
-        # By twice the angle whose sine is 0.6.
-        rotation = np.array([[0.28, -0.96, 0.0], [0.96, 0.28, 0.0], [0.0, 0.0, 1.0]])
+        turn, shift, rotation = TURN, SHIFT, ROTATION
         for tree, origin in ((TREE, np.zeros(3)), (OTHER, ASIDE)):
             guard = dibs.Guard(tree, 300.0, 80, automatic=True, without_transit=True)
             frame = BEAT.frames[0] + origin
@@ -105,6 +107,46 @@ class Guards(unittest.TestCase):
             for wrong in (np.eye(4), 5):
                 with self.assertRaisesRegex(ValueError, "give a rotation"):
                     guard.frame(frame, 2_610, pose=wrong)
+
+    def test_a_sender_takes_the_same_pose(self):
+        turn, shift = TURN, SHIFT
+        for tree, origin, unit, metre in ((TREE, np.zeros(3), None, 1.0), (OTHER, ASIDE, "m", 1_000.0)):
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+                line.bind(("127.0.0.1", 0))
+                line.settimeout(5)
+                to = f"udp:127.0.0.1:{line.getsockname()[1]}"
+                sender = dibs.Sender(tree, to, quantised=False, heartbeat=None, unit=unit)
+                guards = [dibs.Guard(tree, 300.0, 80, automatic=True, without_transit=True) for _ in range(2)]
+                there = [*(ROTATION @ (SPHERE[:3] + origin) + shift), SPHERE[3]]
+                compared = 0
+                for now in range(1_000, 2_600):
+                    if now % PERIOD == 10:
+                        frame = BEAT.frames[0] + origin
+                        at = shift + [0.0, 0.001 * now, 0.0]
+                        guards[0].frame(frame, now, captured=now - 5, pose=(turn, at))
+                        sent = sender.send(frame / metre, age=0.005, pose=(turn, at / metre))
+                        for _ in range(sent.packets):
+                            guards[1].packet(line.recv(2_048), now)
+                        for guard in guards:
+                            while guard.work(500) == "pending":
+                                pass
+                    called, sent = (guard.closest(there, now).closest for guard in guards)
+                    self.assertEqual(called is None, sent is None)
+                    if called is not None:
+                        compared += 1
+                        for field in ("separation", "point_on_surface", "accuracy"):
+                            np.testing.assert_allclose(called[field], sent[field], rtol=0, atol=1e-3 if unit else 0)
+                self.assertGreater(compared, 500)
+                for wrong, reason in (
+                    (([0.0, 0.0, 0.0, 1.1], shift), "is no rotation"),
+                    ((turn, [np.nan, 0, 0]), "is not finite"),
+                    ((turn[:3], shift), "give 4 numbers"),
+                    (np.eye(4), "give a rotation"),
+                ):
+                    with self.assertRaisesRegex(ValueError, reason):
+                        sender.send(BEAT.frames[0] + origin, age=0, pose=wrong)
+                with self.assertRaisesRegex(ValueError, "age: with a pose"):
+                    sender.send(BEAT.frames[0] / metre + origin / metre, pose=(turn, shift / metre))
 
     def test_the_answer_is_that_of_the_frame(self):
         for tree, frame, shift, is_serial in [

@@ -47,11 +47,9 @@ pub use answer::{Answer, Searched};
 pub use bus::Bus;
 pub use limits::GuardLimits;
 pub use posed::Posed;
-/// For a model checker.
-#[cfg(loom)]
+/// For the model checker and the fault matrix. They may change with any version.
 #[doc(hidden)]
 pub use poses::Poses;
-#[cfg(loom)]
 #[doc(hidden)]
 pub use rows::Shared;
 /// The kinds of rows, for [`Bus`], [`Guard`] and [`Surface`].

@@ -225,15 +225,17 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
     #[inline]
     pub fn accept(&mut self, packet: &[u8], now: Millis) -> Result<Progress, ReceiveError> {
         self.collector.set_now(now);
-        let packet = match Packet::decode(packet) {
+        // Borrowed: moved out of the result, each packet would be copied.
+        let decoded = Packet::decode(packet);
+        let packet = match &decoded {
             Ok(packet) => packet,
             Err(error) => {
-                let rejection = ReceiveError::Packet(error);
+                let rejection = ReceiveError::Packet(*error);
                 self.collector.refuse_bytes(rejection.event());
                 return Err(rejection);
             }
         };
-        let outcome = self.take(&packet);
+        let outcome = self.take(packet);
         match &outcome {
             Ok(Progress::Duplicate) => self.collector.counters.count(Event::Duplicate),
             Ok(Progress::Hello) => (),
@@ -245,7 +247,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
             }
             Err(rejection) => {
                 let is_begin = matches!(packet.body, Body::Begin(_));
-                self.collector.refuse::<M>(FrameName::of_packet(&packet), is_begin, rejection);
+                self.collector.refuse::<M>(FrameName::of_packet(packet), is_begin, rejection);
             }
         }
         outcome

@@ -34,6 +34,8 @@ pub enum Fault {
     TooFar,
     /// A vertex is far from its neighbours, and the frame's digest confirms it. Sealed.
     Stretch,
+    /// The pose is no rotation, is too far, or is another than the commit confirms. Sealed. Only for packets with a pose.
+    Pose,
     /// The tag or a byte that it covers is changed. Sealed. Only for packets with tags.
     Forgery,
     /// The sender restarts in the middle of a frame.
@@ -44,7 +46,7 @@ pub enum Fault {
 
 impl Fault {
     /// Every fault.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::FlipOne,
         Self::FlipTwo,
         Self::Burst,
@@ -60,6 +62,7 @@ impl Fault {
         Self::NotFinite,
         Self::TooFar,
         Self::Stretch,
+        Self::Pose,
         Self::Forgery,
         Self::SenderRestart,
         Self::ReceiverRestart,
@@ -84,6 +87,7 @@ impl Fault {
             Self::NotFinite => "NaN or infinity",
             Self::TooFar => "out of box",
             Self::Stretch => "stretch violation",
+            Self::Pose => "altered pose",
             Self::Forgery => "forged MAC",
             Self::SenderRestart => "sender restart",
             Self::ReceiverRestart => "receiver restart",

@@ -213,22 +213,26 @@ impl Injector {
                 Rows::Float(rows) => {
                     let at = HEADER_BYTES + 4 * rng.usize(..3 * rows.len());
                     // Mirrored and doubled, or moved away from zero: still a possible position.
-                    let value = f32::from_le_bytes([
-                        packet[at],
-                        packet[at + 1],
-                        packet[at + 2],
-                        packet[at + 3],
-                    ]);
+                    let value = float_at(packet, at);
                     let moved = if value < 0.0 { value + FAR } else { value - FAR };
                     put(at, &moved.to_le_bytes());
                 }
                 _ => return None,
             },
+            (Fault::Pose, Body::Pose(_)) => {
+                // One of the four numbers of the rotation, or of the three of the shift.
+                let at = HEADER_BYTES + 4 * rng.usize(..7);
+                let value = float_at(packet, at);
+                let change = [value + 1.0, -value - 1.0, value + 0.001, f32::NAN, 3e30];
+                put(at, &change[rng.usize(..change.len())].to_le_bytes());
+            }
             (Fault::Forgery, _) if is_tagged => {
                 let tag = packet.len() - CHECKSUM_BYTES - TAG_BYTES;
                 let at = match decoded.body {
                     // Other content under the same tag; changed padding would be malformed.
-                    Body::Vertices(_) | Body::Commit(_) if rng.bool() => HEADER_BYTES,
+                    Body::Vertices(_) | Body::Pose(_) | Body::Commit(_) if rng.bool() => {
+                        HEADER_BYTES
+                    }
                     _ => tag + rng.usize(..TAG_BYTES),
                 };
                 put(at, &[packet[at] ^ rng.u8(1..)]);
@@ -255,6 +259,11 @@ fn bad_number(fault: Fault, rng: &mut Rng) -> f32 {
         &[1e9, -1e9, 3e30, f32::MAX, f32::MIN]
     };
     values[rng.usize(..values.len())]
+}
+
+/// The number in these four bytes.
+fn float_at(packet: &[u8], at: usize) -> f32 {
+    f32::from_le_bytes([packet[at], packet[at + 1], packet[at + 2], packet[at + 3]])
 }
 
 /// Corrects a packet's checksum.

@@ -1,7 +1,7 @@
 //! Why a frame was not sent.
 
-use dibs_nostd::SurfaceFacts;
 use dibs_nostd::wire::EncodeError;
+use dibs_nostd::{PoseError, SurfaceFacts};
 use thiserror::Error;
 
 /// Why a frame was not sent.
@@ -25,6 +25,9 @@ pub enum SendError {
     /// The positions cannot be encoded in packets.
     #[error("the frame cannot be sent: {0}")]
     Frame(EncodeError),
+    /// The numbers given with the positions are not a pose.
+    #[error("the frame cannot be sent: {0}")]
+    Pose(#[from] PoseError),
     /// Packets must carry tags, but the receiver's challenge is not known yet.
     #[error("no genuine status came from the receiver: is it on, and has it the same key?")]
     NoChallenge,

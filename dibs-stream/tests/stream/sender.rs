@@ -193,6 +193,7 @@ fn damage_is_seen_by_the_checksum_and_sealed_faults_are_not() {
                     assert!(kinds.is_empty());
                 }
                 Fault::Forgery => assert!(all.is_empty(), "these packets have no tag"),
+                Fault::Pose => assert!(all.is_empty(), "these frames have no pose"),
                 Fault::Duplicate => only(&["same"]),
                 // What was held back comes with another packet of the frame.
                 Fault::Reorder => only(&["body", "same", "epoch"]),

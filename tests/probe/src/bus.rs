@@ -1,4 +1,7 @@
-//! The protocol between the fault matrix and the receiver on the board.
+//! The protocol between the fault matrix and the receiver on the board, and what both receivers have in common.
+
+use dibs_nostd::guard::{Posed, Poses, Rows};
+use dibs_nostd::{FrameGuard, RigidPose, SurfaceLimits, Tree, VertexTable};
 
 /// Vertices of the surface.
 pub const VERTICES: usize = 66;
@@ -14,3 +17,27 @@ pub const HEAD_BYTES: usize = 16;
 pub const KEY: [u8; 16] = *b"sixteen bytes...";
 /// The receiver's id.
 pub const RECEIVER: u32 = 7;
+
+/// The check of a frame, which may have a pose.
+pub type PoseCheck<'s, 't> = <Posed as Rows>::Gate<'s, 't, u16>;
+
+/// A new check.
+#[must_use]
+pub fn gate<'s, 't>(tree: &Tree<'t, u16>, poses: &'s Poses) -> Option<PoseCheck<'s, 't>> {
+    let limits = SurfaceLimits::reach_mm(1e3).speed(1e3);
+    let rows = <Posed as Rows>::of(tree).ok()?;
+    <Posed as Rows>::gate(tree, &rows, limits, poses).ok()
+}
+
+/// A pose's numbers: of its rotation, then of its shift.
+pub fn pose_numbers(pose: RigidPose) -> impl Iterator<Item = f32> {
+    pose.rotation().to_array().into_iter().chain(pose.shift().to_array())
+}
+
+/// The words of a published frame, those of its pose last.
+pub fn published_words(frame: &FrameGuard<'_>, poses: &Poses) -> impl Iterator<Item = u32> {
+    let [_, (pose, _)] = poses.of_frames(frame);
+    let positions =
+        (0..VERTICES as u32).flat_map(|row| frame.position(row).unwrap_or_default().to_array());
+    positions.chain(pose_numbers(pose)).map(f32::to_bits)
+}

@@ -20,6 +20,7 @@
 
 MEMORY(start_memory, DIBS_START_SIZE(MOST_VERTICES));
 MEMORY(tree_memory, DIBS_TREE_SIZE);
+MEMORY(mirror_memory, DIBS_START_SIZE(MOST_VERTICES));
 MEMORY(sender_memory, DIBS_SENDER_SIZE);
 
 static dibs_bus *bus;
@@ -59,30 +60,30 @@ static void open_line(char *target, size_t size) {
     snprintf(target, size, "udp:127.0.0.1:%u", ntohs(here.sin_port));
 }
 
-/* Gives the bus what has come, and sends its statuses back. */
-static void receive(void) {
+/* Gives the bus what has come at `time` on its clock, and sends its statuses back. */
+static void receive(uint32_t time) {
     uint8_t packet[2048], status[DIBS_STATUS];
     struct pollfd waiting = {.fd = line, .events = POLLIN};
     size_t length = 0;
     while (poll(&waiting, 1, 1) > 0) {
         socklen_t size = sizeof peer;
         const ssize_t bytes = recvfrom(line, packet, sizeof packet, 0, (struct sockaddr *)&peer, &size);
-        EXPECT(OK, dibs_bus_packet(bus, packet, (size_t)bytes, now(), NULL));
+        EXPECT(OK, dibs_bus_packet(bus, packet, (size_t)bytes, time, NULL));
         EXPECT(OK, dibs_bus_work(bus, 10000, NULL));
     }
     EXPECT(OK, dibs_bus_work(bus, 10000, NULL));
-    EXPECT(OK, dibs_bus_status(bus, now(), 0, status, sizeof status, &length));
+    EXPECT(OK, dibs_bus_status(bus, time, 0, status, sizeof status, &length));
     if (length > 0) {
         sendto(line, status, length, 0, (struct sockaddr *)&peer, sizeof peer);
     }
 }
 
-/* Receives until the sender knows that its frame was published, for at most ten seconds. */
-static int is_acknowledged(uint32_t epoch) {
+/* Receives at `time` on the bus's clock until the sender knows that its frame was published, for at most ten seconds. */
+static int is_acknowledged(uint32_t epoch, uint32_t time) {
     const uint32_t start = now();
     while (now() - start < 10000) {
         dibs_sender_facts facts;
-        receive();
+        receive(time);
         EXPECT(OK, dibs_sender_poll(sender));
         EXPECT(OK, dibs_sender_get_facts(sender, &facts, NULL));
         if (facts.is_acknowledged && facts.acknowledged == epoch) {
@@ -103,6 +104,67 @@ static int is_published(const float *rows, uint32_t count, float error) {
         }
     }
     return 1;
+}
+
+/* The answer of a tick, as bits. */
+static void answer_of(dibs_guard *of, uint32_t time, float numbers[8]) {
+    dibs_answer answer;
+    EXPECT(OK, dibs_guard_closest(of, &tool, time, &answer));
+    const dibs_proximity *pair = &answer.searched.tracked.proximity;
+    const float found[8] = {
+        pair->separation,         pair->accuracy,           pair->point_on_surface.x,
+        pair->point_on_surface.y, pair->point_on_surface.z, pair->direction.x,
+        answer.velocity.x,        answer.searched.residual,
+    };
+    memcpy(numbers, found, sizeof found);
+}
+
+/* Frames with a pose each are on the bus as the same frames by a call. Returns how many. */
+static unsigned send_poses(dibs_tree *tree, const char *target, const unsigned char *bytes, size_t length,
+                           const dibs_guard_limits *limits, float *positions, uint32_t vertices) {
+    dibs_bus *mirror;
+    dibs_guard *mirrored;
+    dibs_sent sent;
+    char sentence[512];
+    unsigned received = 0;
+    dibs_sender_settings settings = dibs_sender_settings_of();
+    settings.quantised = 0;
+    settings.session++;
+    EXPECT(OK, dibs_sender_init(sender_memory, sizeof sender_memory, tree, target, &settings, &sender));
+    EXPECT(OK, dibs_start(start_memory, sizeof start_memory, bytes, length, limits, &bus, &guard));
+    EXPECT(OK, dibs_start(mirror_memory, sizeof mirror_memory, bytes, length, limits, &mirror, &mirrored));
+    for (uint32_t frame = 0; frame < FRAMES; frame++) {
+        const uint32_t time = 1000 + 30 * frame;
+        const float half = 0.2f + 0.01f * (float)frame;
+        const dibs_pose pose = {{0.0f, sinf(half), 0.0f, cosf(half)}, {3.0f, -2.0f, 0.5f * (float)frame}};
+        float far[8], near[8];
+        EXPECT(OK, dibs_sender_send_at(sender, positions, vertices, &pose, 4, &sent));
+        EXPECT_THAT(is_acknowledged(sent.epoch, time));
+        EXPECT(OK, dibs_bus_frame_at(mirror, positions, vertices, &pose, time - 4, time));
+        EXPECT(OK, dibs_bus_work(mirror, 10000, NULL));
+        answer_of(guard, time + 11, far);
+        answer_of(mirrored, time + 11, near);
+        received += memcmp(far, near, sizeof far) == 0;
+
+        /* Numbers that are no pose: nothing is sent. */
+        dibs_pose wrong = pose;
+        wrong.rotation[3] += 0.1f;
+        EXPECT(SENDER_FRAME, dibs_sender_send_at(sender, positions, vertices, &wrong, 0, NULL));
+        EXPECT(OK, dibs_sender_error(sender, (uint8_t *)sentence, sizeof sentence));
+        EXPECT_THAT(strstr(sentence, "is no rotation") != NULL);
+        wrong = pose;
+        wrong.shift.y = NAN;
+        EXPECT(SENDER_FRAME, dibs_sender_send_at(sender, positions, vertices, &wrong, 0, NULL));
+        EXPECT(OK, dibs_sender_error(sender, (uint8_t *)sentence, sizeof sentence));
+        EXPECT_THAT(strstr(sentence, "not finite") != NULL);
+        EXPECT(ARGUMENT, dibs_sender_send_at(sender, positions, vertices, &pose, DIBS_AGE_UNKNOWN, NULL));
+        EXPECT(NULL, dibs_sender_send_at(sender, positions, vertices, NULL, 0, NULL));
+    }
+    dibs_sender_facts facts;
+    EXPECT(OK, dibs_sender_get_facts(sender, &facts, NULL));
+    EXPECT_THAT(facts.frames == FRAMES);
+    EXPECT(OK, dibs_sender_close(sender));
+    return received;
 }
 
 int main(int argc, char **argv) {
@@ -143,7 +205,7 @@ int main(int argc, char **argv) {
         EXPECT(OK, dibs_sender_send(sender, positions, vertices, frame % 2 == 0 ? DIBS_AGE_UNKNOWN : 3, &sent));
         allocated += frame > 1 ? allocations - before : 0;
         EXPECT_THAT(sent.epoch > frame && sent.rows == rows && sent.is_partial == 0 && sent.error < 0.01f);
-        EXPECT_THAT(is_acknowledged(sent.epoch));
+        EXPECT_THAT(is_acknowledged(sent.epoch, now()));
         received += is_published(expected + 3ul * rows * frame, rows, sent.error);
 
         /* What cannot be sent leaves the receiver as it was. */
@@ -164,6 +226,7 @@ int main(int argc, char **argv) {
     EXPECT(OK, dibs_sender_close(sender));
     EXPECT(NOT_INITIALISED, dibs_sender_send(sender, frames, vertices, 0, &sent));
     EXPECT(NOT_INITIALISED, dibs_sender_close(sender));
+    printf("%u poses received\n", send_poses(tree, target, bytes, length, &limits, frames, vertices));
     free((void *)bytes);
     free(frames);
     free((void *)expected);

@@ -74,6 +74,8 @@ int main(int argc, char **argv) {
         MUST(sender.init(tree, "udp:127.0.0.1:9"));
         std::array<float, 3> few{};
         EXPECT(DIBS_CODE_SENDER_FRAME, sender.send(few));
+        EXPECT(DIBS_CODE_SENDER_FRAME, sender.send_at(few, {{0.0f, 0.0f, 0.0f, 1.0f}, {}}, 0));
+        EXPECT(DIBS_CODE_ARGUMENT, sender.send_at(few, {{0.0f, 0.0f, 0.0f, 1.0f}, {}}, DIBS_AGE_UNKNOWN));
         MUST(sender.poll());
     }
     for (std::size_t at = 0; at < packets.size(); at++) {

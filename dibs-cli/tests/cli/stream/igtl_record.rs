@@ -36,7 +36,7 @@ struct Subject {
 /// Vertices, each frame with its triangles. Leaves the tree in the folder.
 fn vertices(folder: &Path) -> Subject {
     let heart = generate::heart(10_272).unwrap();
-    heart.mesh.write(&folder.join("heart.ply"), Format::Ply).unwrap();
+    heart.mesh.write(folder.join("heart.ply"), Format::Ply).unwrap();
     run(folder, "build heart.ply -o heart.dibs");
     let contents = heart.motion.frames.iter();
     let contents = contents.map(|frame| poly_data(frame, &heart.mesh.triangles)).collect();
@@ -46,7 +46,7 @@ fn vertices(folder: &Path) -> Subject {
 /// The nodes of a lattice.
 fn nodes(folder: &Path) -> Subject {
     let mesh = generate::heart(TRIANGLES).unwrap().mesh;
-    mesh.write(&folder.join("heart.ply"), Format::Ply).unwrap();
+    mesh.write(folder.join("heart.ply"), Format::Ply).unwrap();
     let [x, y, z] = CELLS;
     run(folder, &format!("build heart.ply -o heart.dibs --nodes lattice:{x},{y},{z}"));
     let volume = Volume::lattice(&mesh, CELLS).unwrap();

@@ -5,13 +5,14 @@ use std::mem::take;
 
 use anyhow::{Result, anyhow};
 use dibs_nostd::Frames;
+use dibs_nostd::guard::{Poses, Shared};
 use dibs_nostd::wire::NoMac;
 use dibs_stream::faults::{Fault, Injector};
 use fastrand::Rng;
 use plotters::prelude::*;
 use serde::Serialize;
 
-use super::subject::{Case, Controller, Log, N, Receiver, TREE, framed, source, surface};
+use super::subject::{Case, Controller, Log, N, Receiver, TREE, framed, source};
 
 /// Frames a second.
 const RATE: u32 = 50;
@@ -68,10 +69,11 @@ pub fn smoke(seed: u64) -> Result<Vec<Row>> {
 }
 
 fn one(partial: bool, probability: f64, frames: u32, seed: u64) -> Result<Row> {
-    let buffers = Frames::<N>::new();
+    let (buffers, poses) = (Frames::<N, 3>::new(), Poses::NEW);
     let tree = TREE.tree::<u16>()?;
-    let mut controller = Controller::new(&buffers, &tree, NoMac);
-    let mut source = source(Case { quantised: true, partial }, 1, |_| NoMac);
+    let mut controller = Controller::new(&buffers, &poses, &tree, NoMac);
+    let case = Case { quantised: true, partial, posed: false };
+    let mut source = source(case, 1, |_| NoMac);
     source.challenge(0);
     let (mut injector, mut rng, mut log) =
         (Injector::new(seed), Rng::with_seed(seed), Log::default());
@@ -81,8 +83,8 @@ fn one(partial: bool, probability: f64, frames: u32, seed: u64) -> Result<Row> {
         // The status is as old as a frame.
         source.transport().inbox.push_back(controller.status());
         source.poll()?;
-        let frame = source.prepare(&surface(moment))?;
-        log.note(&source);
+        let frame = case.prepare(&mut source, moment);
+        log.note(&source, case, moment);
         bytes += frame.sent().bytes;
         source.transmit(frame)?;
         let published = controller.published();

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use dibs_nostd::Frames;
+use dibs_nostd::guard::{Poses, Shared};
 use dibs_nostd::wire::{Event, Mac, NoMac};
 use dibs_stream::faults::{Fault, Injector};
 use fastrand::Rng;
@@ -14,11 +15,14 @@ use rayon::prelude::*;
 use super::board::Board;
 use super::row::Row;
 use super::subject::{
-    Case, Controller, Log, N, Receiver, Source, TREE, framed, mac_under, noticed, source, surface,
+    Case, Controller, Log, N, Receiver, Source, TREE, framed, mac_under, noticed, source,
 };
 
 /// Number of faults for one pair of sender and receiver.
 const CHUNK: u64 = 500;
+
+/// Ways of sending: floats or quantised, whole or partial frames, with tags or without, with poses or without.
+const WAYS: u64 = 16;
 
 /// Undisturbed frames after which a receiver that publishes nothing has failed.
 const PATIENCE: u32 = 20;
@@ -37,9 +41,9 @@ impl Place<'_> {
     fn with<M: Mac>(self, mac: M, work: impl FnOnce(&mut dyn Receiver)) {
         match self {
             Self::Here => {
-                let frames = Frames::<N>::new();
+                let (frames, poses) = (Frames::<N, 3>::new(), Poses::NEW);
                 let tree = TREE.tree::<u16>().expect("16-bit indices");
-                work(&mut Controller::new(&frames, &tree, mac));
+                work(&mut Controller::new(&frames, &poses, &tree, mac));
             }
             Self::Board(program) => work(&mut Board::boot(program, &mac).expect("a board")),
         }
@@ -48,10 +52,10 @@ impl Place<'_> {
 
 /// Runs all kinds of faults.
 pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
+    // Covers every way to send, even with few faults.
     let of_one = match place {
-        Place::Here => CHUNK,
-        // Enough for every way of sending, even with few faults.
-        Place::Board(_) => per_fault.div_ceil(8),
+        Place::Here => CHUNK.min(per_fault.div_ceil(WAYS)),
+        Place::Board(_) => per_fault.div_ceil(WAYS),
     };
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} faults  {msg}")?;
     let bar = ProgressBar::new(per_fault * Fault::ALL.len() as u64).with_style(style);
@@ -79,7 +83,11 @@ pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
 
 /// Some faults of one kind, with each way of sending in turn.
 fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Row {
-    let case = Case { quantised: chunk & 1 == 0, partial: chunk & 2 == 0 };
+    let case = Case {
+        quantised: chunk & 1 == 0,
+        partial: chunk & 2 == 0,
+        posed: chunk & 8 != 0 || fault == Fault::Pose,
+    };
     // Tags would reveal sealed faults before the layers that they are meant for. So tags are only used for forgeries,
     // and in every second run of faults that are not sealed.
     let is_sealed = matches!(
@@ -90,6 +98,7 @@ fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Ro
             | Fault::NotFinite
             | Fault::TooFar
             | Fault::Stretch
+            | Fault::Pose
     );
     let seed = seed ^ (chunk << 8 | fault as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     if fault == Fault::Forgery || (!is_sealed && chunk & 4 != 0) {
@@ -178,8 +187,8 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
             }
         }
         self.moment += 1;
-        let frame = self.source.prepare(&surface(self.moment)).expect("a finite surface");
-        self.log.note(&self.source);
+        let frame = self.case.prepare(&mut self.source, self.moment);
+        self.log.note(&self.source, self.case, self.moment);
         self.source.transmit(frame).expect("a mailbox does not fail");
         take(&mut self.source.transport().sent)
     }

@@ -10,17 +10,16 @@ use std::time::Duration;
 
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::format::CRC;
-use dibs_nostd::glam::Vec3;
+use dibs_nostd::glam::{Quat, Vec3};
+use dibs_nostd::guard::Poses;
 use dibs_nostd::wire::{
     AesCmac, Counters, Deframer, Event, Mac, encode_status, enframe, framed_bytes,
 };
-use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, Millis, StretchMonitor, Tree, VertexTable,
-};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, RigidPose, Tree};
 use dibs_stream::transport::Transport;
-use dibs_stream::{Sender, Settings, SurfaceOrder};
+use dibs_stream::{Prepared, Sender, Settings, SurfaceOrder};
 pub use probe::bus::MTU;
-use probe::bus::{KEY, RECEIVER, VERTICES, WORK};
+use probe::bus::{KEY, PoseCheck, RECEIVER, VERTICES, WORK, pose_numbers, published_words};
 
 /// Rings of vertices between the poles, and vertices of a ring.
 const RINGS: usize = 8;
@@ -72,11 +71,33 @@ pub fn surface(moment: u32) -> Vec<Vec3> {
 /// Time between two frames, in ms.
 pub const FRAME_MS: u32 = 40;
 
+/// The surface's pose at a moment: it sways, so that no two poses are far apart.
+pub fn pose(moment: u32) -> RigidPose {
+    let sway = |period: f32| (moment as f32 / period).sin();
+    let turn = Quat::from_scaled_axis(Vec3::new(0.05 * sway(3.0), 0.0, 0.08 * sway(2.0)));
+    let shift = Vec3::new(4.0 * sway(5.0), -2.0, 3.0 * sway(1.0));
+    RigidPose::new(turn.normalize(), shift).expect("a rotation")
+}
+
 /// A way of sending.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub quantised: bool,
     pub partial: bool,
+    pub posed: bool,
+}
+
+impl Case {
+    /// Makes the frame of a moment.
+    pub fn prepare<M: Mac>(self, source: &mut Source<M>, moment: u32) -> Prepared {
+        let surface = surface(moment);
+        let frame = if self.posed {
+            source.prepare_at(&surface, pose(moment), Duration::ZERO)
+        } else {
+            source.prepare(&surface)
+        };
+        frame.expect("a finite surface")
+    }
 }
 
 /// A sender's transport: the sent packets, and packets to be received.
@@ -121,19 +142,21 @@ pub fn source<M: Mac>(
         .with_clock(now)
 }
 
-/// The completely sent frames, each as the receiver must have it.
+/// The completely sent frames, each as the receiver must have it: its number, and its words, the pose's last.
 #[derive(Default)]
-pub struct Log(VecDeque<(u32, Vec<[u32; 3]>)>);
+pub struct Log(VecDeque<(u32, Vec<u32>)>);
 
 /// More frames than any fault may refer back to.
 const REMEMBERED: usize = 64;
 
 impl Log {
-    /// Records the frame that the sender has prepared last.
-    pub fn note<M: Mac>(&mut self, source: &Source<M>) {
+    /// Notes the frame of a moment, which the sender has prepared last.
+    pub fn note<M: Mac>(&mut self, source: &Source<M>, case: Case, moment: u32) {
         if let Some((epoch, positions)) = source.held() {
-            let bits = positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
-            self.0.push_back((epoch, bits));
+            let positions = positions.iter().flat_map(Vec3::to_array);
+            let pose = if case.posed { pose(moment) } else { RigidPose::IDENTITY };
+            let words = positions.chain(pose_numbers(pose)).map(f32::to_bits);
+            self.0.push_back((epoch, words.collect()));
         }
         if self.0.len() > REMEMBERED {
             self.0.pop_front();
@@ -145,24 +168,19 @@ impl Log {
         self.0.pop_back();
     }
 
-    /// Whether a frame with this epoch and exactly these positions was sent.
-    fn has(&self, epoch: u32, positions: &impl VertexTable) -> bool {
-        let is_equal = |bits: &[[u32; 3]]| {
-            (0..).zip(bits).all(|(row, bits)| {
-                positions.position(row).is_some_and(|p| p.to_array().map(f32::to_bits) == *bits)
-            })
-        };
-        self.0.iter().rev().any(|(number, bits)| *number == epoch && is_equal(bits))
+    /// Whether a frame with this epoch and exactly these words was sent.
+    fn has(&self, epoch: u32, words: &[u32]) -> bool {
+        self.0.iter().rev().any(|(number, sent)| *number == epoch && sent == words)
     }
 
-    /// The same, by the CRC-32 of the positions.
+    /// The same, by the words' CRC-32.
     pub fn has_digest(&self, epoch: u32, digest: u32) -> bool {
-        let of = |bits: &[[u32; 3]]| {
+        let of = |words: &[u32]| {
             let mut crc = CRC.digest();
-            bits.as_flattened().iter().for_each(|word| crc.update(&word.to_le_bytes()));
+            words.iter().for_each(|word| crc.update(&word.to_le_bytes()));
             crc.finalize()
         };
-        self.0.iter().rev().any(|(number, bits)| *number == epoch && of(bits) == digest)
+        self.0.iter().rev().any(|(number, words)| *number == epoch && of(words) == digest)
     }
 }
 
@@ -188,8 +206,9 @@ pub trait Receiver {
 /// The receiver on the host: the work of the bus interrupt, and a check of the frames that the control tick would read.
 pub struct Controller<'f, M> {
     deframer: Deframer<MTU>,
-    assembler: Assembler<'f, StretchMonitor<'f, u16>, M>,
+    assembler: Assembler<'f, PoseCheck<'f, 'f>, M>,
     reader: FrameReader<'f>,
+    poses: &'f Poses,
     published: u32,
     wrong: u64,
     /// Time in ms, which advances with each status.
@@ -197,11 +216,16 @@ pub struct Controller<'f, M> {
 }
 
 impl<'f, M: Mac> Controller<'f, M> {
-    pub fn new(frames: &'f Frames<N>, tree: &'f Tree<'f, u16>, mac: M) -> Self {
+    pub fn new(
+        frames: &'f Frames<N, 3>,
+        poses: &'f Poses,
+        tree: &'f Tree<'f, u16>,
+        mac: M,
+    ) -> Self {
         let (writer, reader) = frames.split().expect("new frames");
-        let monitor = StretchMonitor::new(tree).expect("a tree with a metric");
-        let assembler = Assembler::with_mac(writer, monitor, tree.mesh_id(), LIMIT, mac);
-        Self { deframer: Deframer::new(), assembler, reader, published: 0, wrong: 0, now: 0 }
+        let gate = probe::bus::gate(tree, poses).expect("a tree with a metric");
+        let assembler = Assembler::with_mac(writer, gate, tree.mesh_id(), LIMIT, mac);
+        Self { deframer: Deframer::new(), assembler, reader, poses, published: 0, wrong: 0, now: 0 }
     }
 
     /// Checks and publishes in slices, and compares the published frame with the sent one.
@@ -213,7 +237,8 @@ impl<'f, M: Mac> Controller<'f, M> {
                     self.published += 1;
                     let frame = self.reader.read();
                     let is_right = frame.is_some_and(|frame| {
-                        frame.label().epoch == epoch && log.has(epoch, &frame)
+                        let words: Vec<u32> = published_words(&frame, self.poses).collect();
+                        frame.label().epoch == epoch && log.has(epoch, &words)
                     });
                     self.wrong += u64::from(!is_right);
                 }

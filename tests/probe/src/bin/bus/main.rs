@@ -3,7 +3,7 @@
 //! Reads from `script.bin` four words and a tree of [`VERTICES`] vertices. The words are: 1 for packets with tags, else
 //! 0; the challenge; the bits of the largest coordinate; the tree's length. Whenever no byte waits and no work is due,
 //! it reports, as one COBS frame: the bytes received, the frames published, the epoch of the last, the CRC-32 of its
-//! positions in memory (a word each), and a status packet with every counter.
+//! positions in memory and its pose (a word each), and a status packet with every counter.
 //!
 //! This program polls UART 0; the firmware, which the demo runs, receives by interrupt.
 #![no_std]
@@ -20,14 +20,16 @@ use core::ptr::{read_volatile, with_exposed_provenance_mut, write_volatile};
 
 use cortex_m_rt::entry;
 use dibs_nostd::format::CRC;
+use dibs_nostd::guard::{Poses, Shared};
 use dibs_nostd::wire::{AesCmac, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
-use dibs_nostd::{
-    Advance, Assembler, FrameReader, FrameWriter, Frames, Millis, StretchMonitor, Tree, VertexTable,
-};
+use dibs_nostd::{Advance, Assembler, FrameReader, FrameWriter, Frames, Millis, Tree};
 use exit::exit;
-use probe::bus::{HEAD_BYTES, KEY, MTU, RECEIVER, REPORT_MTU, VERTICES, WORK};
+use probe::bus::{
+    HEAD_BYTES, KEY, MTU, PoseCheck, RECEIVER, REPORT_MTU, VERTICES, WORK, gate, published_words,
+};
 
-static FRAMES: Frames<VERTICES> = Frames::new();
+static FRAMES: Frames<VERTICES, 3> = Frames::new();
+static POSES: Poses = Poses::NEW;
 
 #[entry]
 fn main() -> ! {
@@ -58,7 +60,7 @@ fn run(bytes: &mut [u8]) -> Option<()> {
 struct Receiver<'t, M> {
     mesh_id: u32,
     deframer: Deframer<MTU>,
-    assembler: Assembler<'static, StretchMonitor<'t, u16>, M>,
+    assembler: Assembler<'static, PoseCheck<'static, 't>, M>,
     reader: FrameReader<'static>,
     received: u32,
     published: u32,
@@ -74,11 +76,8 @@ impl<'t, M: Mac> Receiver<'t, M> {
         limit: f32,
         mac: M,
     ) -> Option<Self> {
-        let monitor = StretchMonitor::new(tree)
-            .ok()?
-            .limits(dibs_nostd::SurfaceLimits::reach_mm(1e3).speed(1e3));
         let mesh_id = tree.mesh_id();
-        let assembler = Assembler::with_mac(writer, monitor, mesh_id, limit, mac);
+        let assembler = Assembler::with_mac(writer, gate(tree, &POSES)?, mesh_id, limit, mac);
         let deframer = Deframer::new();
         let [received, published, epoch, digest] = [0; 4];
         Some(Self { mesh_id, deframer, assembler, reader, received, published, epoch, digest })
@@ -120,11 +119,8 @@ impl<'t, M: Mac> Receiver<'t, M> {
                 // Reads the frame as a control tick would.
                 if let Some(frame) = self.reader.read() {
                     let mut digest = CRC.digest();
-                    for row in 0..VERTICES as u32 {
-                        let position = frame.position(row).unwrap_or_default();
-                        for coordinate in position.to_array() {
-                            digest.update(&coordinate.to_bits().to_le_bytes());
-                        }
+                    for word in published_words(&frame, &POSES) {
+                        digest.update(&word.to_le_bytes());
                     }
                     (self.epoch, self.digest) = (frame.label().epoch, digest.finalize());
                 }
