@@ -15,7 +15,7 @@ const MOMENT: Duration = Duration::from_secs(20);
 const DOWNLOAD: Duration = Duration::from_secs(300);
 
 /// The fuzz targets in `tests/fuzz/`.
-pub const TARGETS: [&str; 4] = ["tree", "packets", "mesh", "query"];
+pub const TARGETS: [&str; 5] = ["tree", "packets", "poses", "mesh", "query"];
 
 /// A target that runs only if it is requested by name: its readers take long to compile.
 const FORMATS: &str = "formats";

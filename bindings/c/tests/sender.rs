@@ -14,8 +14,8 @@ use crate::programs::{include, library, run, tool};
 
 /// The mesh's file has its vertices in another order than the tree's rows, and one that no triangle has. All frames arrive in
 /// the tree's order. From the third frame on the sending thread allocates nothing. A frame of another length, or with NaN, is
-/// refused with a sentence. With a pose each they are answered as by
-/// a call, bit for bit, and numbers that are no pose are refused, too.
+/// refused with a sentence. Frames with a pose are answered as by a call, bit for bit, and numbers that are no pose are
+/// refused.
 #[test]
 fn frames_go_from_c_to_a_bus() {
     let folder = tempfile::tempdir().expect("a folder");

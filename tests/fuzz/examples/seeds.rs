@@ -5,8 +5,10 @@ use std::path::Path;
 
 use dibs_build::{Builder, IndexWidth, Mesh, generate};
 use dibs_nostd::format::field::RADIUS_UNIT;
-use dibs_nostd::glam::Vec3;
-use dibs_tests::bus::frame;
+use dibs_nostd::RigidPose;
+use dibs_nostd::glam::{Quat, Vec3};
+use dibs_nostd::wire::{FrameEncoder, FrameId};
+use dibs_tests::bus::{collect, encoding, frame};
 
 fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
@@ -36,6 +38,31 @@ fn main() {
             input.extend(packet);
         }
         write("packets", if quantised { "quantised" } else { "float" }, &input);
+    }
+    // Frames with a pose each: whole ones, and one that changes a part of the second.
+    let posed = Builder::new().stretch(1.5).build(&heart).expect("a valid mesh");
+    for quantised in [false, true] {
+        let (mut input, mut held) = (Vec::new(), Vec::new());
+        for epoch in 1..=3 {
+            let mut rows = posed.to_rows(&heart.positions);
+            rows[epoch as usize] *= 1.001;
+            let id = FrameId { mesh_id: posed.summary().mesh_id, session: 1, epoch };
+            let (turn, shift) = (Quat::from_rotation_z(0.1 * epoch as f32), Vec3::Z * epoch as f32);
+            let pose = RigidPose::new(turn, shift).expect("a rotation");
+            let (now, encoding) = (rows.clone(), encoding(quantised, &rows));
+            let frame = if epoch < 3 {
+                FrameEncoder::<_, 250>::new(id, encoding, &now[..])
+            } else {
+                FrameEncoder::partial(id, encoding, &now[..], epoch - 1, &held[..])
+            };
+            let frame = frame.and_then(|frame| frame.with_pose(pose)).expect("few packets");
+            for packet in collect(frame) {
+                input.push(packet.len() as u8);
+                input.extend(packet);
+            }
+            held = rows;
+        }
+        write("poses", if quantised { "quantised" } else { "float" }, &input);
     }
     let obj = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
     let off = "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";

@@ -17,6 +17,7 @@ pub const CHECK: Check = Check {
         note("fuzz.seconds"),
         note("fuzz.tree.inputs"),
         note("fuzz.packets.inputs"),
+        note("fuzz.poses.inputs"),
         note("fuzz.mesh.inputs"),
         note("fuzz.query.inputs"),
         Promise {
@@ -24,8 +25,8 @@ pub const CHECK: Check = Check {
             says: "No input makes the readers of trees, packets and meshes, or a query, panic or hang",
             criterion: EDGES,
             bound: Bound::Is(0.0),
-            unit: "findings in {fuzz.tree.inputs} trees, {fuzz.packets.inputs} rows of packets, {fuzz.mesh.inputs} \
-         mesh files and {fuzz.query.inputs} queries, {fuzz.seconds} s each",
+            unit: "findings in {fuzz.tree.inputs} trees, {fuzz.packets.inputs} rows of packets, {fuzz.poses.inputs} of \
+         packets with poses, {fuzz.mesh.inputs} mesh files and {fuzz.query.inputs} queries, {fuzz.seconds} s each",
             limits: "Nightly compiler; skipped without one.",
         },
     ],
