@@ -3,7 +3,10 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-use crate::{Builder, BuiltTree, Mesh, ReadOptions, RestSurface, Unit, read_labels, read_limits};
+use crate::{
+    Builder, BuiltTree, Mesh, ReadOptions, RestSurface, Unit, check_winding, crossing_parts,
+    orient, read_labels, read_limits,
+};
 
 /// Starts the tree of a build script, from a mesh file or a [`Mesh`]; [`TreeScript::emit`] builds it.
 ///
@@ -19,6 +22,7 @@ pub fn tree(mesh: impl Into<MeshSource>) -> TreeScript {
     TreeScript {
         mesh: mesh.into(),
         reading: ReadOptions::default(),
+        orients: false,
         limits: None,
         labels: None,
         #[cfg(feature = "modes")]
@@ -61,6 +65,7 @@ impl From<Mesh> for MeshSource {
 pub struct TreeScript {
     mesh: MeshSource,
     reading: ReadOptions,
+    orients: bool,
     limits: Option<PathBuf>,
     labels: Option<PathBuf>,
     #[cfg(feature = "modes")]
@@ -107,6 +112,13 @@ impl TreeScript {
     /// ```
     pub fn unit(mut self, unit: Unit) -> Self {
         self.reading.unit = Some(unit);
+        self
+    }
+
+    /// Flips triangles until the surface faces outwards, as [`orient`](crate::orient()) does: of a mesh that faces inwards,
+    /// inside and outside are exchanged.
+    pub fn orient(mut self) -> Self {
+        self.orients = true;
         self
     }
 
@@ -175,13 +187,22 @@ impl TreeScript {
             MeshSource::File(path) => {
                 let mut import = self.reading.read(path)?;
                 warn(label, import.report.warnings());
+                if self.orients {
+                    orient(&mut import.mesh).map_err(|error| format!("{label}: {error}"))?;
+                }
                 if let Some(groups) = import.groups.take() {
                     builder = builder.labels(groups.labels);
                 }
                 Box::new(import)
             }
-            MeshSource::Mesh(mesh) => Box::new(mesh),
+            MeshSource::Mesh(mut mesh) => {
+                if self.orients {
+                    orient(&mut mesh).map_err(|error| format!("{label}: {error}"))?;
+                }
+                Box::new(mesh)
+            }
         };
+        warn(label, remarks(surface.mesh()));
         let builder = match &self.limits {
             Some(path) => {
                 let limits = match builder.volume() {
@@ -208,6 +229,12 @@ impl TreeScript {
         }
         Ok(built)
     }
+}
+
+/// What is unusual in a mesh, as `dibs build` warns of it.
+fn remarks(mesh: &Mesh) -> impl Iterator<Item = String> + use<> {
+    let winding = check_winding(mesh).err().map(|error| error.to_string());
+    winding.into_iter().chain(crossing_parts(mesh).into_iter().map(|parts| parts.to_string()))
 }
 
 fn warn(label: &str, warnings: impl Iterator<Item = String>) {
@@ -239,6 +266,27 @@ mod tests {
             .collect();
         labels.sort_unstable();
         labels
+    }
+
+    #[test]
+    fn a_mesh_that_faces_inwards_is_warned_of_and_turned() {
+        let mut mesh = crate::generate::heart(320).unwrap().mesh;
+        assert_eq!(remarks(&mesh).count(), 0);
+        for corners in &mut mesh.triangles {
+            corners.swap(0, 1);
+        }
+        let warned: Vec<String> = remarks(&mesh).collect();
+        assert!(matches!(&warned[..], [one] if one.contains("faces inwards")), "{warned:?}");
+        let side = |script: TreeScript| {
+            let built = script.build("heart").unwrap();
+            let tree = built.tree::<u16>().unwrap();
+            let rest: Vec<_> = (0..).map_while(|row| tree.rest_position(row)).collect();
+            let mut query = dibs_nostd::Query::<u16, 64>::new(&tree).unwrap();
+            let far = dibs_nostd::Sphere::new(glam::Vec3::new(200.0, 0.0, 0.0), 1.0).unwrap();
+            query.closest(rest.as_slice(), &far, &dibs_nostd::Options::new()).unwrap().side
+        };
+        assert_eq!(side(tree(mesh.clone())), dibs_nostd::Side::Inside);
+        assert_eq!(side(tree(mesh).orient()), dibs_nostd::Side::Outside);
     }
 
     #[test]
