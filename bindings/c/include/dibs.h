@@ -2619,7 +2619,7 @@ dibs_code dibs_guard_closest(dibs_guard *guard,
  * the same budget. Each has the velocity of the surface there, so `dibs_contacts_set_velocities` is not needed.
  *
  * Call it instead of `dibs_guard_closest`. Act on the list only if the answer's outcome is `DIBS_CODE_OK`, and in a
- * constraint only up to the list's bound. Its accuracy covers the same errors as the pair's.
+ * constraint only up to the list's bound. The list's accuracy includes the surface's error and age.
  *
  * Cost: that of `dibs_guard_closest`, and some hundred instructions a contact.
  *
@@ -3032,8 +3032,8 @@ dibs_code dibs_sender_send_at(dibs_sender *sender,
                               dibs_sent *sent);
 
 /**
- * Sends a heartbeat if one is due, and takes the statuses that have come. Does not wait. Call it a few times between two
- * heartbeats: without it the controller takes the link for lost, and no transit time is measured.
+ * Sends a heartbeat if one is due, and receives the statuses that have arrived. Does not wait. Call it a few times
+ * between two heartbeats: otherwise the controller considers the link lost, and no transit time is measured.
  *
  * @return As `dibs_sender_send`.
  */

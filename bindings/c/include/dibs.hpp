@@ -217,7 +217,7 @@ struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
         return dibs_sender_send(*this, positions.data(), uint32_t(positions.size() / 3), age, sent);
     }
     /** The same, with the mesh as a whole at a pose. */
-    Code send_at(std::span<const float> positions, const dibs_pose &pose, uint32_t age, dibs_sent *sent = nullptr) {
+    Code send_at(Span<const float> positions, const dibs_pose &pose, uint32_t age, dibs_sent *sent = nullptr) {
         return dibs_sender_send_at(*this, positions.data(), uint32_t(positions.size() / 3), &pose, age, sent);
     }
     Code poll() { return dibs_sender_poll(*this); }
