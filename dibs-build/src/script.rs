@@ -115,8 +115,8 @@ impl TreeScript {
         self
     }
 
-    /// Flips triangles until the surface faces outwards, as [`orient`](crate::orient()) does: of a mesh that faces inwards,
-    /// inside and outside are exchanged.
+    /// Flips triangles until the surface faces outwards, as [`orient`](crate::orient()) does. Without it, inside and outside
+    /// of a mesh that faces inwards are exchanged.
     pub fn orient(mut self) -> Self {
         self.orients = true;
         self

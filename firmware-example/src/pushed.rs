@@ -17,7 +17,7 @@ use crate::surface::{CENTRE, REACH};
 use crate::telemetry::Push;
 use crate::{PERIOD, STIFFNESS};
 
-/// Limits of the wall: the largest energy (mJ) that it returns to the hand, and the largest step of its force (N) from
+/// Limits of the wall: the largest energy (mJ) that it gives to the hand, and the largest step of its force (N) from
 /// tick to tick.
 const ACCOUNT: EnergyAccount = match EnergyAccount::new(1.0, 0.5, STIFFNESS) {
     Ok(account) => account,

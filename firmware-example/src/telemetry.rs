@@ -221,7 +221,7 @@ pub struct Push {
     pub queries: u32,
     /// With a filter: instructions of these queries, by the cost model.
     pub instructions: u32,
-    /// The energy that the wall may still return to the hand, in mJ.
+    /// The energy that the wall may still give to the hand, in mJ.
     pub balance: f32,
 }
 

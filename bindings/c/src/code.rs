@@ -38,7 +38,7 @@ pub enum dibs_code {
     TreeMagic = 101,
     /// The tree is of another format version: build it again.
     TreeVersion = 102,
-    /// The tree has 32-bit indices: more than 65,536 vertices.
+    /// The tree's indices have another width than the library's: 16 bits, or 32 with the feature `large`.
     TreeWidth = 103,
     /// The tree's bytes changed since they were written.
     TreeChecksum = 104,
@@ -108,9 +108,9 @@ pub enum dibs_code {
     NoPose = 317,
     /// The packet's checksum does not match, or it is too short for one.
     PacketDamaged = 400,
-    /// The packet's checksum is right, but its form is not.
+    /// The packet is of another version of the protocol.
     PacketVersion = 401,
-    /// The packet's checksum is right and its form is not.
+    /// The packet's checksum is right, but its form is not.
     PacketForm = 402,
     /// The packet is of another mesh.
     PacketMesh = 403,
@@ -301,7 +301,7 @@ impl dibs_code {
             Self::TreeLength => c"the tree's bytes are cut short",
             Self::TreeMagic => c"the bytes are no tree",
             Self::TreeVersion => c"the tree is of another format version",
-            Self::TreeWidth => c"the tree has 32-bit indices",
+            Self::TreeWidth => c"the tree's indices have another width than the library's",
             Self::TreeChecksum => c"the tree's checksum does not match",
             Self::TreeForm => c"the tree is not well formed",
             Self::TreeCorrupt => c"the tree's bytes changed since they were validated",
@@ -346,7 +346,7 @@ impl dibs_code {
             Self::PacketBase => c"the frame changes another one than that published",
             Self::PacketNotReady => c"rows came before the published frame was copied that far",
             Self::PacketRows => c"the frame's rows are not those of this surface",
-            Self::PacketEncoding => c"the frame's content or encoding is not received here",
+            Self::PacketEncoding => c"the frame's content or encoding is not accepted",
             Self::PacketOrder => c"the packet's place does not fit the others",
             Self::PacketNotFinite => c"a coordinate in the packet is not finite",
             Self::PacketTooFar => c"a coordinate in the packet is beyond the reach",

@@ -112,7 +112,7 @@ pub enum dibs_side {
     NoAdjacency = 4,
     /// No side: the closest point is on an open boundary of the surface.
     OpenBoundary = 5,
-    /// No side: distances to both sides differ by less than the accuracy.
+    /// No side: the axis is closer to the surface, or to a tie between its features, than the accuracy resolves.
     BelowAccuracy = 6,
     /// No side: the triangles at the closest point have no clear normal.
     Degenerate = 7,

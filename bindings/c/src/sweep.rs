@@ -10,7 +10,7 @@ use crate::tool::dibs_tool;
 use crate::tracker::dibs_tracker;
 
 /// The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices
-/// each move straight and evenly.
+/// each move linearly.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
 pub struct dibs_sweep {
@@ -23,14 +23,14 @@ pub struct dibs_sweep {
     pub share: [f32; 2],
     /// In mm, not negative.
     pub margin: f32,
-    /// The most queries; 1 at least is made. An answer within few is the rule.
+    /// Largest number of queries; at least 1 is made, which is usually enough.
     pub samples: u32,
 }
 
-/// The result of a sweep. Times count in sweeps: 0 is its start, 1 its end.
+/// The result of a sweep. Times are fractions of the sweep: 0 is its start, 1 its end.
 #[repr(C)]
 pub struct dibs_swept {
-    /// Before this time they are certainly not closer than the margin; 1 or more: at no time.
+    /// Before this time they are certainly not closer than the margin; 1 or more: during the whole sweep.
     pub clear_until: f32,
     /// The first time at which they were found within the margin, or farther by no more than the accuracy; -1 for none.
     /// With none and `clear_until` below 1 the samples were too few to decide.

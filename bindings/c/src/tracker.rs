@@ -360,7 +360,8 @@ pub extern "C" fn dibs_tracker_closest_on(
 /// Fills the list with all locally closest pairs with a separation of at most `margin`, deepest first: the list of
 /// `dibs_query_contacts`.
 ///
-/// Cost: that of `dibs_tracker_closest`, and and within the margin of the surface a range search without the last tick.
+/// Cost: that of `dibs_tracker_closest`, and, if the surface is within the margin, of a range search
+/// without memory of the last tick.
 ///
 /// @param tracker   The tracker.
 /// @param tool      The tool.

@@ -102,7 +102,8 @@ fn a_large_tree_is_answered_by_the_library_for_large_trees() {
         println!("skipped: on request, `cargo xtask test --whole`");
         return;
     }
-    let [said, expected] = first_answer::<u32>(&shuffled(140_000), &library_with("large"));
+    let library = library_with("large");
+    let [said, expected] = first_answer::<u32>(&shuffled(140_000), &library);
     assert_eq!(said, expected);
 }
 

@@ -15,7 +15,7 @@ struct Line {
     /// The least separation during the admitted motion (mm).
     least_separation: Option<f32>,
     reason: Option<String>,
-    /// The energy that the wall may still return to the hand (mJ).
+    /// The energy that the wall may still give to the hand (mJ).
     energy: Option<f32>,
 }
 

@@ -74,6 +74,7 @@ pub const WORDS: &[Row] = &[
     ("host", "", "the controller on this computer", "demo"),
     ("c", "", "the controller in C", "demo"),
     ("serial", "", "a serial line for the bus", "demo"),
+    ("bridge", "", "frames from OpenIGTLink", "demo"),
     ("faults", "", "faults on the bus", "demo"),
     ("seed", "SEED", "the faults' seed", "demo"),
 ];

@@ -232,7 +232,7 @@ impl fmt::Display for ReceiveError {
                 write!(f, "{count} rows from {first} are outside the surface")
             }
             Self::Order { sequence } => {
-                write!(f, "the rows of packet {sequence} are out of order")
+                write!(f, "packet {sequence} is out of order in its frame")
             }
             Self::Gaps { sequence } => {
                 write!(f, "packet {sequence} of the frame leaves too many gaps")

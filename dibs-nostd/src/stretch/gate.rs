@@ -155,8 +155,8 @@ pub trait Gate {
     /// Checks at most `work` rows and triangles that have arrived. Admission before the frame is complete has no
     /// effect.
     ///
+    /// # Errors
     /// [`StretchError`] if the surface must not be published; it names the triangle or vertex.
-    /// [`StretchError`] when the surface must not be published; it names the triangle or vertex.
     fn advance<V: VertexTable + ?Sized>(
         &mut self,
         arriving: IncomingSurface<'_, V>,

@@ -153,7 +153,6 @@ impl core::error::Error for StretchError {}
 /// # Errors
 /// [`StretchError::Exceeded`] for the first triangle beyond its limit; other errors give the cause of a missing
 /// measurement.
-/// measurement.
 pub fn measure_stretch<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,

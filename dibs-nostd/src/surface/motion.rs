@@ -62,7 +62,7 @@ pub struct MotionReading {
     prediction: Prediction,
 }
 
-/// Readings are equal whatever their predictions.
+/// Equality ignores the prediction.
 impl PartialEq for MotionReading {
     fn eq(&self, other: &Self) -> bool {
         let reading = |motion: &Self| (motion.tree, motion.run, motion.reading, motion.aside);

@@ -75,7 +75,6 @@ impl defmt::Format for Wrench {
 ///
 /// Cost: about 30 f32 operations per step for each contact within the margin; at most 32 steps, usually about one per
 /// contact.
-/// are contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Proxy {

@@ -137,11 +137,11 @@ impl Filter {
 
 impl<const LABELS: usize> Filter<LABELS> {
     /// The same with a stand-off (mm, at least the filter's) from the triangles of each of these
-    /// [labels](crate::Tree::label): 3 from a vessel where 1 is enough elsewhere. Every tool keeps the filter's stand-off from the whole
-    /// surface. A nearer label with a smaller one hides none that is farther with a larger one.
+    /// [labels](crate::Tree::label): 3 from a vessel where 1 is enough elsewhere. Every tool keeps the filter's stand-off
+    /// from the whole surface. A nearer label with a smaller stand-off does not hide a farther one with a larger.
     ///
-    /// Each that is larger than the filter's counts as a further pair of every tool and surface. It takes a search of the
-    /// label's triangles near the tool, wherever the surface is near enough for the label to matter.
+    /// Each stand-off that is larger than the filter's counts as a further pair of every tool and surface, and takes a
+    /// search of the label's triangles near the tool, wherever the surface is near enough for the label to matter.
     ///
     /// ```
     /// # use dibs_nostd::filter::Filter;

@@ -1,8 +1,8 @@
 //! A part of the surface that tools must stay farther from than from the rest: the triangles of a label.
 //!
-//! It is one more surface for each tool, which is as much thicker there. A nearer label with less of a stand-off does not hide
-//! it, because only its own triangles are searched. Where the tool is not certainly outside of the whole surface, that
-//! is what keeps it out; a part has no side of its own.
+//! It is one more surface for each tool, thickened by the difference of the stand-offs. A nearer label with a smaller
+//! stand-off does not hide it, because only its own triangles are searched. Where the tool is not certainly outside of
+//! the whole surface, the whole surface's own stand-off keeps the tool out; a part has no side of its own.
 
 use super::Filter;
 
