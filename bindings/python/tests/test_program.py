@@ -118,13 +118,17 @@ class Program(WithProgram):
         scope = {}
         exec(compile(first, "README.md", "exec"), scope)
         answers, heart = scope["answers"], scope["heart"]
-        # Of the vertices alone: each is a point of the surface, and no point is farther from one than an edge.
+        # Of the vertices alone: each is a point of the surface, and no point is farther from one than the longest edge.
+        moved = 1.1 * heart.vertices
+        edges = moved[heart.triangles] - moved[np.roll(heart.triangles, 1, axis=1)]
+        longest = np.linalg.norm(edges, axis=2).max()
         for answer, (*axis, radius) in zip(answers, scope["capsules"]):
+            self.assertEqual(answer["side"], dibs.Side.OUTSIDE)
             start, end = np.reshape(axis, (2, 3))
-            share = np.clip((1.1 * heart.vertices - start) @ (end - start) / np.sum((end - start) ** 2), 0, 1)
-            nearest = np.linalg.norm(1.1 * heart.vertices - start - share[:, None] * (end - start), axis=1).min() - radius
+            share = np.clip((moved - start) @ (end - start) / np.sum((end - start) ** 2), 0, 1)
+            nearest = np.linalg.norm(moved - start - share[:, None] * (end - start), axis=1).min() - radius
             self.assertLessEqual(answer["interval"][0], nearest)
-            self.assertLess(nearest - answer["separation"], 3.0)
+            self.assertLess(nearest - answer["separation"], longest)
         fields = re.findall(r"^\| (`.*?) \|", page, re.MULTILINE)
         named = {name for row in fields[:9] for name in re.findall(r"`(\w+)`", row)}
         self.assertEqual(named, set(dibs.ANSWER.names))
