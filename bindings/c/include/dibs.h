@@ -293,7 +293,7 @@ enum dibs_code
    */
   DIBS_CODE_TREE_VERSION = 102,
   /**
-   * The tree has 32-bit indices: more than 65,536 vertices.
+   * The tree's indices have another width than the library's: 16 bits, or 32 with the feature `large`.
    */
   DIBS_CODE_TREE_WIDTH = 103,
   /**
@@ -433,11 +433,11 @@ enum dibs_code
    */
   DIBS_CODE_PACKET_DAMAGED = 400,
   /**
-   * The packet's checksum is right, but its form is not.
+   * The packet is of another version of the protocol.
    */
   DIBS_CODE_PACKET_VERSION = 401,
   /**
-   * The packet's checksum is right and its form is not.
+   * The packet's checksum is right, but its form is not.
    */
   DIBS_CODE_PACKET_FORM = 402,
   /**
@@ -758,7 +758,7 @@ enum dibs_side
    */
   DIBS_SIDE_OPEN_BOUNDARY = 5,
   /**
-   * No side: distances to both sides differ by less than the accuracy.
+   * No side: the axis is closer to the surface, or to a tie between its features, than the accuracy resolves.
    */
   DIBS_SIDE_BELOW_ACCURACY = 6,
   /**
@@ -1975,7 +1975,7 @@ typedef struct {
 
 /**
  * The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices
- * each move straight and evenly.
+ * each move linearly.
  */
 typedef struct {
   /**
@@ -1996,17 +1996,17 @@ typedef struct {
    */
   float margin;
   /**
-   * The most queries; 1 at least is made. An answer within few is the rule.
+   * Largest number of queries; at least 1 is made, which is usually enough.
    */
   uint32_t samples;
 } dibs_sweep;
 
 /**
- * The result of a sweep. Times count in sweeps: 0 is its start, 1 its end.
+ * The result of a sweep. Times are fractions of the sweep: 0 is its start, 1 its end.
  */
 typedef struct {
   /**
-   * Before this time they are certainly not closer than the margin; 1 or more: at no time.
+   * Before this time they are certainly not closer than the margin; 1 or more: during the whole sweep.
    */
   float clear_until;
   /**
@@ -3167,7 +3167,8 @@ dibs_code dibs_tracker_closest_on(dibs_tracker *tracker,
  * Fills the list with all locally closest pairs with a separation of at most `margin`, deepest first: the list of
  * `dibs_query_contacts`.
  *
- * Cost: that of `dibs_tracker_closest`, and and within the margin of the surface a range search without the last tick.
+ * Cost: that of `dibs_tracker_closest`, and, if the surface is within the margin, of a range search
+ * without memory of the last tick.
  *
  * @param tracker   The tracker.
  * @param tool      The tool.
