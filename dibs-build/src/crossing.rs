@@ -16,7 +16,7 @@ const FLAT: f64 = 1e-12;
 
 /// Two parts that share no vertex, and cross or touch at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CrossingParts {
+pub(crate) struct CrossingParts {
     /// A triangle of one part.
     pub triangle: usize,
     /// A triangle of the other part that it meets.
@@ -38,7 +38,7 @@ impl fmt::Display for CrossingParts {
 /// Cost: linear in the triangles. Triangles of two parts whose boxes overlap are sorted along one axis and compared, up
 /// to four million pairs. A mesh with more parts than a tree has roots is not checked.
 #[must_use]
-pub fn crossing_parts(mesh: &Mesh) -> Vec<CrossingParts> {
+pub(crate) fn crossing_parts(mesh: &Mesh) -> Vec<CrossingParts> {
     let parts = connected_by_vertices(&mesh.triangles);
     if parts.len() > MAX_ROOTS as usize {
         return Vec::new();

@@ -45,7 +45,6 @@ mod write;
 pub use array::{BuiltTree, ModesSummary, Summary, VolumeSummary, summarise};
 pub use builder::{Builder, IndexWidth};
 pub use construct::Construction;
-pub use crossing::{CrossingParts, crossing_parts};
 pub use error::BuildError;
 pub use frames::{FrameCheck, FrameError};
 pub use labels::{LabelsError, LabelsErrorKind, read_labels};

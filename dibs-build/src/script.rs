@@ -4,8 +4,7 @@ use std::env;
 use std::path::{Path, PathBuf};
 
 use crate::{
-    Builder, BuiltTree, Mesh, ReadOptions, RestSurface, Unit, check_winding, crossing_parts,
-    orient, read_labels, read_limits,
+    Builder, BuiltTree, Mesh, ReadOptions, RestSurface, Unit, orient, read_labels, read_limits,
 };
 
 /// Starts the tree of a build script, from a mesh file or a [`Mesh`]; [`TreeScript::emit`] builds it.
@@ -143,7 +142,7 @@ impl TreeScript {
     /// the remedy.
     pub fn emit(self, name: &str) {
         if let Err(error) = self.try_emit(name) {
-            println!("cargo::error={error}");
+            println!("cargo::error={}", of_script(error.to_string()));
             std::process::exit(1);
         }
     }
@@ -202,7 +201,7 @@ impl TreeScript {
                 Box::new(mesh)
             }
         };
-        warn(label, remarks(surface.mesh()));
+        warn(label, surface.mesh().warnings().into_iter());
         let builder = match &self.limits {
             Some(path) => {
                 let limits = match builder.volume() {
@@ -231,16 +230,34 @@ impl TreeScript {
     }
 }
 
-/// What is unusual in a mesh, as `dibs build` warns of it.
-fn remarks(mesh: &Mesh) -> impl Iterator<Item = String> + use<> {
-    let winding = check_winding(mesh).err().map(|error| error.to_string());
-    winding.into_iter().chain(crossing_parts(mesh).into_iter().map(|parts| parts.to_string()))
-}
-
 fn warn(label: &str, warnings: impl Iterator<Item = String>) {
     for warning in warnings {
-        println!("cargo::warning={label}: {warning}");
+        println!("cargo::warning={label}: {}", of_script(warning));
     }
+}
+
+/// The command line's options in the library's sentences, and what a script calls instead.
+const CALLS: [(&str, &str); 12] = [
+    ("`dibs build --orient`", "`.orient()`"),
+    ("--orient", "`.orient()`"),
+    ("without --strict", "without `strict` in `.reading(..)`"),
+    ("--strict", "`strict` in `.reading(..)`"),
+    ("--weld 0", "`weld_tolerance: Some(0.0)` in `.reading(..)`"),
+    ("--largest-component", "`largest_component` in `.reading(..)`"),
+    ("--unit mm", "`.unit(Unit::Millimetre)`"),
+    ("--unit cm", "`.unit(Unit::Centimetre)`"),
+    ("--unit in", "`.unit(Unit::Inch)`"),
+    ("--unit um", "`.unit(Unit::Micrometre)`"),
+    ("--unit m", "`.unit(Unit::Metre)`"),
+    ("--unit", "`.unit(..)`"),
+];
+
+/// A sentence of the library, with a script's calls.
+fn of_script(mut sentence: String) -> String {
+    for (option, call) in CALLS {
+        sentence = sentence.replace(option, call);
+    }
+    sentence
 }
 
 #[cfg(test)]
@@ -271,12 +288,13 @@ mod tests {
     #[test]
     fn a_mesh_that_faces_inwards_is_warned_of_and_turned() {
         let mut mesh = crate::generate::heart(320).unwrap().mesh;
-        assert_eq!(remarks(&mesh).count(), 0);
+        assert!(mesh.warnings().is_empty());
         for corners in &mut mesh.triangles {
             corners.swap(0, 1);
         }
-        let warned: Vec<String> = remarks(&mesh).collect();
-        assert!(matches!(&warned[..], [one] if one.contains("faces inwards")), "{warned:?}");
+        let warned: Vec<String> = mesh.warnings().into_iter().map(of_script).collect();
+        let is_it = |one: &str| one.contains("faces inwards") && one.contains("`.orient()`");
+        assert!(matches!(&warned[..], [one] if is_it(one)), "{warned:?}");
         let side = |script: TreeScript| {
             let built = script.build("heart").unwrap();
             let tree = built.tree::<u16>().unwrap();

@@ -7,8 +7,8 @@ use crate::{modes, overwrite, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
-    Beyond, Builder, BuiltTree, Group, Import, IndexWidth, Mesh, Needed, Volume, check_winding,
-    crossing_parts, orient, read_labels, read_limits,
+    Beyond, Builder, BuiltTree, Group, Import, IndexWidth, Mesh, Needed, Volume, orient,
+    read_labels, read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -112,8 +112,7 @@ pub fn run(args: &Args) -> Result<()> {
         None
     };
     let Import { mesh, report, groups, .. } = &import;
-    let winding = check_winding(mesh).err().map(|error| error.to_string());
-    let crossing = crossing_parts(mesh);
+    let of_mesh = mesh.warnings();
     let nodes = args.nodes.as_ref();
     let volume = nodes.map(|nodes| nodes.volume(mesh, &args.reading.lengths)).transpose()?;
     let volume = volume.map(|volume| volume.bind_within(args.bind_within));
@@ -151,8 +150,7 @@ pub fn run(args: &Args) -> Result<()> {
         tree.write_blob(&args.output)?;
     }
     let summary = tree.summary();
-    let crossing = || crossing.iter().map(ToString::to_string);
-    let warnings = || winding.clone().into_iter().chain(crossing()).chain(summary.warnings());
+    let warnings = || of_mesh.iter().cloned().chain(summary.warnings());
     for warning in warnings() {
         eprintln!("warning: {name}: {warning}");
     }

@@ -4,11 +4,11 @@ use std::path::Path;
 use std::str::FromStr;
 
 use anyhow::{Context, Result, anyhow, bail};
-use dibs_nostd::filter::Filter;
-use dibs_nostd::{Index, Tree, TriangleRow};
+use dibs_nostd::filter::{Filter, MOST_PAIRS};
+use dibs_nostd::{Index, Tree};
 
 /// Most labels with a stand-off of their own.
-pub const LABELS: usize = 7;
+pub const LABELS: usize = MOST_PAIRS - 1;
 
 /// A stand-off (mm): `1` of all tissue, `2=3` of the label 2.
 #[derive(Clone, Copy)]
@@ -43,7 +43,7 @@ pub fn filter<I: Index>(
     let of_all: Vec<f32> =
         stand_offs.iter().filter(|one| one.label.is_none()).map(|one| one.value).collect();
     let [of_all] = of_all[..] else {
-        bail!("--stand-off: give one without a label, and not {}", of_all.len());
+        bail!("--stand-off: give exactly one without a label; there are {}", of_all.len());
     };
     if !(of_all >= 0.0 && of_all.is_finite()) {
         bail!("--stand-off is {of_all}: give a number of at least 0");
@@ -57,8 +57,7 @@ pub fn filter<I: Index>(
                 "--stand-off is {label}={value}: give at least {of_all}, the one without a label"
             );
         }
-        let mut rows = (0..).map_while(|row| tree.label(TriangleRow(row)));
-        if !rows.any(|own| own == label) {
+        if !tree.has_label(label) {
             bail!(
                 "--stand-off is {label}={value}: no triangle of {} has this label",
                 file.display()

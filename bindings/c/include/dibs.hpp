@@ -9,6 +9,7 @@
 #include <new>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include "dibs.h"
 
 namespace dibs {
@@ -146,7 +147,7 @@ template <class Base> struct BusOf : Base {
     Code frame(Span<const float> positions, uint32_t captured, uint32_t now) {
         return dibs_bus_frame(*this, positions.data(), uint32_t(positions.size() / 3), captured, now);
     }
-    /** The same, with the mesh as a whole at a pose. */
+    /** The same, for a mesh at a rigid pose. */
     Code frame_at(Span<const float> positions, const dibs_pose &pose, uint32_t captured, uint32_t now) {
         return dibs_bus_frame_at(*this, positions.data(), uint32_t(positions.size() / 3), &pose, captured, now);
     }
@@ -216,7 +217,7 @@ struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
     Code send(Span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent *sent = nullptr) {
         return dibs_sender_send(*this, positions.data(), uint32_t(positions.size() / 3), age, sent);
     }
-    /** The same, with the mesh as a whole at a pose. */
+    /** The same, for a mesh at a rigid pose. */
     Code send_at(Span<const float> positions, const dibs_pose &pose, uint32_t age, dibs_sent *sent = nullptr) {
         return dibs_sender_send_at(*this, positions.data(), uint32_t(positions.size() / 3), &pose, age, sent);
     }

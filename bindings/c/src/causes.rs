@@ -180,7 +180,7 @@ impl From<LimitError> for dibs_code {
 impl From<FilterError> for dibs_code {
     fn from(error: FilterError) -> Self {
         match error {
-            FilterError::Parameter { .. } => Self::Filter,
+            FilterError::Parameter { .. } | FilterError::Unlabelled { .. } => Self::Filter,
             FilterError::Command | FilterError::Row { .. } => Self::NotFinite,
             FilterError::Query(error) => error.into(),
             FilterError::Untrusted(cause) => cause.into(),

@@ -162,7 +162,8 @@ pub enum dibs_code {
     Acknowledge = 505,
     /// A limit is so high that its input can never exceed it.
     LimitUntrippable = 506,
-    /// A stand-off, speed, lever arm, approach, period or uncertainty of a filter is out of range.
+    /// A stand-off, speed, lever arm, approach, period or uncertainty of a filter is out of range, or no triangle has a
+    /// label that it names.
     Filter = 507,
     /// A sender's target is invalid, or cannot be opened.
     SenderTarget = 600,

@@ -53,7 +53,7 @@ pub struct dibs_filter {
     /// As in `dibs_options`.
     pub depth_tolerance: f32,
     /// Labels with a stand-off of their own: at most `DIBS_FILTER_LABELS`. Each stand-off above the filter's counts as one
-    /// more tool for every tool, up to `DIBS_FILTER_TOOLS` in all, and the tree must have labels.
+    /// more tool for every tool, up to `DIBS_FILTER_TOOLS` in all, and a triangle must have that label.
     pub label_count: u32,
     /// Those labels.
     pub labels: [dibs_stand_off_of; DIBS_FILTER_LABELS],

@@ -200,17 +200,17 @@ pub extern "C" fn dibs_sender_send(
     dibs_code::of(|| send(sender, positions, count, None, age, sent))
 }
 
-/// The same as `dibs_sender_send`, with the mesh as a whole elsewhere. For a `dibs_bus`; a `dibs_receiver` refuses such frames.
+/// The same as `dibs_sender_send`, for a mesh at a rigid pose. For a `dibs_bus`; a `dibs_receiver` refuses such frames.
 ///
 /// @param sender     The sender.
 /// @param positions  As for `dibs_sender_send`: those of the mesh's own frame.
 /// @param count      Their number.
 /// @param pose       The pose, read during the call.
-/// @param age        Time (ms) since the surface was so, and there: of the older of the two. A source that has stopped
-///                   cannot be told from a mesh that moves as a whole, so it must be stated.
+/// @param age        Time (ms) since the older of positions and pose was measured. It must be stated, since the same
+///                   positions at a new pose may be a rigid mesh, or a source that has stopped.
 /// @param sent       Receives the frame's number and size; or null.
-/// @return As `dibs_sender_send`; `DIBS_CODE_SENDER_FRAME` also for numbers that are no pose, and `DIBS_CODE_ARGUMENT` for
-///         `DIBS_AGE_UNKNOWN`.
+/// @return As `dibs_sender_send`; `DIBS_CODE_SENDER_FRAME` also for numbers that are no pose, and `DIBS_CODE_ARGUMENT`
+///         for `DIBS_AGE_UNKNOWN`.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_sender_send_at(
     sender: *mut dibs_sender,

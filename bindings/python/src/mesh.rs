@@ -3,10 +3,7 @@
 use std::path::PathBuf;
 
 use dibs_build::glam::DVec3;
-use dibs_build::{
-    Builder, Groups, Import, ReadOptions, Report, Unit, Volume, check_winding, crossing_parts,
-    orient,
-};
+use dibs_build::{Builder, Groups, Import, ReadOptions, Report, Unit, Volume, orient};
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
@@ -104,10 +101,7 @@ impl Mesh {
     }
 
     fn warnings(&self) -> Vec<String> {
-        let winding = check_winding(&self.import.mesh).err().map(|error| error.to_string());
-        let crossing = crossing_parts(&self.import.mesh);
-        let crossing = crossing.iter().map(ToString::to_string);
-        let warnings = self.import.report.warnings().chain(winding).chain(crossing);
+        let warnings = self.import.report.warnings().chain(self.import.mesh.warnings());
         warnings.map(error::sentence).collect()
     }
 

@@ -16,7 +16,7 @@ use pyo3::types::PyByteArray;
 use crate::record::{push_answer, push_contact};
 use crate::surface::{List, Surface};
 use crate::tool::AnyTool;
-use crate::tree::{Owned, Tree, View};
+use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, invalid};
 
 /// Enough for any tree.
@@ -221,7 +221,7 @@ impl Tracked {
 pub type Admitted = ([f32; 3], [f32; 3], f32, &'static str, u32, u32);
 
 /// Most labels with a stand-off of their own.
-const LABELS: usize = 7;
+const LABELS: usize = filter::MOST_PAIRS - 1;
 
 /// A filter of commands.
 #[pyclass(frozen, module = "dibs._dibs")]
@@ -259,6 +259,10 @@ impl Filter {
         }
         labels.iter_mut().zip(of_labels).for_each(|(place, of_label)| *place = of_label);
         let filter = filter.stand_off_of(labels).map_err(named)?;
+        let has = |label| of_any_width!(tree.0.view(), tree => tree.has_label(label));
+        if let Some(&(label, _)) = labels.iter().take(found).find(|&&(label, _)| !has(label)) {
+            return Err(named(FilterError::Unlabelled { label }));
+        }
         Ok(Self { ticks: on(tree), filter, tree: Arc::clone(&tree.0) })
     }
 
@@ -351,7 +355,9 @@ pub fn named(error: FilterError) -> PyErr {
         FilterError::Command => invalid("command: it is too large"),
         FilterError::Row { row } => invalid(format!("rows: row {row} is not finite")),
         FilterError::Rows { .. } => invalid(format!("rows: {error}")),
-        FilterError::Unlabelled => invalid("stand_off_of: the tree has no labels"),
+        FilterError::Unlabelled { label } => {
+            invalid(format!("stand_off_of: no triangle has the label {label}"))
+        }
         _ => invalid(error),
     }
 }

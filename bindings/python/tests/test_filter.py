@@ -9,6 +9,9 @@ import dibs
 from subjects import ASIDE, BEAT, HEART, OTHER, ROOT, TREE, WithProgram
 
 PERIOD = 0.001
+# The side that a shaft is pushed into is a vessel.
+_IS_VESSEL = (HEART.vertices[HEART.triangles][..., 0] > 0).all(axis=1)
+LABELLED = dibs.build(HEART, labels=2 * _IS_VESSEL.astype(np.uint8))
 TOOL = np.array([95.0, 3.0, 60.0, 95.0, 80.0, 90.0, 2.5])
 
 
@@ -107,13 +110,11 @@ class Filters(WithProgram):
 
     def test_a_label_has_a_larger_stand_off(self):
         """The side that the shaft is pushed into is a vessel."""
-        is_vessel = (HEART.vertices[HEART.triangles][..., 0] > 0).all(axis=1)
-        tree = dibs.build(HEART, labels=2 * is_vessel.astype(np.uint8))
 
         def least(of):
-            guard, tool, nearest = dibs.Filter(tree, 1.0, 200.0, stand_off_of=of), TOOL, np.inf
+            guard, tool, nearest = dibs.Filter(LABELLED, 1.0, 200.0, stand_off_of=of), TOOL, np.inf
             for _ in range(400):
-                admitted = guard.admit(tool, dibs.RigidMotion(tool[:3], [-0.1, 0, 0]), PERIOD, tree)
+                admitted = guard.admit(tool, dibs.RigidMotion(tool[:3], [-0.1, 0, 0]), PERIOD, LABELLED)
                 self.assertNotEqual(admitted.reason, "no safe motion")
                 nearest = min(nearest, admitted.least_separation)
                 tool = admitted.motion.apply(tool)
@@ -148,7 +149,8 @@ class Filters(WithProgram):
             ("stand_off_of[2]", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={2: 0.5})),
             ("stand_off_of[2]", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={2: nan})),
             ("stand_off_of", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={at: 3 for at in range(8)})),
-            ("stand_off_of", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={2: 3}).admit(TOOL, motion, PERIOD, TREE)),
+            ("label 2", ValueError, lambda: dibs.Filter(TREE, 1, 200, stand_off_of={2: 3})),
+            ("label 3", ValueError, lambda: dibs.Filter(LABELLED, 1, 200, stand_off_of={2: 3, 3: 3})),
             ("speed", ValueError, lambda: dibs.Filter(TREE, 1, 0)),
             ("speed", TypeError, lambda: dibs.Filter(TREE, 1, "fast")),
             ("lever", ValueError, lambda: dibs.Filter(TREE, 1, 200, lever=0.5)),

@@ -140,8 +140,8 @@ fn bad_input_is_named() {
     for (options, named) in [
         ("--stand-off -1", "--stand-off is -1"),
         ("--stand-off nan", "--stand-off is NaN"),
-        ("--stand-off 1 --stand-off 2", "give one without a label, and not 2"),
-        ("--stand-off 2=3", "give one without a label, and not 0"),
+        ("--stand-off 1 --stand-off 2", "give exactly one without a label; there are 2"),
+        ("--stand-off 2=3", "give exactly one without a label; there are 0"),
         ("--stand-off 1 --stand-off 2=3", "no triangle of heart.dibs has this label"),
         ("--stand-off 1 --stand-off 2=0.5", "--stand-off is 2=0.5: give at least 1"),
         ("--stand-off 1 --stand-off 2=nan", "--stand-off is 2=NaN: give at least 1"),

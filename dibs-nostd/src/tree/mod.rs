@@ -19,6 +19,7 @@ pub mod format;
 mod header;
 mod index;
 #[cfg(feature = "control")]
+mod labels;
 mod order;
 mod row;
 mod scrub;
@@ -62,6 +63,8 @@ pub struct Tree<'a, I> {
     /// The checksum if no edge of the surface is a border, else its complement. After a memory fault it is neither, and
     /// the tree counts as open: then a depth takes longer, but is correct.
     closed: u32,
+    #[cfg(feature = "control")]
+    labels: labels::LabelSet,
     width: PhantomData<I>,
 }
 
@@ -81,7 +84,14 @@ impl<'a, I: Index> Tree<'a, I> {
         let header = tri!(header::read::<I>(bytes));
         let sections = tri!(sections::find::<I>(bytes, &header));
         tri!(validate::well_formed::<I>(&header, &sections));
-        let mut tree = Self { sections, header, closed: !header.checksum, width: PhantomData };
+        let mut tree = Self {
+            sections,
+            header,
+            closed: !header.checksum,
+            #[cfg(feature = "control")]
+            labels: labels::LabelSet::of(sections.labels),
+            width: PhantomData,
+        };
         if tri!(adjacency::check(&tree)) {
             tree.closed = header.checksum;
         }
@@ -109,10 +119,7 @@ impl<'a, I: Index> Tree<'a, I> {
     /// [`FormatError`] if the copy's sections are not where this tree's layout has them.
     pub const fn moved_to<'b>(&self, copy: &'b [u8]) -> Result<Tree<'b, I>, FormatError> {
         match sections::find::<I>(copy, &self.header) {
-            Ok(sections) if self.sections.matches(&sections) => {
-                let Self { header, closed, .. } = *self;
-                Ok(Tree { sections, header, closed, width: PhantomData })
-            }
+            Ok(sections) if self.sections.matches(&sections) => Ok(Tree { sections, ..*self }),
             Ok(_) => Err(FormatError::Section { kind: section::NODES }),
             Err(error) => Err(error),
         }
@@ -342,10 +349,13 @@ impl<'a, I: Index> Tree<'a, I> {
         }
     }
 
-    /// Whether the tree was built with labels.
+    /// Whether a triangle has this label.
+    ///
+    /// Cost: some ten instructions; which labels there are is noted at validation.
     #[cfg(feature = "control")]
-    pub(crate) const fn has_labels(&self) -> bool {
-        !self.sections.labels.is_empty()
+    #[must_use]
+    pub const fn has_label(&self, label: u8) -> bool {
+        self.labels.contains(label)
     }
 
     /// Pin, geodesic radius (mm, rounded up) and link of a node, for programs that walk the tree; `None` outside the

@@ -167,6 +167,9 @@ pub fn walk_by_label<const LABELS: usize>(
     let filter = Filter::new(episode.stand_off, episode.robot).expect("in range");
     let filter = filter.budget(episode.instructions, Cost::M7_CAPSULE);
     let filter = filter.approach(episode.approach).expect("in range");
+    // A scene may be so small that no triangle has the label, which a filter would refuse.
+    let labels =
+        labels.map(|(label, more)| (label, if tree.has_label(label) { more } else { 0.0 }));
     let stand_offs = labels.map(|(label, more)| (label, episode.stand_off + more));
     let filter = filter.stand_off_of(stand_offs).expect("in range");
     let labels = labels.map(|(label, more)| (label, f64::from(more)));

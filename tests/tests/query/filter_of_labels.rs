@@ -16,6 +16,8 @@ use rayon::prelude::*;
 const MUSCLE: u8 = 0;
 const NERVE: u8 = 1;
 const VESSEL: u8 = 2;
+/// A label that no triangle has.
+const ABSENT: u8 = 5;
 
 /// A vessel beside the region's middle, and a nerve across.
 fn tissue(from_middle: Vec3) -> u8 {
@@ -166,7 +168,10 @@ fn bad_input_is_named() {
     assert!(ask(&wall, &by_label, &tools[..4], Vec3::X * 0.1).is_ok());
     let bare = Surface::new(&Builder::new(), &sheet(20, 60.0, |_, _| 0.0));
     let error = ask(&bare, &by_label, &tools[..1], Vec3::X * 0.1).unwrap_err();
-    assert_eq!(error, FilterError::Unlabelled);
+    assert_eq!(error, FilterError::Unlabelled { label: VESSEL });
+    let absent = filter.stand_off_of([(VESSEL, 3.0), (ABSENT, 2.0)]).expect("in range");
+    let error = ask(&wall, &absent, &tools[..1], Vec3::X * 0.1).unwrap_err();
+    assert_eq!(error, FilterError::Unlabelled { label: ABSENT });
     let own = filter.stand_off_of([(NERVE, 1.0)]).expect("in range");
     assert!(ask(&bare, &own, &tools[..1], Vec3::X * 0.1).is_ok());
 }

@@ -166,7 +166,7 @@ static void trackers(const float *positions, uint32_t vertices) {
         {{1.0f, 200.0f, 0.0f, 0.0f, 200000, 1, 0.0f, 5, {{0, 3.0f}}}, command, still, DIBS_CODE_ARGUMENT},
         {{1.0f, 200.0f, 0.0f, 0.0f, 200000, 1, 0.0f, 1, {{256, 3.0f}}}, command, still, DIBS_CODE_ARGUMENT},
         /* The tree has no labels. */
-        {{1.0f, 200.0f, 0.0f, 0.0f, 200000, 1, 0.0f, 1, {{2, 3.0f}}}, command, still, DIBS_CODE_ARGUMENT},
+        {{1.0f, 200.0f, 0.0f, 0.0f, 200000, 1, 0.0f, 1, {{2, 3.0f}}}, command, still, DIBS_CODE_FILTER},
         {{1.0f, 200.0f, 0.0f, 0.0f, 200000, 1, 0.0f, 1, {{2, 0.5f}}}, command, still, DIBS_CODE_FILTER},
         {{1.0f, 200.0f, 0.0f, 0.0f, 200000, 1, 0.0f, 1, {{2, NAN}}}, command, still, DIBS_CODE_FILTER},
         {filter, {.translation = {NAN, 0.0f, 0.0f}}, still, DIBS_CODE_NOT_FINITE},

@@ -99,8 +99,11 @@ pub enum FilterError {
         /// Slots.
         most: usize,
     },
-    /// A stand-off of a label, and a tree without labels.
-    Unlabelled,
+    /// A stand-off of a label that no triangle has.
+    Unlabelled {
+        /// The label.
+        label: u8,
+    },
     /// A query gave no answer.
     Query(QueryError),
     /// No surface is trusted: a [guard](crate::guard::Guard::admit) is in its safe state.
@@ -126,7 +129,9 @@ impl fmt::Display for FilterError {
             Self::Pairs { found, most } => {
                 write!(f, "{found} pairs of tool and surface, but at most {most} have a place")
             }
-            Self::Unlabelled => write!(f, "a stand-off of a label, but the tree has no labels"),
+            Self::Unlabelled { label } => {
+                write!(f, "a stand-off of the label {label}, but no triangle has it")
+            }
             Self::Query(error) => error.fmt(f),
             Self::Untrusted(cause) => write!(f, "no surface to trust: {cause}"),
         }

@@ -87,8 +87,9 @@ pub use row::MotionRow;
 use session::Session;
 pub use uncertainty::Uncertainty;
 
-/// Most pairs of tool and surface, and of tool and a label's part of one.
-const MOST_PAIRS: usize = 8;
+/// Most pairs of tool and surface, and of tool and a label's part of one: each tool and surface is a pair once more for
+/// each label with a stand-off that is larger than the filter's.
+pub const MOST_PAIRS: usize = 8;
 
 /// By how much (mm) a verified separation may be below the stand-off.
 const EPSILON: f32 = 0.01;
@@ -133,9 +134,7 @@ impl Filter {
             options: Options::new(),
         })
     }
-}
 
-impl<const LABELS: usize> Filter<LABELS> {
     /// The same with a stand-off (mm, at least the filter's) from the triangles of each of these
     /// [labels](crate::Tree::label): 3 from a vessel where 1 is enough elsewhere. Every tool keeps the filter's stand-off
     /// from the whole surface. A nearer label with a smaller stand-off does not hide a farther one with a larger.
@@ -152,12 +151,13 @@ impl<const LABELS: usize> Filter<LABELS> {
     /// ```
     ///
     /// # Errors
-    /// [`FilterError::Parameter`] if one is less than the filter's, or not finite.
-    pub fn stand_off_of<const N: usize>(
+    /// [`FilterError::Parameter`] if one is less than the filter's, or not finite. A label that no triangle has is
+    /// refused in each tick, as [`FilterError::Unlabelled`], if its stand-off is larger than the filter's.
+    pub fn stand_off_of<const LABELS: usize>(
         self,
-        labels: [(u8, f32); N],
-    ) -> Result<Filter<N>, FilterError> {
-        let mut of_labels = [Part { label: 0, more: 0.0 }; N];
+        labels: [(u8, f32); LABELS],
+    ) -> Result<Filter<LABELS>, FilterError> {
+        let mut of_labels = [Part { label: 0, more: 0.0 }; LABELS];
         for (place, (label, stand_off)) in of_labels.iter_mut().zip(labels) {
             checked("stand_off_of", stand_off, stand_off >= self.stand_off)?;
             *place = Part { label, more: stand_off - self.stand_off };
@@ -165,7 +165,9 @@ impl<const LABELS: usize> Filter<LABELS> {
         let Self { stand_off, speed, lever, approach, instructions, cost, options, .. } = self;
         Ok(Filter { stand_off, of_labels, speed, lever, approach, instructions, cost, options })
     }
+}
 
+impl<const LABELS: usize> Filter<LABELS> {
     /// The same with a lever (mm, at least 1): a rotation by one radian counts as much as a translation by this length. By
     /// default it is the distance from the reference point to the farthest end of a tool's axis.
     ///
@@ -236,11 +238,11 @@ impl<const LABELS: usize> Filter<LABELS> {
         if pairs.is_empty() || found > MOST_PAIRS {
             return Err(FilterError::Pairs { found, most: MOST_PAIRS });
         }
-        let is_labelled = |(tracker, ..): &(&mut Tracker<'_, I, STACK, OPENED, RANGE>, &S, &T)| {
-            tracker.tree().has_labels()
-        };
-        if LABELS > 0 && found > pairs.len() && !pairs.iter().any(is_labelled) {
-            return Err(FilterError::Unlabelled);
+        let mut labels = self.parts().map(|part| part.label);
+        if let Some(label) =
+            labels.find(|&label| !pairs.iter().any(|(tracker, ..)| tracker.tree().has_label(label)))
+        {
+            return Err(FilterError::Unlabelled { label });
         }
         let lever = self.lever_of(pairs.iter().map(|(_, _, tool)| *tool), command);
         Session::new(self, command, period, uncertainty, (rows, lever))?.run(pairs)

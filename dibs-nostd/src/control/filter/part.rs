@@ -15,7 +15,7 @@ pub(super) struct Part {
 
 impl<const LABELS: usize> Filter<LABELS> {
     /// The parts whose stand-off is larger than the filter's.
-    fn parts(&self) -> impl Iterator<Item = Part> {
+    pub(super) fn parts(&self) -> impl Iterator<Item = Part> {
         self.of_labels.iter().copied().filter(|part| part.more > 0.0)
     }
 
