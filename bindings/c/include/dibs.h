@@ -9,8 +9,8 @@
  * Calls return a `dibs_code`: `DIBS_CODE_OK`, an error of the call's own, or a misuse, which is one of the codes below 100.
  * After an error nothing is written to the places for results, unless a function says otherwise.
  *
- * A pointer is null, or it points to as much as its function says: more is not checked. Lengths are in the mesh's own unit,
- * mm in these comments; positions are in the mesh's frame.
+ * A pointer is null, or it points to as much as its function says: more is not checked. Lengths are in mm, to which a
+ * tree's builder converts its file's unit; positions are in the mesh's frame.
  */
 /* Generated from bindings/c/src by `DIBS_WRITE=1 cargo test -p dibs-c header`. */
 
@@ -541,7 +541,8 @@ enum dibs_code
    */
   DIBS_CODE_LIMIT_UNTRIPPABLE = 506,
   /**
-   * A stand-off, speed, lever arm, approach, period or uncertainty of a filter is out of range.
+   * A stand-off, speed, lever arm, approach, period or uncertainty of a filter is out of range, or no triangle has a
+   * label that it names.
    */
   DIBS_CODE_FILTER = 507,
   /**
@@ -1602,7 +1603,7 @@ typedef struct {
   float depth_tolerance;
   /**
    * Labels with a stand-off of their own: at most `DIBS_FILTER_LABELS`. Each stand-off above the filter's counts as one
-   * more tool for every tool, up to `DIBS_FILTER_TOOLS` in all, and the tree must have labels.
+   * more tool for every tool, up to `DIBS_FILTER_TOOLS` in all, and a triangle must have that label.
    */
   uint32_t label_count;
   /**
@@ -3012,17 +3013,17 @@ dibs_code dibs_sender_send(dibs_sender *sender,
                            dibs_sent *sent);
 
 /**
- * The same as `dibs_sender_send`, with the mesh as a whole elsewhere. For a `dibs_bus`; a `dibs_receiver` refuses such frames.
+ * The same as `dibs_sender_send`, for a mesh at a rigid pose. For a `dibs_bus`; a `dibs_receiver` refuses such frames.
  *
  * @param sender     The sender.
  * @param positions  As for `dibs_sender_send`: those of the mesh's own frame.
  * @param count      Their number.
  * @param pose       The pose, read during the call.
- * @param age        Time (ms) since the surface was so, and there: of the older of the two. A source that has stopped
- *                   cannot be told from a mesh that moves as a whole, so it must be stated.
+ * @param age        Time (ms) since the older of positions and pose was measured. It must be stated, since the same
+ *                   positions at a new pose may be a rigid mesh, or a source that has stopped.
  * @param sent       Receives the frame's number and size; or null.
- * @return As `dibs_sender_send`; `DIBS_CODE_SENDER_FRAME` also for numbers that are no pose, and `DIBS_CODE_ARGUMENT` for
- *         `DIBS_AGE_UNKNOWN`.
+ * @return As `dibs_sender_send`; `DIBS_CODE_SENDER_FRAME` also for numbers that are no pose, and `DIBS_CODE_ARGUMENT`
+ *         for `DIBS_AGE_UNKNOWN`.
  */
 dibs_code dibs_sender_send_at(dibs_sender *sender,
                               const float *positions,
@@ -3240,6 +3241,8 @@ dibs_code dibs_tree_rest_position(dibs_tree *tree,
 /**
  * Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows,
  * as a frame needs them. A frame in the file's order gives wrong distances without an error, unless it is measured.
+ * Only the order changes: positions are in mm relative to the tree's origin, which is not zero for a mesh far from its
+ * file's; subtract it from positions of the file, and not from velocities (mm/s).
  *
  * Cost: linear in the vertices.
  *

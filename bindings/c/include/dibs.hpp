@@ -34,7 +34,7 @@ public:
 };
 using Tools = Span<const dibs_tool>;
 /** One sentence about a code. */
-inline std::string_view text(Code code) { return dibs_code_text(code); }
+inline std::string_view text(uint32_t code) { return dibs_code_text(code); }
 /** The length of both spans; 0, which every call refuses, if they differ. */
 template <class One, class Other> uint32_t common(One one, Other other) {
     return one.size() == other.size() ? uint32_t(one.size()) : 0;
@@ -53,12 +53,23 @@ public:
 /** A validated tree. The bytes outlive it. */
 struct Tree : Object<dibs_tree, DIBS_TREE_SIZE, dibs_tree_init> {
     Code init(Span<const uint8_t> tree) { return Object::init(tree.data(), tree.size()); }
+    /** Copies the positions, or velocities, of the mesh file's vertices into the tree's order, which a frame needs: `rows`
+     *  are the first of `room`, in which as many as `values` are enough. */
+    Code to_rows(Span<const float> values, Span<float> room, Span<float> &rows) {
+        dibs_tree_facts facts;
+        Code code = dibs_tree_get_facts(*this, &facts);
+        if (code != DIBS_CODE_OK) return code;
+        code = dibs_tree_to_rows(*this, values.data(), uint32_t(values.size() / 3), room.data(), uint32_t(room.size() / 3));
+        if (code == DIBS_CODE_OK) rows = {room.data(), size_t(facts.vertices) * 3};
+        return code;
+    }
 };
 /** The surface at one moment, released with this object. */
 struct Frame : Object<dibs_frame, DIBS_FRAME_SIZE, dibs_frame_init> {
     ~Frame() { release(); }
     Code release() { return dibs_frame_release(*this); }
-    /** x, y and z (mm) of each vertex, which outlive the frame or its release. */
+    /** x, y and z (mm) of each vertex, which outlive the frame or its release. In the tree's order (`Tree::to_rows`): in the
+     *  file's order distances are wrong, which `measure` notices. */
     Code set(Span<const float> positions, float error = 0.0f) {
         return dibs_frame_set_vertices(*this, positions.data(), uint32_t(positions.size() / 3), error);
     }
@@ -66,6 +77,8 @@ struct Frame : Object<dibs_frame, DIBS_FRAME_SIZE, dibs_frame_init> {
     Code set_nodes(dibs_tree *tree, Span<const float> positions, float error = 0.0f) {
         return dibs_frame_set_nodes(*this, tree, positions.data(), uint32_t(positions.size() / 3), error);
     }
+    /** Measures the stretch: queries are cheaper then, and a surface stretched beyond the tree's limit is refused. */
+    Code measure(dibs_tree *tree, float *stretch = nullptr) { return dibs_frame_measure(*this, tree, stretch); }
 };
 /** Contacts of a query, a scene or a tracker. */
 struct Contacts : Object<dibs_contacts, DIBS_CONTACTS_SIZE, dibs_contacts_init> {
