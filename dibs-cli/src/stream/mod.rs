@@ -61,6 +61,10 @@ the receiver takes them, the newest is. Without an age a frame counts as capture
 it that equal it did. With --motion-rate every frame is sent, no faster than that, and counts as captured then. The first
 wrong frame ends the stream.
 
+Frames of --from igtl:HOST:PORT are the POLYDATA, POINT and NDARRAY messages of OpenIGTLink. One that equals the one before
+is as old as that, unless its message has another time: a source states there when it measured, not when it sends. A wrong
+message is refused and counted, and the stream goes on.
+
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
 pub struct Args {
     /// The tree that the receiver has (NAME.dibs), or the mesh from which `dibs build` makes the same tree with default
@@ -83,8 +87,7 @@ pub struct Args {
     device: Option<String>,
     /// Send every frame with the latest rigid pose of this OpenIGTLink device, from TRANSFORM, TDATA or QTDATA: the
     /// frame's positions are those before the pose is applied. For controllers that accept posed frames. The age is
-    /// that of the older of the two. Positions or a pose that equal the ones before count as new only if their message
-    /// has another time: a source states there when it measured, not when it sends
+    /// that of the older of the two. A pose that equals the one before is new only if its message has another time
     #[arg(long, value_name = "TRACKED", conflicts_with_all = ["motion", "unnamed_motion"])]
     pose_device: Option<String>,
     /// The receiver's address: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or

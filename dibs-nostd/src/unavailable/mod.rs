@@ -14,7 +14,8 @@ use crate::time::Millis;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Unavailable {
-    /// No surface was ever published.
+    /// No surface was ever published, or none has been trusted since the start: a [fail-safe machine](crate::failsafe) begins
+    /// in its safe state.
     NoSurface,
     /// The surface is older than allowed.
     Stale {
@@ -70,7 +71,9 @@ pub enum Unavailable {
 impl fmt::Display for Unavailable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoSurface => write!(f, "no surface was published yet"),
+            Self::NoSurface => {
+                write!(f, "no surface was published, or the start was not acknowledged")
+            }
             Self::Stale { age } => write!(f, "the surface is {age} old"),
             Self::Query(error) => error.fmt(f),
             Self::CorruptTree => write!(f, "the tree's bytes changed"),

@@ -280,17 +280,17 @@ impl Igtl {
         let positions = self.place.frame(positions, self.number);
         let positions = positions.map_err(|error| (Cause::Frame, error.to_string()))?;
         let delay = self.delay.of(came, header.time);
-        let Some(device) = &self.pose_device else {
-            return Ok(Parsed { positions, pose: None, came, age: Age::Delay(delay) });
-        };
         let part = Part { value: positions.clone(), time: header.time, came, delay };
-        Part::replace(&mut self.positions, part);
-        let (Some(pose), Some(known)) = (&self.pose, &self.positions) else {
+        let age = Part::replace(&mut self.positions, part).age(came);
+        let Some(device) = &self.pose_device else {
+            return Ok(Parsed { positions, pose: None, came, age: Age::Stated(age) });
+        };
+        let Some(pose) = &self.pose else {
             let why = format!("no pose of device \"{device}\" has come before it");
             return Err((Cause::Pose, why));
         };
         // A frame is as old as its older part.
-        let age = Age::Stated(known.age(came).max(pose.age(came)));
+        let age = Age::Stated(age.max(pose.age(came)));
         Ok(Parsed { positions, pose: Some(pose.value), came, age })
     }
 }

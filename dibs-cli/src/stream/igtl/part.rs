@@ -1,4 +1,4 @@
-//! The two parts of a posed frame, positions and pose, each with the time of its measurement.
+//! The parts of a frame, positions and pose, each with the time of its measurement.
 
 use std::time::{Duration, Instant};
 
@@ -13,16 +13,17 @@ pub struct Part<T> {
 }
 
 impl<T: PartialEq> Part<T> {
-    /// Takes the next message's part in the place of the last one's. A part that repeats the last one stays as old as that,
-    /// unless its header has a time of its own: so a frozen image grows old beside a pose that moves, and a rigid organ that is
-    /// measured anew does not.
-    pub fn replace(last: &mut Option<Self>, next: Self) {
+    /// Takes the next message's part in the place of the last one's, and returns it. A part that repeats the last one stays
+    /// as old as that, unless its header has a time of its own: so an image that is sent again grows old, also beside a pose
+    /// that moves, and an organ at rest that is measured anew does not.
+    pub fn replace(last: &mut Option<Self>, next: Self) -> &Self {
         let repeats = |last: &Self| {
             last.value == next.value
                 && (next.time <= 0.0 || next.time.total_cmp(&last.time).is_eq())
         };
-        if !last.as_ref().is_some_and(repeats) {
-            *last = Some(next);
+        match last.take() {
+            Some(same) if repeats(&same) => last.insert(same),
+            _ => last.insert(next),
         }
     }
 

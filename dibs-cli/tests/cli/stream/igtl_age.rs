@@ -48,6 +48,37 @@ fn frames_are_as_old_as_their_headers_say() {
     assert!(late.iter().all(|&age| age >= 400), "{late:?}");
 }
 
+/// Positions of an organ at rest are new by another time in their header alone.
+#[test]
+fn an_organ_at_rest_stays_fresh_and_a_repeated_message_grows_old() {
+    const MEASURED: usize = FRAMES / 2;
+    const PAUSE: Duration = Duration::from_millis(20);
+    let folder = heart();
+    let folder = folder.path();
+    let (frames, _) = organ(folder);
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("--from igtl:{}", server.local_addr().unwrap());
+    let (seen, _, _) = bridged(folder, &line, || {
+        let mut peer = accepted(&server);
+        let start = Instant::now();
+        let mut time = 0.0;
+        for number in 0..FRAMES {
+            if number < MEASURED {
+                time = 1000.0 + start.elapsed().as_secs_f64();
+            }
+            peer.write_all(&timed(message(1, "NDARRAY", "", &array(&frames[0])), time)).unwrap();
+            thread::sleep(PAUSE);
+        }
+        peer
+    });
+    let pause = PAUSE.as_millis() as u32;
+    let (measured, repeated) = seen.ages.split_at(MEASURED);
+    // A loaded computer may hold some up.
+    assert!(measured[MEASURED / 2..].iter().any(|&age| age < 2 * pause), "{measured:?}");
+    let least = (1..).map(|step: u32| step * pause);
+    assert!(repeated.iter().zip(least).all(|(&age, least)| age + 1 >= least), "{repeated:?}");
+}
+
 /// Where the user gives a rate, a frame that waits for its turn grows old meanwhile.
 #[test]
 fn frames_that_wait_grow_old() {
