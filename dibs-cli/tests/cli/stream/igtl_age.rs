@@ -7,6 +7,7 @@ use std::net::TcpListener;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use dibs_build::Motion;
 use dibs_build::glam::{Quat, Vec3};
 
 use super::igtl::{accepted, bridged, bridged_to, organ};
@@ -56,6 +57,10 @@ fn an_organ_at_rest_stays_fresh_and_a_repeated_message_grows_old() {
     let folder = heart();
     let folder = folder.path();
     let (frames, _) = organ(folder);
+    let motion = folder.join("heart.pc2");
+    let mut still = Motion::read_pc2(&motion).unwrap();
+    still.frames.fill(frames[0].clone());
+    still.write_pc2(&motion).unwrap();
     let server = TcpListener::bind("127.0.0.1:0").unwrap();
     let line = format!("--from igtl:{}", server.local_addr().unwrap());
     let (seen, _, _) = bridged(folder, &line, || {
