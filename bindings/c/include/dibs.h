@@ -34,9 +34,9 @@
 
 
 /**
- * Alignment, in bytes, of the storage of every object.
+ * Alignment, in bytes, of the storage of every object: a computer's cipher needs that much.
  */
-#define DIBS_ALIGNMENT 8
+#define DIBS_ALIGNMENT 16
 
 /**
  * Bytes of a bus's storage.
@@ -87,11 +87,6 @@
  * Bytes of a guard's storage.
  */
 #define DIBS_GUARD_SIZE 25344
-
-/**
- * Bytes of the memory for a control loop's objects, except the surface.
- */
-#define DIBS_START_BASE ((DIBS_TREE_SIZE + DIBS_BUS_SIZE) + DIBS_GUARD_SIZE)
 
 /**
  * Bytes of a query's storage.
@@ -165,6 +160,11 @@
 #define DIBS_AGE_UNKNOWN UINT32_MAX
 
 /**
+ * Bytes of the memory for a control loop's objects, except the surface.
+ */
+#define DIBS_START_BASE ((DIBS_TREE_SIZE + DIBS_BUS_SIZE) + DIBS_GUARD_SIZE)
+
+/**
  * Bytes of a surface's storage in addition to its vertices.
  */
 #define DIBS_SURFACE_BASE 576
@@ -178,6 +178,16 @@
  * Bytes of a guarded surface's storage for each vertex: three positions.
  */
 #define DIBS_GUARDED_VERTEX 36
+
+/**
+ * Bytes of the storage of a receiver's tags.
+ */
+#define DIBS_TAGS_SIZE 1792
+
+/**
+ * Bytes of a key.
+ */
+#define DIBS_KEY 16
 
 /**
  * Largest number of tools in a chain.
@@ -565,6 +575,10 @@ enum dibs_code
    * The receiver has another surface than the sender.
    */
   DIBS_CODE_SENDER_OTHER_SURFACE = 604,
+  /**
+   * The sender has a key, but the receiver has not answered with its challenge yet.
+   */
+  DIBS_CODE_SENDER_NO_CHALLENGE = 605,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -995,6 +1009,14 @@ typedef struct dibs_sender dibs_sender;
  * Any number of contexts may use it at once.
  */
 typedef struct dibs_surface dibs_surface;
+
+/**
+ * The tags that a receiver demands of every packet, and writes into every status: AES-128-CMAC under a key that both
+ * ends have. `docs/wire.md` says what they protect against.
+ *
+ * Any number of contexts may use it at once.
+ */
+typedef struct dibs_tags dibs_tags;
 
 /**
  * A query that remembers the proof of its last answer.
@@ -1972,6 +1994,10 @@ typedef struct {
    * Number of the latest acknowledged frame.
    */
   uint32_t acknowledged;
+  /**
+   * Whether frames can be sent: without a key always, with a key once the receiver's challenge is known.
+   */
+  uint32_t is_ready;
 } dibs_sender_facts;
 
 /**
@@ -2116,6 +2142,26 @@ dibs_code dibs_bus_init(void *storage,
                         dibs_tree *tree,
                         const dibs_guard_limits *limits,
                         dibs_bus **bus);
+
+/**
+ * The same, for a sender with a key: a packet without a genuine tag is refused and counted.
+ *
+ * @param storage  As for `dibs_bus_init`.
+ * @param size     Bytes of the storage.
+ * @param surface  The surface.
+ * @param tree     Its tree.
+ * @param limits   The guard's limits.
+ * @param tags     The tags.
+ * @param bus      Receives the bus's address.
+ * @return As `dibs_bus_init`.
+ */
+dibs_code dibs_bus_init_with_tags(void *storage,
+                                  size_t size,
+                                  dibs_surface *surface,
+                                  dibs_tree *tree,
+                                  const dibs_guard_limits *limits,
+                                  dibs_tags *tags,
+                                  dibs_bus **bus);
 
 /**
  * Receives bytes from a serial line or another stream. `dibs_bus_counters` counts the outcomes by cause.
@@ -2683,31 +2729,6 @@ dibs_code dibs_guard_acknowledge(dibs_guard *guard);
 dibs_code dibs_answer_force(const dibs_answer *answer, const dibs_wall *wall, dibs_force *force);
 
 /**
- * Makes all objects of a control loop in one piece of memory: validates the tree, and makes the surface and its two
- * ends. To make each object in memory of its own, use `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init` and
- * `dibs_guard_init`.
- *
- * Cost: linear in the bytes; once, at start-up.
- *
- * @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that move them),
- *                aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no initial value.
- * @param size    Bytes of the memory.
- * @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
- * @param length  Bytes of the tree.
- * @param limits  The guard's limits.
- * @param bus     Receives the bus's address.
- * @param guard   Receives the guard's address.
- * @return As the four functions; `DIBS_CODE_STORAGE_SIZE` if the tree has more rows than fit.
- */
-dibs_code dibs_start(void *memory,
-                     size_t size,
-                     const uint8_t *bytes,
-                     size_t length,
-                     const dibs_guard_limits *limits,
-                     dibs_bus **bus,
-                     dibs_guard **guard);
-
-/**
  * The limits that follow from two numbers: 1,000 ticks a second, no budget, and an operator who acknowledges.
  *
  * @param speed  Largest speed (mm/s) of any point of the tissue.
@@ -2820,6 +2841,26 @@ dibs_code dibs_receiver_init(void *storage,
                              dibs_tree *tree,
                              const dibs_surface_limits *limits,
                              dibs_receiver **receiver);
+
+/**
+ * The same, for a sender with a key: a packet without a genuine tag is refused and counted.
+ *
+ * @param storage   As for `dibs_receiver_init`.
+ * @param size      Bytes of the storage.
+ * @param surface   The surface.
+ * @param tree      Its tree.
+ * @param limits    Limits of every frame.
+ * @param tags      The tags.
+ * @param receiver  Receives the receiver's address.
+ * @return As `dibs_receiver_init`.
+ */
+dibs_code dibs_receiver_init_with_tags(void *storage,
+                                       size_t size,
+                                       dibs_surface *surface,
+                                       dibs_tree *tree,
+                                       const dibs_surface_limits *limits,
+                                       dibs_tags *tags,
+                                       dibs_receiver **receiver);
 
 /**
  * Registers the surface again: the next whole frame is not compared with an earlier one. For an operator who knows
@@ -2968,11 +3009,6 @@ dibs_code dibs_scene_contacts(const dibs_scene *scene,
                               dibs_closest *closest);
 
 /**
- * The default settings: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
- */
-dibs_sender_settings dibs_sender_settings_of(void);
-
-/**
  * Connects to a controller, and makes the sender of a surface.
  *
  * @param storage   `DIBS_SENDER_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
@@ -2990,6 +3026,36 @@ dibs_code dibs_sender_init(void *storage,
                            const char *target,
                            const dibs_sender_settings *settings,
                            dibs_sender **sender);
+
+/**
+ * The same, for a receiver that demands tags. `dibs_sender_poll` asks it for its challenge; until the answer arrives, no
+ * frame can be sent.
+ *
+ * @param storage   As for `dibs_sender_init`.
+ * @param size      Bytes of the storage.
+ * @param tree      The surface's tree.
+ * @param target    As for `dibs_sender_init`.
+ * @param settings  How to send; or null.
+ * @param key       `DIBS_KEY` bytes that the receiver has, too. Not used after the call.
+ * @param receiver  The receiver's number, as in its `dibs_tags_init`.
+ * @param sender    Receives the sender's address.
+ * @return As `dibs_sender_init`.
+ */
+dibs_code dibs_sender_init_with_key(void *storage,
+                                    size_t size,
+                                    dibs_tree *tree,
+                                    const char *target,
+                                    const dibs_sender_settings *settings,
+                                    const uint8_t *key,
+                                    uint32_t receiver,
+                                    dibs_sender **sender);
+
+/**
+ * Sets the challenge of a receiver from which nothing comes back: that of its `dibs_tags_init`.
+ *
+ * @return `DIBS_CODE_OK`; `DIBS_CODE_ARGUMENT` if the sender has no key; or a misuse.
+ */
+dibs_code dibs_sender_challenge(dibs_sender *sender, uint64_t challenge);
 
 /**
  * Sends a frame, with heartbeats between its packets when due. From the third whole frame on over UDP, this thread
@@ -3068,6 +3134,58 @@ dibs_code dibs_sender_get_facts(dibs_sender *sender, dibs_sender_facts *facts, u
 dibs_code dibs_sender_close(dibs_sender *sender);
 
 /**
+ * The default settings: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
+ */
+dibs_sender_settings dibs_sender_settings_of(void);
+
+/**
+ * Makes all objects of a control loop in one piece of memory: validates the tree, and makes the surface and its two
+ * ends. To make each object in memory of its own, use `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init` and
+ * `dibs_guard_init`.
+ *
+ * Cost: linear in the bytes; once, at start-up.
+ *
+ * @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that move them),
+ *                aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no initial value.
+ * @param size    Bytes of the memory.
+ * @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
+ * @param length  Bytes of the tree.
+ * @param limits  The guard's limits.
+ * @param bus     Receives the bus's address.
+ * @param guard   Receives the guard's address.
+ * @return As the four functions; `DIBS_CODE_STORAGE_SIZE` if the tree has more rows than fit.
+ */
+dibs_code dibs_start(void *memory,
+                     size_t size,
+                     const uint8_t *bytes,
+                     size_t length,
+                     const dibs_guard_limits *limits,
+                     dibs_bus **bus,
+                     dibs_guard **guard);
+
+/**
+ * The same, for a sender with a key: a packet without a genuine tag is refused and counted.
+ *
+ * @param memory  As for `dibs_start`.
+ * @param size    Bytes of the memory.
+ * @param bytes   The tree.
+ * @param length  Bytes of the tree.
+ * @param limits  The guard's limits.
+ * @param tags    The tags.
+ * @param bus     Receives the bus's address.
+ * @param guard   Receives the guard's address.
+ * @return As `dibs_start`.
+ */
+dibs_code dibs_start_with_tags(void *memory,
+                               size_t size,
+                               const uint8_t *bytes,
+                               size_t length,
+                               const dibs_guard_limits *limits,
+                               dibs_tags *tags,
+                               dibs_bus **bus,
+                               dibs_guard **guard);
+
+/**
  * Makes a surface without a frame.
  *
  * @param storage   `DIBS_SURFACE_SIZE(vertices)` bytes, or `DIBS_GUARDED_SIZE(vertices)` for a guard, aligned to
@@ -3099,6 +3217,28 @@ dibs_code dibs_tracker_sweep(dibs_tracker *tracker,
                              const dibs_sweep *sweep,
                              const dibs_options *options,
                              dibs_swept *swept);
+
+/**
+ * Makes the tags of one receiver, for `dibs_start_with_tags`, `dibs_bus_init_with_tags` or
+ * `dibs_receiver_init_with_tags`.
+ *
+ * @param storage    `DIBS_TAGS_SIZE` bytes, aligned to `DIBS_ALIGNMENT`, for as long as the receiver is used. They hold
+ *                   the key in another form.
+ * @param size       Bytes of the storage.
+ * @param key        `DIBS_KEY` bytes that the sender has, too. Not used after the call.
+ * @param receiver   The receiver's number: no two receivers under one key may have the same.
+ * @param challenge  Drawn anew at each start: a random number, or a counter that survives a restart. The sender reads it
+ *                   from the answer to its hello. With 0, recordings of an earlier run are accepted until a later session
+ *                   has published.
+ * @param tags       Receives the tags' address.
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_tags_init(void *storage,
+                         size_t size,
+                         const uint8_t *key,
+                         uint32_t receiver,
+                         uint64_t challenge,
+                         dibs_tags **tags);
 
 /**
  * Makes a tracker on a tree, without a surface.

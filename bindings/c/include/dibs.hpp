@@ -49,6 +49,9 @@ public:
     Object &operator=(Object &&) = delete;
     operator T *() const { return object; }
     template <class... With> Code init(const With &...with) { return Make(storage, Size, First..., with..., &object); }
+protected:
+    /** The same by another function. */
+    template <auto Other, class... With> Code init_by(const With &...with) { return Other(storage, Size, with..., &object); }
 };
 /** A validated tree. The bytes outlive it. */
 struct Tree : Object<dibs_tree, DIBS_TREE_SIZE, dibs_tree_init> {
@@ -148,6 +151,12 @@ template <uint32_t Vertices> using Surface = Object<dibs_surface, DIBS_SURFACE_S
 /** Buffers for so many vertices, with the frame before, for a bus and a guard. */
 template <uint32_t Vertices>
 using GuardedSurface = Object<dibs_surface, DIBS_GUARDED_SIZE(Vertices), dibs_surface_init, Vertices>;
+/** A key of `DIBS_KEY` bytes. */
+using Key = const uint8_t (&)[DIBS_KEY];
+/** The tags that a receiver demands, and its challenge, drawn anew at each start. It outlives its receiver. */
+struct Tags : Object<dibs_tags, DIBS_TAGS_SIZE, dibs_tags_init> {
+    Code init(Key key, uint32_t receiver, uint64_t challenge) { return Object::init(&key[0], receiver, challenge); }
+};
 /** The bus's end of a guarded surface: its calls. */
 template <class Base> struct BusOf : Base {
     Code receive(Span<const uint8_t> bytes, uint32_t now) {
@@ -166,7 +175,15 @@ template <class Base> struct BusOf : Base {
     }
     Code work(uint32_t work, dibs_advance *outcome = nullptr) { return dibs_bus_work(*this, work, outcome); }
 };
-using Bus = BusOf<Object<dibs_bus, DIBS_BUS_SIZE, dibs_bus_init>>;
+struct Bus : BusOf<Object<dibs_bus, DIBS_BUS_SIZE, dibs_bus_init>> {
+    Code init(dibs_surface *surface, dibs_tree *tree, const dibs_guard_limits *limits) {
+        return Object::init(surface, tree, limits);
+    }
+    /** Of packets with tags alone. */
+    Code init(dibs_surface *surface, dibs_tree *tree, const dibs_guard_limits *limits, dibs_tags *tags) {
+        return init_by<dibs_bus_init_with_tags>(surface, tree, limits, tags);
+    }
+};
 /** The control tick's end of a guarded surface: its calls. */
 template <class Base> struct GuardOf : Base {
     Code closest(const dibs_tool &tool, uint32_t now, dibs_answer &answer) {
@@ -196,6 +213,20 @@ public:
     GuardOf<Handle<dibs_guard>> guard;
     /** The bytes outlive the loop. `DIBS_CODE_STORAGE_SIZE` where there is no memory. A second call begins anew. */
     Code init(Span<const uint8_t> tree, const dibs_guard_limits &limits) {
+        return start(tree, [&](auto... given) { return dibs_start(given..., &limits, &bus.object, &guard.object); });
+    }
+    /** Of packets with tags alone. */
+    Code init(Span<const uint8_t> tree, const dibs_guard_limits &limits, dibs_tags *tags) {
+        return start(tree, [&](auto... given) {
+            return dibs_start_with_tags(given..., &limits, tags, &bus.object, &guard.object);
+        });
+    }
+    /** Deletes every move and copy. */
+    Loop &operator=(Loop &&) = delete;
+    Loop() = default;
+    ~Loop() { release(); }
+private:
+    template <class Start> Code start(Span<const uint8_t> tree, Start make) {
         release();
         Tree checked;
         dibs_tree_facts facts;
@@ -205,13 +236,8 @@ public:
         const size_t size = DIBS_START_SIZE(facts.rows);
         memory = operator new(size, Alignment, std::nothrow);
         if (memory == nullptr) return DIBS_CODE_STORAGE_SIZE;
-        return dibs_start(memory, size, tree.data(), tree.size(), &limits, &bus.object, &guard.object);
+        return make(memory, size, tree.data(), tree.size());
     }
-    /** Deletes every move and copy. */
-    Loop &operator=(Loop &&) = delete;
-    Loop() = default;
-    ~Loop() { release(); }
-private:
     void release() {
         bus.object = nullptr;
         guard.object = nullptr;
@@ -226,6 +252,12 @@ struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
     Code init(dibs_tree *tree, const char *target, const dibs_sender_settings *settings = nullptr) {
         return Object::init(tree, target, settings);
     }
+    /** For a receiver that demands tags. */
+    Code init(dibs_tree *tree, const char *target, Key key, uint32_t receiver, const dibs_sender_settings *settings = nullptr) {
+        return init_by<dibs_sender_init_with_key>(tree, target, settings, &key[0], receiver);
+    }
+    /** That of a receiver from which nothing comes back. */
+    Code challenge(uint64_t challenge) { return dibs_sender_challenge(*this, challenge); }
     /** x, y and z of each vertex, in the mesh's order, so many milliseconds ago. */
     Code send(Span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent *sent = nullptr) {
         return dibs_sender_send(*this, positions.data(), uint32_t(positions.size() / 3), age, sent);
@@ -248,6 +280,13 @@ struct Writer : Object<dibs_writer, DIBS_WRITER_SIZE, dibs_writer_init> {
 };
 /** The bus's end of a surface. */
 struct Receiver : Object<dibs_receiver, DIBS_RECEIVER_SIZE, dibs_receiver_init> {
+    Code init(dibs_surface *surface, dibs_tree *tree, const dibs_surface_limits *limits) {
+        return Object::init(surface, tree, limits);
+    }
+    /** Of packets with tags alone. */
+    Code init(dibs_surface *surface, dibs_tree *tree, const dibs_surface_limits *limits, dibs_tags *tags) {
+        return init_by<dibs_receiver_init_with_tags>(surface, tree, limits, tags);
+    }
     Code accept(Span<const uint8_t> packet, uint32_t now, dibs_progress *progress = nullptr) {
         return dibs_receiver_accept(*this, packet.data(), packet.size(), now, progress);
     }

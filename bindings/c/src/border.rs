@@ -19,8 +19,8 @@ use heapless::Vec;
 
 use crate::code::dibs_code;
 
-/// Alignment, in bytes, of the storage of every object.
-pub const DIBS_ALIGNMENT: usize = 8;
+/// Alignment, in bytes, of the storage of every object: a computer's cipher needs that much.
+pub const DIBS_ALIGNMENT: usize = 16;
 
 /// A type for which any bits are a valid value.
 ///
@@ -176,7 +176,7 @@ pub trait Storage {
         words: usize,
     ) -> Result<&'static mut [u32], dibs_code>;
 
-    /// Stores a value after the first `offset` bytes, which are a multiple of [`DIBS_ALIGNMENT`].
+    /// Stores a value after the first `offset` bytes, which are a multiple of its alignment.
     fn keep<T>(self, size: usize, offset: usize, value: T) -> Result<&'static T, dibs_code>;
 }
 
@@ -236,7 +236,7 @@ impl Storage for *mut c_void {
     fn keep<T>(self, size: usize, offset: usize, value: T) -> Result<&'static T, dibs_code> {
         const { assert!(align_of::<T>() <= DIBS_ALIGNMENT) };
         let needed = size_of::<T>().checked_add(offset);
-        let needed = needed.filter(|_| offset.is_multiple_of(DIBS_ALIGNMENT));
+        let needed = needed.filter(|_| offset.is_multiple_of(align_of::<T>()));
         let start = memory(self, size, needed.ok_or(dibs_code::Argument)?)?;
         // SAFETY: inside the caller's memory and aligned; it belongs to this object alone from now on.
         unsafe {

@@ -2,18 +2,19 @@
 
 use core::ffi::c_void;
 
-use bytemuck::AnyBitPattern;
-use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::guard::{Bus, Rows};
-use dibs_nostd::wire::{Event, NoMac};
+use dibs_nostd::wire::{AesCmac, Event, Mac, NoMac};
 use dibs_nostd::{Advance, Millis, Progress, ReceiveError, TreeBytes, VertexTable};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
 use crate::frame::rows;
 use crate::limits::dibs_guard_limits;
-use crate::receiver::{DIBS_EVENTS, DIBS_STATUS, dibs_advance, dibs_progress};
-use crate::surface::{OfNodes, OfVertices, dibs_surface};
+use crate::outcome::{dibs_advance, dibs_progress};
+use crate::pose::dibs_pose;
+use crate::receiver::{DIBS_EVENTS, DIBS_STATUS};
+use crate::surface::{OfNodes, OfVertices, Poses, dibs_surface};
+use crate::tags::dibs_tags;
 use crate::tool::dibs_vec3;
 use crate::tree::{Row, dibs_tree};
 
@@ -28,14 +29,15 @@ pub const DIBS_BUS_SIZE: usize = 3_072;
 /// keeps its bytes for later, or the loop masks the interrupt while it works.
 pub struct dibs_bus(TheBus);
 
-/// For frames of vertices, or of the nodes that move the surface.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "its storage has one size, and there is no allocator"
-)]
+type OfRows<R, M> = Bus<'static, 'static, Row, M, R>;
+type Tags = &'static AesCmac;
+
+/// For frames of vertices, or of the nodes that move the surface; in packets without tags, or with them.
 enum TheBus {
-    Vertices(Bus<'static, 'static, Row, NoMac, OfVertices>),
-    Nodes(Bus<'static, 'static, Row, NoMac, OfNodes>),
+    Vertices(OfRows<OfVertices, NoMac>),
+    Nodes(OfRows<OfNodes, NoMac>),
+    TaggedVertices(OfRows<OfVertices, Tags>),
+    TaggedNodes(OfRows<OfNodes, Tags>),
 }
 
 /// Calls a function of the bus, of either kind.
@@ -44,6 +46,8 @@ macro_rules! with_bus {
         match $bus {
             TheBus::Vertices($own) => $call,
             TheBus::Nodes($own) => $call,
+            TheBus::TaggedVertices($own) => $call,
+            TheBus::TaggedNodes($own) => $call,
         }
     };
 }
@@ -90,22 +94,57 @@ pub extern "C" fn dibs_bus_init(
 ) -> dibs_code {
     dibs_code::of(|| {
         storage.make(size, bus, || {
-            let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?.read()?);
-            surface.check_guarded(tree.rows())?;
-            let (bytes, notes) = (TreeBytes::new(tree.bytes), &surface.notes);
-            let bus = surface.with_writer(|writer| match &tree.nodes {
-                None => {
-                    let tree = (&tree.tree, bytes, &OfVertices::of(&tree.tree)?);
-                    Ok(TheBus::Vertices(Bus::new(notes, writer, tree, &limits, NoMac)?))
-                }
-                Some(_) => {
-                    let tree = (&tree.tree, bytes, &OfNodes::of(&tree.tree)?);
-                    Ok(TheBus::Nodes(Bus::new(notes, writer, tree, &limits, NoMac)?))
-                }
-            });
-            Ok(dibs_bus(bus?))
+            let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?);
+            Ok(dibs_bus(match tree.nodes {
+                None => TheBus::Vertices(bus_of(surface, tree, limits, NoMac)?),
+                Some(_) => TheBus::Nodes(bus_of(surface, tree, limits, NoMac)?),
+            }))
         })
     })
+}
+
+/// The same, for a sender with a key: a packet without a genuine tag is refused and counted.
+///
+/// @param storage  As for `dibs_bus_init`.
+/// @param size     Bytes of the storage.
+/// @param surface  The surface.
+/// @param tree     Its tree.
+/// @param limits   The guard's limits.
+/// @param tags     The tags.
+/// @param bus      Receives the bus's address.
+/// @return As `dibs_bus_init`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_bus_init_with_tags(
+    storage: *mut c_void,
+    size: usize,
+    surface: *mut dibs_surface,
+    tree: *mut dibs_tree,
+    limits: *const dibs_guard_limits,
+    tags: *mut dibs_tags,
+    bus: *mut *mut dibs_bus,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, bus, || {
+            let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?);
+            let tags = tags.share()?.mac();
+            Ok(dibs_bus(match tree.nodes {
+                None => TheBus::TaggedVertices(bus_of(surface, tree, limits, tags)?),
+                Some(_) => TheBus::TaggedNodes(bus_of(surface, tree, limits, tags)?),
+            }))
+        })
+    })
+}
+
+fn bus_of<R: Rows<Poses = Poses>, M: Mac>(
+    surface: &'static dibs_surface,
+    tree: &'static dibs_tree,
+    limits: dibs_guard_limits,
+    mac: M,
+) -> Result<OfRows<R, M>, dibs_code> {
+    let limits = limits.read()?;
+    surface.check_guarded(tree.rows())?;
+    let of_tree = (&tree.tree, TreeBytes::new(tree.bytes), &R::of(&tree.tree)?);
+    surface.with_writer(|writer| Ok(Bus::new(&surface.notes, writer, of_tree, &limits, mac)?))
 }
 
 /// Receives bytes from a serial line or another stream. `dibs_bus_counters` counts the outcomes by cause.
@@ -187,22 +226,6 @@ pub extern "C" fn dibs_bus_frame(
         let _ = with_bus!(&mut bus.0, |bus| bus.frame(rows, Millis(captured), Millis(now)))?;
         Ok(())
     })
-}
-
-/// A rigid pose of a mesh: its point `p` is at `rotation p + shift`.
-#[derive(Clone, Copy, AnyBitPattern)]
-#[repr(C)]
-pub struct dibs_pose {
-    /// A quaternion x, y, z, w; the square of its length is within 2^-20 of 1.
-    pub rotation: [f32; 4],
-    /// In mm.
-    pub shift: dibs_vec3,
-}
-
-impl From<dibs_pose> for (Quat, Vec3) {
-    fn from(pose: dibs_pose) -> Self {
-        (Quat::from_array(pose.rotation), pose.shift.into())
-    }
 }
 
 /// The same as `dibs_bus_frame`, with a rigid pose of the whole mesh, for example from a tracker of the patient: tools,

@@ -175,6 +175,8 @@ pub enum dibs_code {
     SenderSuperseded = 603,
     /// The receiver has another surface than the sender.
     SenderOtherSurface = 604,
+    /// The sender has a key, but the receiver has not answered with its challenge yet.
+    SenderNoChallenge = 605,
 }
 
 impl dibs_code {
@@ -277,6 +279,7 @@ impl dibs_code {
         Self::SenderLine,
         Self::SenderSuperseded,
         Self::SenderOtherSurface,
+        Self::SenderNoChallenge,
     ];
 
     /// The code that a number from C stands for.
@@ -370,6 +373,7 @@ impl dibs_code {
             Self::SenderLine => c"the sender's connection broke",
             Self::SenderSuperseded => c"another sender has taken over the receiver",
             Self::SenderOtherSurface => c"the receiver has another surface than the sender",
+            Self::SenderNoChallenge => c"the receiver has not answered with its challenge yet",
         }
     }
 }

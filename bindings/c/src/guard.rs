@@ -1,7 +1,6 @@
 //! The control tick's end of a guarded surface: from a tool's pose to an answer.
 
 use core::ffi::c_void;
-use core::ptr;
 
 use bytemuck::AnyBitPattern;
 use dibs_nostd::filter::{FilterError, Motion};
@@ -10,7 +9,6 @@ use dibs_nostd::guard::{Answer, Guard, Rows};
 use dibs_nostd::{Contacts, Interval, Millis, Proximity, TreeBytes, Unavailable};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
-use crate::bus::{DIBS_BUS_SIZE, dibs_bus, dibs_bus_init};
 use crate::code::dibs_code;
 use crate::constraint::{dibs_force, dibs_wall, dibs_wall_force};
 use crate::contacts::dibs_contacts;
@@ -19,10 +17,10 @@ use crate::filter::{dibs_admitted, dibs_filter, dibs_motion};
 use crate::limits::dibs_guard_limits;
 use crate::query::{STACK, dibs_interval, dibs_proximity};
 use crate::reader::{dibs_age, dibs_link};
-use crate::surface::{OfNodes, OfVertices, dibs_surface, dibs_surface_init};
+use crate::surface::{OfNodes, OfVertices, dibs_surface};
 use crate::tool::{Shape, dibs_tool, dibs_vec3};
 use crate::tracker::{DIBS_OPENED, dibs_tracked};
-use crate::tree::{DIBS_TREE_SIZE, Row, dibs_tree, dibs_tree_init};
+use crate::tree::{Row, dibs_tree};
 
 /// Bytes of a guard's storage.
 pub const DIBS_GUARD_SIZE: usize = 25_344;
@@ -365,52 +363,4 @@ pub extern "C" fn dibs_answer_force(
         }
         Err(misuse) => misuse,
     }
-}
-
-/// Bytes of the memory for a control loop's objects, except the surface.
-pub const DIBS_START_BASE: usize = DIBS_TREE_SIZE + DIBS_BUS_SIZE + DIBS_GUARD_SIZE;
-
-/// Makes all objects of a control loop in one piece of memory: validates the tree, and makes the surface and its two
-/// ends. To make each object in memory of its own, use `dibs_tree_init`, `dibs_surface_init`, `dibs_bus_init` and
-/// `dibs_guard_init`.
-///
-/// Cost: linear in the bytes; once, at start-up.
-///
-/// @param memory  `DIBS_START_SIZE(rows)` bytes, with the rows of the tree's facts (vertices, or nodes that move them),
-///                aligned to `DIBS_ALIGNMENT`, for as long as an end is used. Needs no initial value.
-/// @param size    Bytes of the memory.
-/// @param bytes   The tree, in flash or in memory. Not copied: as for `dibs_tree_init`.
-/// @param length  Bytes of the tree.
-/// @param limits  The guard's limits.
-/// @param bus     Receives the bus's address.
-/// @param guard   Receives the guard's address.
-/// @return As the four functions; `DIBS_CODE_STORAGE_SIZE` if the tree has more rows than fit.
-#[unsafe(no_mangle)]
-pub extern "C" fn dibs_start(
-    memory: *mut c_void,
-    size: usize,
-    bytes: *const u8,
-    length: usize,
-    limits: *const dibs_guard_limits,
-    bus: *mut *mut dibs_bus,
-    guard: *mut *mut dibs_guard,
-) -> dibs_code {
-    const BUS: usize = DIBS_TREE_SIZE;
-    const GUARD: usize = BUS + DIBS_BUS_SIZE;
-    dibs_code::of(|| {
-        let (bus_place, guard_place) = (bus.check()?, guard.check()?);
-        let (mut tree, mut surface) = (ptr::null_mut(), ptr::null_mut());
-        let (mut bus, mut guard) = (ptr::null_mut(), ptr::null_mut());
-        dibs_tree_init(memory, size, bytes, length, &raw mut tree).done()?;
-        let room = size.checked_sub(DIBS_START_BASE).ok_or(dibs_code::StorageSize)?;
-        let rows = tree.share()?.rows();
-        let at = |offset| memory.wrapping_byte_add(offset);
-        dibs_surface_init(at(DIBS_START_BASE), room, rows, &raw mut surface).done()?;
-        dibs_bus_init(at(BUS), DIBS_BUS_SIZE, surface, tree, limits, &raw mut bus).done()?;
-        dibs_guard_init(at(GUARD), DIBS_GUARD_SIZE, surface, tree, limits, &raw mut guard)
-            .done()?;
-        bus_place.set(bus);
-        guard_place.set(guard);
-        Ok(())
-    })
 }

@@ -29,16 +29,22 @@ mod filter;
 mod frame;
 mod guard;
 mod limits;
+mod outcome;
 #[cfg(target_os = "none")]
 mod panic;
+mod pose;
 mod query;
 mod reader;
 mod receiver;
 mod scene;
 #[cfg(not(target_os = "none"))]
 mod sender;
+#[cfg(not(target_os = "none"))]
+mod settings;
+mod start;
 mod surface;
 mod sweep;
+mod tags;
 mod tool;
 mod tracker;
 mod tree;

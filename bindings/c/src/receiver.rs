@@ -3,14 +3,18 @@
 use core::ffi::{c_char, c_void};
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::wire::{Deframer, Event, encode_status, enframe, framed_bytes};
+use dibs_nostd::wire::{
+    AesCmac, Deframer, Event, Mac, NoMac, encode_status, enframe, framed_bytes,
+};
 use dibs_nostd::{
     Advance, Assembler, Millis, Progress, StretchMonitor, SurfaceLimits, VertexTable,
 };
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage};
 use crate::code::dibs_code;
+use crate::outcome::{dibs_advance, dibs_progress};
 use crate::surface::dibs_surface;
+use crate::tags::dibs_tags;
 use crate::tool::dibs_vec3;
 use crate::tree::{Row, dibs_tree};
 
@@ -32,12 +36,36 @@ const _: () = assert!(DIBS_STATUS == framed_bytes(STATUS));
 ///
 /// One context at a time, of lower priority than the reader's: the bus interrupt.
 pub struct dibs_receiver {
-    assembler: Assembler<'static, StretchMonitor<'static, Row>>,
+    assembler: TheAssembler,
     deframer: Deframer<DIBS_MTU>,
     surface: &'static dibs_surface,
     mesh_id: u32,
     /// Number of the latest published frame.
     published: Option<u32>,
+}
+
+type OfPackets<M> = Assembler<'static, StretchMonitor<'static, Row>, M>;
+
+/// Of packets without tags, or with them.
+enum TheAssembler {
+    Untagged(OfPackets<NoMac>),
+    Tagged(OfPackets<&'static AesCmac>),
+}
+
+/// Calls a function of the assembler, of either kind.
+macro_rules! with_assembler {
+    ($assembler:expr, |$own:ident| $call:expr) => {
+        match $assembler {
+            TheAssembler::Untagged($own) => $call,
+            TheAssembler::Tagged($own) => $call,
+        }
+    };
+}
+
+impl TheAssembler {
+    fn accept(&mut self, packet: &[u8], now: Millis) -> Result<Progress, dibs_code> {
+        with_assembler!(self, |own| own.accept(packet, now)).map_err(dibs_code::from)
+    }
 }
 
 impl Kind for dibs_receiver {
@@ -48,7 +76,8 @@ impl Kind for dibs_receiver {
 impl dibs_receiver {
     /// Passes the bus's health to the reader.
     fn note(&self) {
-        self.surface.notes.link().set(&self.assembler.health());
+        let health = with_assembler!(&self.assembler, |own| own.health());
+        self.surface.notes.link().set(&health);
     }
 
     /// The common end of all calls that receive a packet.
@@ -106,50 +135,54 @@ pub extern "C" fn dibs_receiver_init(
 ) -> dibs_code {
     dibs_code::of(|| {
         storage.make(size, receiver, || {
-            let (surface, tree, given) = (surface.share()?, &tree.share()?.tree, limits.get()?);
-            if surface.vertices() != tree.vertex_count() as usize {
-                return Err(dibs_code::OtherTree);
-            }
-            let monitor = StretchMonitor::new(tree)?.limits(given.into());
-            let (writer, mesh_id) = (surface.take_writer()?, tree.mesh_id());
-            let assembler = Assembler::new(writer, monitor, mesh_id, given.reach);
-            let (deframer, published) = (Deframer::new(), None);
-            Ok(dibs_receiver { assembler, deframer, surface, mesh_id, published })
+            receiver_of(surface, tree, limits, NoMac, TheAssembler::Untagged)
         })
     })
 }
 
-/// The outcome of a packet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum dibs_progress {
-    /// No packet is complete yet.
-    None = 0,
-    /// A frame began.
-    Begun = 1,
-    /// The packet was accepted.
-    Stored = 2,
-    /// The packet was a repetition, and was ignored.
-    Duplicate = 3,
-    /// The frame is complete: `dibs_receiver_advance` checks and publishes it.
-    Complete = 4,
-    /// The packet was a heartbeat of the sender.
-    Heartbeat = 5,
-    /// The packet was a hello, which asks for a status: it is due now.
-    Hello = 6,
+/// The same, for a sender with a key: a packet without a genuine tag is refused and counted.
+///
+/// @param storage   As for `dibs_receiver_init`.
+/// @param size      Bytes of the storage.
+/// @param surface   The surface.
+/// @param tree      Its tree.
+/// @param limits    Limits of every frame.
+/// @param tags      The tags.
+/// @param receiver  Receives the receiver's address.
+/// @return As `dibs_receiver_init`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_receiver_init_with_tags(
+    storage: *mut c_void,
+    size: usize,
+    surface: *mut dibs_surface,
+    tree: *mut dibs_tree,
+    limits: *const dibs_surface_limits,
+    tags: *mut dibs_tags,
+    receiver: *mut *mut dibs_receiver,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, receiver, || {
+            let tags = tags.share()?.mac();
+            receiver_of(surface, tree, limits, tags, TheAssembler::Tagged)
+        })
+    })
 }
 
-impl From<Progress> for dibs_progress {
-    fn from(progress: Progress) -> Self {
-        match progress {
-            Progress::Begun { .. } => Self::Begun,
-            Progress::Duplicate => Self::Duplicate,
-            Progress::Complete { .. } => Self::Complete,
-            Progress::Heartbeat => Self::Heartbeat,
-            Progress::Hello => Self::Hello,
-            _ => Self::Stored,
-        }
+fn receiver_of<M: Mac>(
+    surface: *mut dibs_surface,
+    tree: *mut dibs_tree,
+    limits: *const dibs_surface_limits,
+    mac: M,
+    assembler: fn(OfPackets<M>) -> TheAssembler,
+) -> Result<dibs_receiver, dibs_code> {
+    let (surface, tree, given) = (surface.share()?, &tree.share()?.tree, limits.get()?);
+    if surface.vertices() != tree.vertex_count() as usize {
+        return Err(dibs_code::OtherTree);
     }
+    let monitor = StretchMonitor::new(tree)?.limits(given.into());
+    let (writer, mesh_id) = (surface.take_writer()?, tree.mesh_id());
+    let assembler = assembler(Assembler::with_mac(writer, monitor, mesh_id, given.reach, mac));
+    Ok(dibs_receiver { assembler, deframer: Deframer::new(), surface, mesh_id, published: None })
 }
 
 /// Registers the surface again: the next whole frame is not compared with an earlier one. For an operator who knows
@@ -160,7 +193,7 @@ impl From<Progress> for dibs_progress {
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_receiver_register(receiver: *mut dibs_receiver) -> dibs_code {
     dibs_code::of(|| {
-        receiver.open()?.assembler.register();
+        with_assembler!(&mut receiver.open()?.assembler, |own| own.register());
         Ok(())
     })
 }
@@ -187,7 +220,7 @@ pub extern "C" fn dibs_receiver_accept(
     dibs_code::of(|| {
         let (progress, mut receiver) = (progress.check_if_any()?, receiver.open()?);
         let outcome = receiver.assembler.accept(packet.slice(length)?, Millis(now));
-        receiver.end(outcome.map_err(dibs_code::from), progress)
+        receiver.end(outcome, progress)
     })
 }
 
@@ -213,39 +246,14 @@ pub extern "C" fn dibs_receiver_byte(
                 Place::set_if_any(progress, dibs_progress::None);
                 return Ok(());
             }
-            Some(Ok(packet)) => assembler.accept(packet, Millis(now)).map_err(dibs_code::from),
+            Some(Ok(packet)) => assembler.accept(packet, Millis(now)),
             Some(Err(error)) => {
-                assembler.count_framing(&error);
+                with_assembler!(assembler, |own| own.count_framing(&error));
                 Err(error.into())
             }
         };
         receiver.end(outcome, progress)
     })
-}
-
-/// The outcome of a slice of work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum dibs_advance {
-    /// No complete frame waits to be checked.
-    Idle = 0,
-    /// More work is left.
-    Pending = 1,
-    /// The frame is admitted, but the previous one is being read: a later call publishes it.
-    Held = 2,
-    /// The frame is published.
-    Published = 3,
-}
-
-impl From<Advance> for dibs_advance {
-    fn from(advance: Advance) -> Self {
-        match advance {
-            Advance::Pending => Self::Pending,
-            Advance::Held { .. } => Self::Held,
-            Advance::Published { .. } => Self::Published,
-            _ => Self::Idle,
-        }
-    }
 }
 
 /// Does some of the pending work: checks rows and triangles, and publishes a frame that is within its limits.
@@ -265,7 +273,7 @@ pub extern "C" fn dibs_receiver_advance(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (advance, mut receiver) = (advance.check_if_any()?, receiver.open()?);
-        let outcome = receiver.assembler.advance(work);
+        let outcome = with_assembler!(&mut receiver.assembler, |own| own.advance(work));
         receiver.note();
         let outcome = outcome?;
         if let Advance::Published { epoch } = outcome {
@@ -299,10 +307,12 @@ pub extern "C" fn dibs_receiver_status(
     dibs_code::of(|| {
         let (length, out) = (length.check()?, out.places(capacity)?);
         let mut receiver = receiver.open()?;
-        let status = receiver.assembler.status(Millis(now), safety);
-        let (counters, mac) = (receiver.assembler.counters(), receiver.assembler.mac());
         let (mut packet, mut line) = ([0; STATUS], [0; DIBS_STATUS]);
-        let packet = encode_status(receiver.mesh_id, &status, counters, mac, &mut packet);
+        let mesh_id = receiver.mesh_id;
+        let packet = with_assembler!(&mut receiver.assembler, |own| {
+            let status = own.status(Millis(now), safety);
+            encode_status(mesh_id, &status, own.counters(), own.mac(), &mut packet)
+        });
         let bytes = if framed == 0 {
             packet
         } else {
@@ -337,7 +347,8 @@ pub extern "C" fn dibs_receiver_position(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (position, receiver) = (position.check()?, receiver.open()?);
-        let surface = receiver.assembler.surface().ok_or(dibs_code::NoSurface)?;
+        let surface = with_assembler!(&receiver.assembler, |own| own.surface());
+        let surface = surface.ok_or(dibs_code::NoSurface)?;
         position.set(surface.position(row).ok_or(dibs_code::Argument)?.into());
         Ok(())
     })
@@ -369,7 +380,7 @@ pub extern "C" fn dibs_receiver_counters(
 ) -> dibs_code {
     dibs_code::of(|| {
         let (out, receiver) = (counters.places(DIBS_EVENTS)?, receiver.open()?);
-        let all = receiver.assembler.counters();
+        let all = with_assembler!(&receiver.assembler, |own| own.counters());
         out.fill(&Event::ALL.map(|event| all.of(event))).map(|_| ())
     })
 }

@@ -1,21 +1,24 @@
 //! The imaging side, on a host computer: sends a moving surface to a controller over a serial line or a socket.
 
 use core::ffi::{c_char, c_void};
+use std::boxed::Box;
 use std::string::{String, ToString};
 use std::time::Duration;
 use std::vec::Vec;
 
 use dibs_nostd::RigidPose;
 use dibs_nostd::glam::{Quat, Vec3};
-use dibs_nostd::wire::{Content, Event};
+use dibs_nostd::wire::{AesCmac, Content, Event};
 use dibs_stream::transport::{Line, Target};
 use dibs_stream::{SendError, Sender, Sent, Settings, SurfaceOrder};
 
 use crate::border::{Handle, Input, Kind, Output, Place, Storage, text};
-use crate::bus::dibs_pose;
 use crate::code::dibs_code;
 use crate::frame::rows;
+use crate::pose::dibs_pose;
 use crate::receiver::DIBS_EVENTS;
+use crate::settings::dibs_sender_settings;
+use crate::tags;
 use crate::tree::dibs_tree;
 
 /// Bytes of a sender's storage.
@@ -34,52 +37,32 @@ const MTU: usize = 1_024;
 /// Unlike the other objects it allocates when it starts, and has a thread that reads the line: `dibs_sender_close` ends
 /// both. Another `dibs_sender_init` in the same storage without it leaks them.
 pub struct dibs_sender {
-    sender: Sender<Line, MTU>,
+    sender: TheSender,
     /// Positions of the present frame, in memory that is reused.
     positions: Vec<Vec3>,
     /// The text of the last error.
     error: String,
 }
 
+/// Of packets without tags, or with them.
+enum TheSender {
+    Untagged(Box<Sender<Line, MTU>>),
+    Tagged(Box<Sender<Line, MTU, AesCmac>>),
+}
+
+/// Calls a function of the sender, of either kind.
+macro_rules! with_sender {
+    ($sender:expr, |$own:ident| $call:expr) => {
+        match $sender {
+            TheSender::Untagged($own) => $call,
+            TheSender::Tagged($own) => $call,
+        }
+    };
+}
+
 impl Kind for dibs_sender {
     const MARK: u32 = 0x6462_7318;
     const SIZE: usize = DIBS_SENDER_SIZE;
-}
-
-/// Settings of a sender. `dibs_sender_settings_of` returns the defaults.
-#[derive(Clone, Copy, bytemuck::AnyBitPattern)]
-#[repr(C)]
-pub struct dibs_sender_settings {
-    /// Other than 0 for 6 bytes a vertex instead of 12, in a box that is fitted to each frame.
-    pub quantised: u32,
-    /// Sends only the vertices that moved by more than this (mm); below 0 every frame is whole.
-    pub partial: f32,
-    /// With partial frames, the largest number of frames from one whole frame to the next.
-    pub whole_every: u32,
-    /// Time between two heartbeats, in ms; 0 sends none.
-    pub heartbeat: u32,
-    /// Session number of this sender. The receiver ignores packets of earlier sessions, whose numbers are smaller, so a
-    /// program that restarts needs a larger one. By default the time in tenths of a second.
-    pub session: u32,
-}
-
-impl TryFrom<dibs_sender_settings> for Settings {
-    type Error = dibs_code;
-
-    fn try_from(settings: dibs_sender_settings) -> Result<Self, dibs_code> {
-        if !settings.partial.is_finite() {
-            return Err(dibs_code::Argument);
-        }
-        let heartbeat = Duration::from_millis(settings.heartbeat.into());
-        Ok(Self {
-            quantised: settings.quantised != 0,
-            partial: (settings.partial >= 0.0).then_some(settings.partial),
-            whole_every: settings.whole_every,
-            heartbeat: (settings.heartbeat > 0).then_some(heartbeat),
-            session: settings.session,
-            ..Self::default()
-        })
-    }
 }
 
 /// A frame that was sent.
@@ -114,6 +97,10 @@ impl From<Sent> for dibs_sent {
 }
 
 impl dibs_sender {
+    fn of(sender: TheSender) -> Self {
+        Self { sender, positions: Vec::new(), error: String::new() }
+    }
+
     /// Stores an error's text.
     fn keep(&mut self, error: &SendError) -> dibs_code {
         use core::fmt::Write;
@@ -124,21 +111,9 @@ impl dibs_sender {
             SendError::Line(_) => dibs_code::SenderLine,
             SendError::Superseded { .. } => dibs_code::SenderSuperseded,
             SendError::OtherSurface { .. } => dibs_code::SenderOtherSurface,
+            SendError::NoChallenge => dibs_code::SenderNoChallenge,
             _ => dibs_code::SenderFrame,
         }
-    }
-}
-
-/// The default settings: 6 bytes a vertex, whole frames, a heartbeat every 100 ms.
-#[unsafe(no_mangle)]
-pub extern "C" fn dibs_sender_settings_of() -> dibs_sender_settings {
-    let usual = Settings::default();
-    dibs_sender_settings {
-        quantised: usual.quantised.into(),
-        partial: -1.0,
-        whole_every: usual.whole_every,
-        heartbeat: usual.heartbeat.map_or(0, |time| time.as_millis() as u32),
-        session: usual.session,
     }
 }
 
@@ -163,16 +138,74 @@ pub extern "C" fn dibs_sender_init(
 ) -> dibs_code {
     dibs_code::of(|| {
         storage.make(size, sender, || {
-            let (tree, target) = (tree.share()?, text(target)?);
-            let settings = match settings.get_if_any()? {
-                Some(settings) => settings.try_into()?,
-                None => Settings::default(),
-            };
-            let target: Target = target.parse().map_err(|_| dibs_code::SenderTarget)?;
-            let line = target.open().map_err(|_| dibs_code::SenderTarget)?;
-            let sender = Sender::new(line, SurfaceOrder::of(&tree.tree), settings);
-            Ok(dibs_sender { sender, positions: Vec::new(), error: String::new() })
+            let (line, order, settings) = ends(tree, target, settings)?;
+            let sender = Sender::new(line, order, settings);
+            Ok(dibs_sender::of(TheSender::Untagged(Box::new(sender))))
         })
+    })
+}
+
+/// The same, for a receiver that demands tags. `dibs_sender_poll` asks it for its challenge; until the answer arrives, no
+/// frame can be sent.
+///
+/// @param storage   As for `dibs_sender_init`.
+/// @param size      Bytes of the storage.
+/// @param tree      The surface's tree.
+/// @param target    As for `dibs_sender_init`.
+/// @param settings  How to send; or null.
+/// @param key       `DIBS_KEY` bytes that the receiver has, too. Not used after the call.
+/// @param receiver  The receiver's number, as in its `dibs_tags_init`.
+/// @param sender    Receives the sender's address.
+/// @return As `dibs_sender_init`.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_init_with_key(
+    storage: *mut c_void,
+    size: usize,
+    tree: *mut dibs_tree,
+    target: *const c_char,
+    settings: *const dibs_sender_settings,
+    key: *const u8,
+    receiver: u32,
+    sender: *mut *mut dibs_sender,
+) -> dibs_code {
+    dibs_code::of(|| {
+        storage.make(size, sender, || {
+            let key = tags::key(key)?;
+            let (line, order, settings) = ends(tree, target, settings)?;
+            let keyed_mac = move |challenge| AesCmac::new(&key, receiver, challenge);
+            let sender = Sender::with_mac(line, order, settings, keyed_mac);
+            Ok(dibs_sender::of(TheSender::Tagged(Box::new(sender))))
+        })
+    })
+}
+
+/// The line, the surface and the settings of a sender.
+fn ends(
+    tree: *mut dibs_tree,
+    target: *const c_char,
+    settings: *const dibs_sender_settings,
+) -> Result<(Line, SurfaceOrder, Settings), dibs_code> {
+    let (tree, target) = (tree.share()?, text(target)?);
+    let settings = match settings.get_if_any()? {
+        Some(settings) => settings.try_into()?,
+        None => Settings::default(),
+    };
+    let target: Target = target.parse().map_err(|_| dibs_code::SenderTarget)?;
+    let line = target.open().map_err(|_| dibs_code::SenderTarget)?;
+    Ok((line, SurfaceOrder::of(&tree.tree), settings))
+}
+
+/// Sets the challenge of a receiver from which nothing comes back: that of its `dibs_tags_init`.
+///
+/// @return `DIBS_CODE_OK`; `DIBS_CODE_ARGUMENT` if the sender has no key; or a misuse.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_sender_challenge(sender: *mut dibs_sender, challenge: u64) -> dibs_code {
+    dibs_code::of(|| match &mut sender.open()?.sender {
+        TheSender::Untagged(_) => Err(dibs_code::Argument),
+        TheSender::Tagged(sender) => {
+            sender.challenge(challenge);
+            Ok(())
+        }
     })
 }
 
@@ -237,12 +270,12 @@ fn send(
     positions.extend(rows.iter().copied().map(Vec3::from_array));
     let ago = (age != DIBS_AGE_UNKNOWN).then_some(Duration::from_millis(age.into()));
     let outcome = match (pose.map(<(Quat, Vec3)>::from), ago) {
-        (None, None) => own.send(positions),
-        (None, Some(ago)) => own.send_captured(positions, ago),
+        (None, None) => with_sender!(own, |own| own.send(positions)),
+        (None, Some(ago)) => with_sender!(own, |own| own.send_captured(positions, ago)),
         (Some(_), None) => return Err(dibs_code::Argument),
         (Some((rotation, shift)), Some(ago)) => RigidPose::new(rotation, shift)
             .map_err(SendError::from)
-            .and_then(|pose| own.send_at(positions, pose, ago)),
+            .and_then(|pose| with_sender!(own, |own| own.send_at(positions, pose, ago))),
     };
     let outcome = outcome.map_err(|error| sender.keep(&error))?;
     Place::set_if_any(sent, outcome.into());
@@ -257,7 +290,7 @@ fn send(
 pub extern "C" fn dibs_sender_poll(sender: *mut dibs_sender) -> dibs_code {
     dibs_code::of(|| {
         let mut sender = sender.open()?;
-        let polled = sender.sender.poll();
+        let polled = with_sender!(&mut sender.sender, |own| own.poll());
         polled.map_err(|error| sender.keep(&error))
     })
 }
@@ -296,6 +329,8 @@ pub struct dibs_sender_facts {
     pub is_acknowledged: u32,
     /// Number of the latest acknowledged frame.
     pub acknowledged: u32,
+    /// Whether frames can be sent: without a key always, with a key once the receiver's challenge is known.
+    pub is_ready: u32,
 }
 
 /// Reads the state of a sender.
@@ -313,17 +348,17 @@ pub extern "C" fn dibs_sender_get_facts(
     dibs_code::of(|| {
         let (facts, sender) = (facts.check()?, sender.open()?);
         if !counters.is_null() {
-            let all = sender.sender.counters();
+            let all = with_sender!(&sender.sender, |own| own.counters());
             counters.places(DIBS_EVENTS)?.fill(&Event::ALL.map(|event| all.of(event)))?;
         }
-        let (totals, acknowledged) = (sender.sender.totals(), sender.sender.acknowledged());
-        facts.set(dibs_sender_facts {
-            frames: totals.frames as u32,
-            statuses: totals.statuses as u32,
-            in_flight: sender.sender.in_flight(),
-            is_acknowledged: acknowledged.is_some().into(),
-            acknowledged: acknowledged.unwrap_or(0),
-        });
+        facts.set(with_sender!(&sender.sender, |own| dibs_sender_facts {
+            frames: own.totals().frames as u32,
+            statuses: own.totals().statuses as u32,
+            in_flight: own.in_flight(),
+            is_acknowledged: own.acknowledged().is_some().into(),
+            acknowledged: own.acknowledged().unwrap_or(0),
+            is_ready: own.is_ready().into(),
+        }));
         Ok(())
     })
 }

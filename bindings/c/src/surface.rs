@@ -49,7 +49,7 @@ impl Kind for dibs_surface {
 /// Every frame of a bus may have a pose. Frames without one behave bit for bit as if poses did not exist.
 pub(crate) type OfVertices = Posed;
 pub(crate) type OfNodes = Posed<Nodes<'static>>;
-type Poses = <OfVertices as Rows>::Poses;
+pub(crate) type Poses = <OfVertices as Rows>::Poses;
 
 pub(crate) type Writer = FrameWriter<'static>;
 pub(crate) type Reader = FrameReader<'static>;

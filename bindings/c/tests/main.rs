@@ -15,4 +15,5 @@ mod ros2;
 mod script;
 mod sender;
 mod sweep;
+mod tags;
 mod wrapper;

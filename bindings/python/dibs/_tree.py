@@ -21,24 +21,7 @@ def _dtype(fields: list[tuple[str, str, int]]) -> np.dtype[Any]:
 
 
 ANSWER = _dtype(_dibs.ANSWER)
-"""The record of an answer. Act on the first of `interval`. Lengths are in mm, coordinates those of the mesh's file.
-
-`separation`: the distance from tool to surface; where the tool's axis crosses or is inside, less than 0 by the depth.
-`lower`: the search's certified lower bound; less than `separation` if a budget ended, or by a depth's tolerance.
-`accuracy`: largest error of either, from rounding and from the positions.
-`interval`: both bounds, including the accuracy. The first is negative infinity if the tool may be inside to any depth.
-`axis_distance`: from the tool's axis, a sphere's centre or a capsule's segment, to the surface; 0 where it crosses.
-`axis_parameter`: the pair's position along the axis, 0 at its start and 1 at its end; 0 for a sphere.
-`point_on_surface`, `point_on_tool`: the closest pair; if the axis crosses or is inside, that of its deepest point.
-`direction`: the unit vector that points out of the tissue; zero if undefined.
-`triangle`: the vertices of the surface's triangle, numbered as in the mesh. Three equal ones where the budget ended first.
-`barycentric`: their weights at `point_on_surface`, of sum 1.
-`label`: the triangle's label, or -1.
-`surface`, `tool`: the pair's surface in a `Scene` and tool in a chain, from 0.
-`side`, `side_reason`: a `Side`; and an index of `SIDE_REASONS`, why it is undefined.
-`coverage`: a `Coverage`, how the stretch is known.
-`node_tests`, `triangle_tests`: the cost of the search.
-"""
+"""The record of an answer: `help(dibs.Tree.query)` says what its fields are."""
 CONTACT = _dtype(_dibs.CONTACT)
 """The record of a contact. Fields with the names of an `ANSWER` have the same meaning.
 
@@ -268,6 +251,30 @@ class Tree:
         positions, or a `Surface`, which is measured once for several calls; by default the rest shape. `budget` limits
         the node tests of each tool, where an exact triangle test counts as 8. Poses are answered on all cores, without
         Python's lock.
+
+        The fields of an answer; act on the first of `interval`. Lengths are in mm, coordinates those of the mesh's file.
+
+        `separation`: the distance from tool to surface; where the tool's axis crosses or is inside, less than 0 by the
+            depth.
+        `lower`: the search's certified lower bound; less than `separation` if a budget ended, or by a depth's
+            tolerance.
+        `accuracy`: largest error of either, from rounding and from the positions.
+        `interval`: both bounds, including the accuracy. The first is negative infinity if the tool may be inside to any
+            depth.
+        `axis_distance`: from the tool's axis, a sphere's centre or a capsule's segment, to the surface; 0 where it
+            crosses.
+        `axis_parameter`: the pair's position along the axis, 0 at its start and 1 at its end; 0 for a sphere.
+        `point_on_surface`, `point_on_tool`: the closest pair; if the axis crosses or is inside, that of its deepest
+            point.
+        `direction`: the unit vector that points out of the tissue; zero if undefined.
+        `triangle`: the vertices of the surface's triangle, numbered as in the mesh. Three equal ones where the budget
+            ended first.
+        `barycentric`: their weights at `point_on_surface`, of sum 1.
+        `label`: the triangle's label, or -1.
+        `surface`, `tool`: the pair's surface in a `Scene` and tool in a chain, from 0.
+        `side`, `side_reason`: a `Side`; and an index of `SIDE_REASONS`, why it is undefined.
+        `coverage`: a `Coverage`, how the stretch is known.
+        `node_tests`, `triangle_tests`: the cost of the search.
         """
         return self._surface(surface).query(tools, budget=budget)
 

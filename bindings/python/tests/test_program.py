@@ -6,6 +6,7 @@ name another, and where an axis crosses the surface each has an interval of its 
 
 import json
 import pathlib
+import pydoc
 import re
 import sys
 import unittest
@@ -132,6 +133,10 @@ class Program(WithProgram):
         fields = re.findall(r"^\| (`.*?) \|", page, re.MULTILINE)
         named = {name for row in fields[:9] for name in re.findall(r"`(\w+)`", row)}
         self.assertEqual(named, set(dibs.ANSWER.names))
+
+    def test_help_says_what_the_fields_of_an_answer_are(self):
+        fields = re.findall(r"^[ |]*((?:`\w+`(?:, )?)+):", pydoc.render_doc(dibs.Tree.query), re.MULTILINE)
+        self.assertEqual({name for row in fields for name in re.findall(r"`(\w+)`", row)}, set(dibs.ANSWER.names))
 
     def test_the_example_of_the_readme_draws_the_programs_answers(self):
         page = pathlib.Path(ROOT / "bindings/python/README.md").read_text(encoding="utf-8")

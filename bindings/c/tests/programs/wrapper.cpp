@@ -78,6 +78,47 @@ int main(int argc, char **argv) {
         EXPECT(DIBS_CODE_ARGUMENT, sender.send_at(few, {{0.0f, 0.0f, 0.0f, 1.0f}, {}}, DIBS_AGE_UNKNOWN));
         MUST(sender.poll());
     }
+    {
+        /* With tags the packets, which have none, are forgeries to bus, loop and receiver; a sender waits. */
+        constexpr std::uint8_t key[DIBS_KEY] = {1, 2, 3};
+        static dibs::Tags tags;
+        static dibs::GuardedSurface<502> tagged_surface;
+        static dibs::Bus tagged;
+        static dibs::Surface<502> of_receiver;
+        static dibs::Receiver tagged_receiver;
+        const dibs_guard_limits limits = dibs_guard_limits_of(300.0f, 80);
+        dibs::Loop loop;
+        dibs::Sender sender;
+        EXPECT(DIBS_CODE_NULL, loop.init(bytes, limits, tags));
+        MUST(tags.init(key, 7, 0x5EED));
+        MUST(loop.init(bytes, limits, tags));
+        MUST(tagged_surface.init());
+        MUST(of_receiver.init());
+        MUST(tagged.init(tagged_surface, tree, &limits, tags));
+        MUST(tagged_receiver.init(of_receiver, tree, &surface_limits, tags));
+        MUST(tagged.receive(packets, 0));
+        MUST(loop.bus.receive(packets, 0));
+        std::uint32_t counts[3][DIBS_EVENTS];
+        dibs_code last = DIBS_CODE_OK;
+        for (const auto byte : packets) {
+            const auto code = dibs_receiver_byte(tagged_receiver, byte, 0, nullptr);
+            last = code == DIBS_CODE_OK ? last : code;
+        }
+        EXPECT(DIBS_CODE_PACKET_FORGED, last);
+        MUST(dibs_bus_counters(tagged, counts[0]));
+        MUST(dibs_bus_counters(loop.bus, counts[1]));
+        MUST(dibs_receiver_counters(tagged_receiver, counts[2]));
+        for (std::uint32_t event = 0; event < DIBS_EVENTS; event++) {
+            const bool is_forged = dibs_event_name(event) == std::string_view("forged");
+            for (const auto &count : counts) {
+                EXPECT(true, (count[event] > 0) == is_forged);
+            }
+        }
+        MUST(sender.init(tree, "udp:127.0.0.1:9", key, 7));
+        EXPECT(DIBS_CODE_SENDER_NO_CHALLENGE, sender.send(std::vector<float>(3 * 502)));
+        MUST(sender.challenge(0x5EED));
+        EXPECT(DIBS_CODE_SENDER_FRAME, sender.send(std::vector<float>(3)));
+    }
     for (std::size_t at = 0; at < packets.size(); at++) {
         MUST(dibs_receiver_byte(receiver, packets[at], 0, nullptr));
         MUST(receiver.advance(10'000));

@@ -3,6 +3,7 @@
 
 // Requirement: B-09
 
+use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::process::{Child, Command, Stdio};
@@ -35,14 +36,15 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// the controller's.
 const MOST: &str = "1000";
 
-/// Frames on their way before one waits: the emulator is slower than the board.
+/// Frames on their way before one waits in the program. There it would grow old by this computer's time, which is faster than
+/// the emulated board's, so that the board would take it for one captured before the published frame.
 const ON_THEIR_WAY: &str = "64";
 
 /// Sends the motion repeatedly until the controller ends. Returns the program's totals.
 pub fn send(scene: &Scene, link: &Arc<Link>, port: u16) -> Result<Value> {
     let folder = tempfile::tempdir()?;
-    let tree = folder.path().join("surface.dibs");
-    std::fs::write(&tree, scene.tree.blob())?;
+    let [tree, said] = ["surface.dibs", "said"].map(|name| folder.path().join(name));
+    fs::write(&tree, scene.tree.blob())?;
     let (listener, relay) = (TcpListener::bind("127.0.0.1:0")?, Relay::new(link, port)?);
     // A board that starts has no network yet.
     while link.now() == 0 && !link.is_over() {
@@ -58,9 +60,23 @@ pub fn send(scene: &Scene, link: &Arc<Link>, port: u16) -> Result<Value> {
     ]);
     bridge.arg("--from").arg(format!("igtl:{}", listener.local_addr()?));
     bridge.arg("--to").arg(format!("udp:{}", relay.to));
-    bridge.stdout(Stdio::piped()).stderr(Stdio::null());
-    let mut bridge = Guard(bridge.spawn().context("cannot start `dibs`, which cargo builds")?);
-    let mut peer = accept(&listener)?;
+    bridge.stdout(Stdio::piped()).stderr(File::create(&said)?);
+    let bridge = Guard(bridge.spawn().context("cannot start `dibs`, which cargo builds")?);
+    let totals = pass(scene, link, bridge, &listener, relay);
+    totals.with_context(|| {
+        format!("`dibs bridge` said: {}", fs::read_to_string(&said).unwrap_or_default())
+    })
+}
+
+/// Lets the program send until the controller ends. Returns its totals.
+fn pass(
+    scene: &Scene,
+    link: &Link,
+    mut bridge: Guard,
+    listener: &TcpListener,
+    relay: Relay,
+) -> Result<Value> {
+    let mut peer = accept(listener)?;
     let played = thread::scope(|scope| {
         let relayed = scope.spawn(|| relay.run(link));
         play(scene, link, &mut peer).and(joined(relayed.join()))
