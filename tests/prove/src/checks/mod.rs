@@ -10,6 +10,7 @@ mod bound;
 mod bounded;
 mod corruption;
 pub mod cost;
+mod dearer;
 mod demo;
 mod demo_c;
 mod demo_faults;
@@ -25,6 +26,7 @@ mod host_faults;
 pub mod instructions;
 mod interleavings;
 mod link;
+mod listed;
 mod miri;
 mod modes;
 mod nodes;
@@ -42,12 +44,17 @@ mod torn;
 mod tracked;
 mod tracked_modes;
 
+use anyhow::Result;
+
 use crate::harness::Check;
 
 /// All checks, in the order of the document.
 pub const CHECKS: &[Check] = &[
     anytime::CHECK,
     bounded::CHECK,
+    dearer::CHECK,
+    dearer::OF_HUMAN,
+    listed::CHECK,
     sides::CHECK,
     hand::CHECK,
     filter::CHECK,
@@ -91,7 +98,10 @@ pub const CHECKS: &[Check] = &[
 
 /// Checks that `cargo xtask test` runs only with `--whole`: each builds one more program, or takes half a minute in
 /// addition to checks of the same parts, or runs the tests again under a sanitizer.
-pub const ON_REQUEST: [&str; 9] = [
+pub const ON_REQUEST: [&str; 12] = [
+    dearer::CHECK.name,
+    dearer::OF_HUMAN.name,
+    listed::CHECK.name,
     demo_nodes::CHECK.name,
     filter_board::CHECK.name,
     nodes::CHECK.name,
@@ -120,3 +130,9 @@ pub const BESIDE: [&str; 13] = [
     corruption::CHECK.name,
     python::CHECK.name,
 ];
+
+/// Fits all constants, or those whose names contain `only`.
+pub fn fit(only: Option<&str>) -> Result<()> {
+    cost::fit(only)?;
+    bounded::rows::fit(only)
+}

@@ -13,8 +13,6 @@ pub struct Effort {
     pub board_walks: u64,
     pub board_glides: u64,
     pub board_glide_ticks: u32,
-    /// Ticks of a path with each of several budgets.
-    pub bounded_ticks: usize,
     /// Queries whose bits must be the same.
     pub bits: usize,
     /// Queries that must stay within their bound.
@@ -57,7 +55,6 @@ impl Effort {
         board_walks: 250,
         board_glides: 3,
         board_glide_ticks: 3_000,
-        bounded_ticks: 30_000,
         bits: 100_000,
         costs: 100_000,
         host_costs: 100_000,
@@ -83,7 +80,6 @@ impl Effort {
         board_walks: 20,
         board_glides: 1,
         board_glide_ticks: 1_500,
-        bounded_ticks: 10_000,
         bits: 10_000,
         costs: 4_000,
         host_costs: 2_500,
@@ -114,7 +110,6 @@ impl Effort {
             board_walks: (self.board_walks / u64::from(share)).max(least.board_walks),
             board_glides: (self.board_glides / u64::from(share)).max(least.board_glides),
             board_glide_ticks: narrow(self.board_glide_ticks, least.board_glide_ticks),
-            bounded_ticks: wide(self.bounded_ticks, least.bounded_ticks),
             bits: wide(self.bits, least.bits),
             costs: wide(self.costs, least.costs),
             host_costs: wide(self.host_costs, least.host_costs),

@@ -35,8 +35,9 @@ pub struct Check {
 /// Measures every promise, and writes docs/evidence/guarantees.json and docs/evidence/guarantees.md.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Fits the constants of the cost model again (`--only board`, `--only host`: for one machine), and ends; then run
-    /// the checks with a program that has the new constants.
+    /// Fits the constants of the cost model again (`--only board`, `--only host`: for one machine) and the budgets of
+    /// the table of bounded ticks (`--only bounded.60k`: of one row), and ends; then run the checks with a program
+    /// that has the new constants.
     #[arg(long)]
     fit: bool,
     /// Seconds of each fuzz target.
@@ -70,7 +71,7 @@ pub struct Options {
 pub fn guarantees(options: &Options) -> Result<()> {
     let only = options.only.as_deref();
     if options.fit {
-        return crate::checks::cost::fit(only);
+        return crate::checks::fit(only);
     }
     if options.render {
         return record::render();

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail, ensure};
 use dibs_build::{BuiltTree, Motion};
-use dibs_nostd::{Capsule, Tool};
+use dibs_nostd::{Budget, Capsule, Tool};
 use dibs_tests::method::Probe;
 use dibs_tests::streams::{Beat, TICK_RATE};
 use glam::{Quat, Vec3};
@@ -97,6 +97,12 @@ pub struct Tick {
 }
 
 impl Tick {
+    /// The tracker's work in node tests, which a budget bounds.
+    pub fn work(&self) -> u32 {
+        let [nodes, triangles] = self.tests;
+        nodes + triangles * Budget::TRIANGLE
+    }
+
     /// Whether the answer is a whole query's.
     pub fn is_whole(&self) -> bool {
         self.apart <= 1.0

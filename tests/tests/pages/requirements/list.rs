@@ -116,7 +116,7 @@ pub const REQUIREMENTS: &[Requirement] = &[
     requirement(
         "S-05",
         "A list that is too short for all contacts states how far it is complete.",
-        &[],
+        &["listed.100k.without"],
     ),
     requirement("S-06", "A contact's velocity row is the rate of its separation.", &[]),
     requirement(
@@ -128,7 +128,17 @@ pub const REQUIREMENTS: &[Requirement] = &[
         "T-02",
         "A tick within any budget has an interval that holds the true separation, and keeps what was certain, less the motion \
          since.",
-        &["bounded.wrong", "bounded.damped", "bounded.60k.95", "bounded.100k.95"],
+        &[
+            "bounded.wrong",
+            "bounded.damped",
+            "bounded.60k.95",
+            "bounded.100k.95",
+            "dearer.wrong",
+            "dearer.damped",
+            "dearer.human.wrong",
+            "dearer.human.damped",
+            "listed.wrong",
+        ],
     ),
     requirement("T-03", "Where triangles tie, the direction does not turn to and fro.", &[]),
     requirement("T-04", "The motion by which bounds run out is never understated.", &[]),

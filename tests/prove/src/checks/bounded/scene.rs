@@ -1,0 +1,154 @@
+//! A moving surface, the poses of an instrument around it, and whole queries of both.
+
+use anyhow::Result;
+use dibs_build::{Builder, BuiltTree, Mesh, Motion, generate};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{
+    Budget, Capsule, MeasuredStretch, Odometer, Options, Proximity, Query, Side, SurfaceBlend,
+    Tree, measure_stretch,
+};
+use glam::Vec3;
+use probe::track::tick;
+
+use super::path::path;
+use crate::data::real;
+use crate::probe::ticks::{Script, Tick, read};
+use crate::probe::{COUNTING, board, build_for_board, run_on_board};
+
+/// Ticks for each frame of the surface's motion: 25 frames a second.
+const TICKS_A_FRAME: usize = 40;
+
+/// A point inside the generated heart.
+const MIDDLE: Vec3 = Vec3::new(12.0, -4.0, 38.0);
+
+/// A tree, its surface's frames with their stretches, and the poses of a path.
+pub struct Scene {
+    tree: BuiltTree,
+    frames: Vec<(Vec<Vec3>, MeasuredStretch)>,
+    path: Vec<Capsule>,
+}
+
+/// The result of whole queries for a tick.
+pub struct Truth {
+    pub lower: f32,
+    pub upper: f32,
+    pub accuracy: f32,
+    pub direction: Vec3,
+}
+
+impl Truth {
+    /// Whether an answer's certified interval does not hold the true separation.
+    pub fn is_missed_by(&self, found: &Proximity) -> bool {
+        let accuracy = found.accuracy + self.accuracy;
+        let is_open = matches!(found.side, Side::Undefined(_));
+        found.lower - accuracy > self.upper || found.separation + accuracy < self.lower && !is_open
+    }
+}
+
+impl Scene {
+    /// A generated heart of this many triangles, and a path at a multiple of the usual speed.
+    pub fn heart(triangles: u32, faster: f32, ticks: usize) -> Result<Self> {
+        let generate::MovingMesh { mesh, motion } = generate::heart(triangles)?;
+        Self::of(&mesh, &motion, 1.5, (MIDDLE, faster), ticks)
+    }
+
+    /// A human heart, if it is beside the repository. A triangle of it is stretched by 1.522.
+    pub fn human(ticks: usize) -> Result<Option<Self>> {
+        let Some(folder) = real() else { return Ok(None) };
+        let mesh = dibs_build::read(folder.join("heart_10272.ply"))?.mesh;
+        let motion = Motion::read_pc2(folder.join("heart_10272.pc2"))?;
+        let middle = mesh.positions.iter().sum::<Vec3>() / mesh.positions.len() as f32;
+        Self::of(&mesh, &motion, 4.0, (middle, 1.0), ticks).map(Some)
+    }
+
+    /// A moving surface within this stretch, and a path around a point inside it.
+    fn of(
+        mesh: &Mesh,
+        Motion { frames, .. }: &Motion,
+        stretch: f32,
+        around: (Vec3, f32),
+        ticks: usize,
+    ) -> Result<Self> {
+        let tree = Builder::new().stretch(stretch).build(mesh)?;
+        let view = tree.tree::<u16>()?;
+        let corners: Vec<[Vec3; 3]> =
+            mesh.triangles.iter().map(|rows| rows.map(|row| frames[0][row as usize])).collect();
+        let path = path(&corners, around, ticks);
+        let frames = frames.iter().map(|frame| {
+            let rows = tree.to_rows(frame);
+            let stretch = measure_stretch(&view, rows.as_slice())?;
+            Ok((rows, stretch))
+        });
+        let frames = frames.collect::<Result<_>>()?;
+        Ok(Self { tree, frames, path })
+    }
+
+    /// The tree as the queries read it.
+    pub fn tree(&self) -> Tree<'_, u16> {
+        self.tree.tree().expect("16-bit indices")
+    }
+
+    /// The number of ticks.
+    pub fn ticks(&self) -> usize {
+        self.path.len()
+    }
+
+    /// Calls a function with each tick's surface and pose.
+    pub fn each<T>(
+        &self,
+        tree: &Tree<'_, u16>,
+        mut ask: impl FnMut(usize, &SurfaceBlend<'_, [Vec3], [Vec3]>, &Capsule, Options) -> T,
+    ) -> Vec<T> {
+        let mut odometer = Odometer::new(tree);
+        let mut step = None;
+        let ticks = self.path.iter().enumerate().map(|(tick, tool)| {
+            let (frame, share) = place(tick);
+            let (rows, stretch) = &self.frames[frame % self.frames.len()];
+            let (next, next_stretch) = &self.frames[(frame + 1) % self.frames.len()];
+            if share == 0.0 {
+                step = Some(odometer.step(rows.as_slice(), next.as_slice()));
+            }
+            let surface = step.as_ref().expect("a step").at(share);
+            let both = stretch.or_larger(*next_stretch).expect("one tree");
+            ask(tick, &surface, tool, Options::new().stretch(both))
+        });
+        ticks.collect()
+    }
+}
+
+/// A tick's frame, and the fraction of the interval to the next frame.
+fn place(tick: usize) -> (usize, f32) {
+    (tick / TICKS_A_FRAME, (tick % TICKS_A_FRAME) as f32 / TICKS_A_FRAME as f32)
+}
+
+/// The results of whole queries for each tick.
+pub fn truth(scene: &Scene) -> Vec<Truth> {
+    let tree = scene.tree();
+    let mut query = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
+    scene.each(&tree, |_, surface, tool, options| {
+        let options = options.depth_tolerance(0.02);
+        let found = query.closest(surface, tool, &options).expect("an answer");
+        let Proximity { lower, separation: upper, accuracy, direction, .. } = found;
+        Truth { lower, upper, accuracy, direction }
+    })
+}
+
+/// All ticks except the first of a tracker on the board within a budget, sorted by their instructions. `bits` selects
+/// what else the tracker must find.
+pub fn on_board(scene: &Scene, bits: u32, budget: Budget) -> Result<Vec<Tick>> {
+    let program = build_for_board(&board()?, "chain")?;
+    let frames = &scene.frames;
+    let mut script = Script::new(&scene.tree, &frames[0].0);
+    let bits = bits | tick::INTERPOLATED | tick::SIGNED | budget.tests() << tick::BUDGET;
+    for (at, tool) in scene.path.iter().enumerate() {
+        let (frame, share) = place(at);
+        if share == 0.0 {
+            script.frame(&frames[(frame + 1) % frames.len()].0);
+        }
+        script.tick(bits, share, tool);
+    }
+    let ticks = scene.path.len() as u32;
+    let mut ticks = read(&run_on_board(&program, &script.end(), COUNTING)?, ticks)?;
+    ticks.sort_unstable_by_key(|tick| tick.instructions);
+    Ok(ticks)
+}

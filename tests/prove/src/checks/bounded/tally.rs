@@ -1,0 +1,78 @@
+//! How wide a tracker's intervals are over a path within a budget, and whether whole queries agree with them.
+
+use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Budget, Capsule, Options, Proximity, Query, Sphere, SurfaceBlend, Tool, Tracker};
+use glam::Vec3;
+
+use super::path::RADIUS;
+use super::scene::{Scene, Truth};
+use super::{MARGIN, Settling};
+use crate::harness::figures::Figures;
+
+/// Results of the ticks with one budget.
+#[derive(Default)]
+pub struct Tally {
+    pub wrong: usize,
+    pub damped: usize,
+    turned: usize,
+    /// Widths of the intervals near the wall, in order.
+    pub widths: Vec<f32>,
+}
+
+impl Tally {
+    /// Notes the widths, and how often the pair was off the deepest, under names that start with `name`.
+    pub fn note(&self, name: &str, figures: &mut Figures) {
+        let last = self.widths.len().saturating_sub(1) as f64;
+        for (end, part) in [("95", 0.95), ("99", 0.99), ("largest", 1.0)] {
+            let width = self.widths.get((last * part) as usize).copied().unwrap_or_default();
+            figures.note(&format!("{name}.{end}"), (f64::from(width) * 100.0).round() / 100.0);
+        }
+        let turned = self.turned as f64 / self.widths.len().max(1) as f64 * 100.0;
+        figures.note(&format!("{name}.turned"), (turned * 100.0).round() / 100.0);
+    }
+}
+
+/// Runs a tracker over the path within a budget.
+pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
+    let tree = scene.tree();
+    let mut tracker = Tracker::<_, MAX_STACK, 512>::new(&tree).expect("enough for any tree");
+    let mut point = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
+    let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
+    let wall = ForbiddenRegion::new(spring, MARGIN).expect("a valid margin");
+    let (mut tally, mut settling) = (Tally::default(), Settling::default());
+    scene.each(&tree, |tick, surface, tool, options| {
+        let options = options.budget(budget);
+        let tracked = tracker.closest(surface, tool, &options).expect("an answer");
+        let is_settled = settling.is_settled(tracked.moved);
+        let (found, truth) = (tracked.closest, &truth[tick]);
+        tally.wrong += usize::from(truth.is_missed_by(&found));
+        if truth.lower >= MARGIN || !is_settled {
+            return;
+        }
+        tally.widths.push(found.separation - found.lower);
+        let force = wall.force(&Ok(found), Vec3::ZERO);
+        let is_damped = matches!(force.state, ConstraintState::Safe(_));
+        tally.damped += usize::from(is_damped);
+        let is_turned = found.direction.dot(truth.direction) < std::f32::consts::FRAC_1_SQRT_2;
+        tally.turned +=
+            usize::from(is_turned && !is_deepest(&mut point, surface, tool, &found, truth));
+    });
+    tally.widths.sort_by(f32::total_cmp);
+    tally
+}
+
+/// Whether an answer's pair is the deepest or the closest one, within half a millimetre.
+fn is_deepest(
+    point: &mut Query<'_, u16, MAX_STACK>,
+    surface: &SurfaceBlend<'_, [Vec3], [Vec3]>,
+    tool: &Capsule,
+    found: &Proximity,
+    truth: &Truth,
+) -> bool {
+    let at = tool.axis_point(found.axis_parameter);
+    let sphere = Sphere::new(at, 0.0).expect("finite");
+    let own = point.closest(surface, &sphere, &Options::new()).expect("an answer");
+    own.separation <= truth.upper + RADIUS + 0.5
+        && found.point_on_surface.distance(at) <= own.separation.abs() + 0.5
+}

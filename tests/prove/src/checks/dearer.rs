@@ -1,0 +1,146 @@
+//! A tracker's ticks within 60,000 instructions where they are dearer: at twice the speed, on 40,000 triangles, and on a
+//! human heart.
+
+// Requirement: T-02
+
+use anyhow::Result;
+use xtask::steps::Outcome;
+
+use super::bounded::rows::{DEARER, HUMAN, Row, TICKS};
+use super::bounded::scene::truth;
+use super::bounded::tally::run;
+use super::bounded::{largest, width};
+use crate::harness::figures::Figures;
+use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
+use crate::harness::{Check, Effort};
+
+pub const CHECK: Check = Check {
+    name: "dearer ticks in 60,000 instructions",
+    run: check,
+    promises: &[
+        wrong(
+            "dearer.wrong",
+            "of {dearer.ticks} ticks at twice the speed and of as many on 40,000 triangles",
+        ),
+        note("dearer.ticks"),
+        damped("dearer.damped", "of {dearer.near} ticks within 5 mm"),
+        note("dearer.near"),
+        width(
+            "dearer.fast.95",
+            "At twice the instrument's speed, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
+            "mm; 99 %: {dearer.fast.99}, largest {dearer.fast.largest}; pair off the deepest and turned: {dearer.fast.turned} %",
+            Bound::Informs,
+        ),
+        note("dearer.fast.99"),
+        note("dearer.fast.largest"),
+        note("dearer.fast.turned"),
+        largest(
+            "dearer.fast.instructions",
+            "On the board the largest of these ticks takes",
+            "instructions with {dearer.fast.tests} tests; the mean one {dearer.fast.mean}, the median of those that use the budget up {dearer.fast.spent}",
+            60_000.0,
+        ),
+        note("dearer.fast.mean"),
+        note("dearer.fast.tests"),
+        note("dearer.fast.spent"),
+        width(
+            "dearer.large.95",
+            "On a heart of 40,000 triangles, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
+            "mm; 99 %: {dearer.large.99}, largest {dearer.large.largest}; pair off the deepest and turned: {dearer.large.turned} %",
+            Bound::Informs,
+        ),
+        note("dearer.large.99"),
+        note("dearer.large.largest"),
+        note("dearer.large.turned"),
+        largest(
+            "dearer.large.instructions",
+            "On the board the largest of these ticks takes",
+            "instructions with {dearer.large.tests} tests; the mean one {dearer.large.mean}, the median of those that use the budget up {dearer.large.spent}",
+            60_000.0,
+        ),
+        note("dearer.large.mean"),
+        note("dearer.large.tests"),
+        note("dearer.large.spent"),
+    ],
+};
+
+pub const OF_HUMAN: Check = Check {
+    name: "a human heart in 60,000 instructions",
+    run: human,
+    promises: &[
+        wrong("dearer.human.wrong", "of {dearer.human.ticks} ticks on a human heart"),
+        note("dearer.human.ticks"),
+        damped("dearer.human.damped", "of {dearer.human.near} ticks within 5 mm of a human heart"),
+        note("dearer.human.near"),
+        width(
+            "dearer.human.95",
+            "On a human heart, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
+            "mm; 99 %: {dearer.human.99}, largest {dearer.human.largest}; pair off the deepest and turned: {dearer.human.turned} %",
+            Bound::Informs,
+        ),
+        note("dearer.human.99"),
+        note("dearer.human.largest"),
+        note("dearer.human.turned"),
+        largest(
+            "dearer.human.instructions",
+            "On the board the largest of these ticks takes",
+            "instructions with {dearer.human.tests} tests; the mean one {dearer.human.mean}, the median of those that use the budget up {dearer.human.spent}",
+            60_000.0,
+        ),
+        note("dearer.human.mean"),
+        note("dearer.human.tests"),
+        note("dearer.human.spent"),
+    ],
+};
+
+const fn wrong(id: &'static str, unit: &'static str) -> Promise {
+    Promise {
+        id,
+        says: "The certified interval holds the true separation in dearer ticks, too",
+        criterion: TIMING,
+        bound: Bound::Is(0.0),
+        unit,
+        limits: "As with four budgets, at 60,000 instructions. Truth by whole queries.",
+    }
+}
+
+const fn damped(id: &'static str, unit: &'static str) -> Promise {
+    Promise {
+        id,
+        says: "Once it has settled, no dearer tick near the wall leaves the constraint without a spring",
+        criterion: TIMING,
+        bound: Bound::Is(0.0),
+        unit,
+        limits: "After 100 ticks, and after 100 from each leap.",
+    }
+}
+
+fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    measure(&DEARER, "dearer", figures)
+}
+
+fn human(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    measure(&[HUMAN], "dearer.human", figures)
+}
+
+/// Measures rows, and notes their sums under names that start with `name`.
+fn measure(rows: &[Row], name: &str, figures: &mut Figures) -> Result<Outcome> {
+    let (mut wrong, mut damped, mut near) = (0, 0, 0);
+    for row in rows {
+        let Some(scene) = row.scene()? else {
+            let reason = format!("{}: its mesh is not beside the repository", row.name);
+            return Ok(Outcome::Skipped(reason));
+        };
+        let tally = run(&scene, &truth(&scene), row.budget()?);
+        tally.note(row.name, figures);
+        row.note_board(&scene, figures)?;
+        wrong += tally.wrong;
+        damped += tally.damped;
+        near += tally.widths.len();
+    }
+    figures.note(&format!("{name}.ticks"), TICKS as f64);
+    figures.note(&format!("{name}.wrong"), wrong as f64);
+    figures.note(&format!("{name}.damped"), damped as f64);
+    figures.note(&format!("{name}.near"), near as f64);
+    Ok(Outcome::Passed)
+}

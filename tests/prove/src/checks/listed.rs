@@ -1,0 +1,170 @@
+//! A tracker's lists of contacts within a budget: how often there is none near a wall, and how many
+//! are complete.
+
+// Requirements: S-05, T-02
+
+use anyhow::{Context, Result};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{Budget, Contacts, Tracker};
+use probe::track::OPENED;
+use xtask::steps::Outcome;
+
+use super::bounded::rows::LISTED;
+use super::bounded::scene::{Scene, Truth, truth};
+use super::bounded::{MARGIN, Settling, largest};
+use crate::harness::figures::Figures;
+use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
+use crate::harness::{Check, Effort};
+
+pub const CHECK: Check = Check {
+    name: "lists of contacts within a budget",
+    run: check,
+    promises: &[
+        Promise {
+            id: "listed.wrong",
+            says: "With contacts, too, the certified interval holds the true separation, whatever the budget",
+            criterion: TIMING,
+            bound: Bound::Is(0.0),
+            unit: "of {listed.ticks} ticks with each of three budgets",
+            limits: "The path of the ticks within a budget. Truth by whole queries.",
+        },
+        note("listed.ticks"),
+        without(
+            "listed.40k.without",
+            "Ticks within 40,000 instructions at which a proxy has no list of contacts",
+            Bound::Informs,
+        ),
+        note("listed.near"),
+        complete(
+            "listed.40k.complete",
+            "The list is complete to 5 mm",
+            "% of these ticks; without a budget: {listed.whole} %",
+        ),
+        note("listed.whole"),
+        largest(
+            "listed.40k.instructions",
+            "On the board the largest of these ticks takes",
+            "instructions with {listed.40k.tests} tests; the mean one {listed.40k.mean}, the median of those that use the budget up {listed.40k.spent}",
+            40_000.0,
+        ),
+        note("listed.40k.mean"),
+        note("listed.40k.tests"),
+        note("listed.40k.spent"),
+        without(
+            "listed.60k.without",
+            "Ticks within 60,000 instructions at which a proxy has no list of contacts",
+            Bound::Informs,
+        ),
+        complete(
+            "listed.60k.complete",
+            "The list is complete to 5 mm",
+            "% of these ticks; without a budget: {listed.whole} %",
+        ),
+        largest(
+            "listed.60k.instructions",
+            "On the board the largest of these ticks takes",
+            "instructions with {listed.60k.tests} tests; the mean one {listed.60k.mean}, the median of those that use the budget up {listed.60k.spent}",
+            60_000.0,
+        ),
+        note("listed.60k.mean"),
+        note("listed.60k.tests"),
+        note("listed.60k.spent"),
+        without(
+            "listed.100k.without",
+            "Within 100,000 instructions a proxy is never without its list of contacts",
+            Bound::Is(0.0),
+        ),
+        complete(
+            "listed.100k.complete",
+            "The list is complete to 5 mm",
+            "% of these ticks; without a budget: {listed.whole} %",
+        ),
+        largest(
+            "listed.100k.instructions",
+            "On the board the largest of these ticks takes",
+            "instructions with {listed.100k.tests} tests; the mean one {listed.100k.mean}, the median of those that use the budget up {listed.100k.spent}",
+            100_000.0,
+        ),
+        note("listed.100k.mean"),
+        note("listed.100k.tests"),
+        note("listed.100k.spent"),
+    ],
+};
+
+/// The number of ticks near the wall without a list.
+const fn without(id: &'static str, says: &'static str, bound: Bound) -> Promise {
+    let (unit, limits) = (
+        "of {listed.near} ticks within 5 mm",
+        "After 100 ticks, and after 100 from each leap. Without a list the budget ended before the deepest contact was known.",
+    );
+    Promise { id, says, criterion: TIMING, bound, unit, limits }
+}
+
+/// The share of complete lists.
+const fn complete(id: &'static str, says: &'static str, unit: &'static str) -> Promise {
+    let limits = "The whole list of an axis that crosses the surface or is inside is its deepest pair, which counts as incomplete.";
+    Promise { id, says, criterion: TIMING, bound: Bound::Informs, unit, limits }
+}
+
+/// Results of the ticks with one budget.
+#[derive(Default)]
+struct Tally {
+    wrong: u32,
+    /// Ticks near the wall, those without a list, and those with a complete one.
+    near: u32,
+    without: u32,
+    complete: u32,
+}
+
+impl Tally {
+    /// The share of ticks near the wall whose list is complete, in per cent.
+    fn share(&self) -> f64 {
+        let share = f64::from(self.complete) / f64::from(self.near.max(1)) * 100.0;
+        (share * 10.0).round() / 10.0
+    }
+}
+
+/// Runs a tracker with contacts over the path within a budget.
+fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
+    let tree = scene.tree();
+    let mut tracker =
+        Tracker::<_, MAX_STACK, OPENED, OPENED>::with_range(&tree).expect("enough for any tree");
+    let mut contacts = Contacts::<8>::new();
+    let (mut tally, mut settling) = (Tally::default(), Settling::default());
+    scene.each(&tree, |tick, surface, tool, options| {
+        let options = options.budget(budget);
+        let tracked = tracker.contacts(surface, tool, MARGIN, &options, &mut contacts);
+        let tracked = tracked.expect("an answer");
+        let is_settled = settling.is_settled(tracked.moved);
+        tally.wrong += u32::from(truth[tick].is_missed_by(&tracked.closest));
+        if truth[tick].lower >= MARGIN || !is_settled {
+            return;
+        }
+        tally.near += 1;
+        match contacts.within(MARGIN) {
+            Ok(list) => tally.complete += u32::from(list.is_complete()),
+            Err(_) => tally.without += 1,
+        }
+    });
+    tally
+}
+
+fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    let [row, ..] = LISTED;
+    let scene = row.scene()?.context("a generated scene")?;
+    let truth = truth(&scene);
+    let whole = run(&scene, &truth, Budget::UNLIMITED);
+    let mut wrong = whole.wrong;
+    for row in LISTED {
+        let tally = run(&scene, &truth, row.budget()?);
+        wrong += tally.wrong;
+        figures.note(&format!("{}.without", row.name), tally.without.into());
+        figures.note(&format!("{}.complete", row.name), tally.share());
+        row.note_board(&scene, figures)?;
+    }
+    figures.note("listed.ticks", scene.ticks() as f64);
+    figures.note("listed.wrong", wrong.into());
+    figures.note("listed.near", whole.near.into());
+    figures.note("listed.whole", whole.share());
+    Ok(Outcome::Passed)
+}
