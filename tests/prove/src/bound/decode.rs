@@ -107,6 +107,10 @@ pub fn may_write(register: u32, first: u32, second: u32) -> bool {
     if is_float && second >> 9 & 7 == 0b101 {
         return first >> 8 != 0xEE && first & 0x20 != 0 && is_field(first, 0);
     }
+    // A load or store with an offset of 12 bits.
+    if first & 0xFE80 == 0xF880 {
+        return is_field(second, 12);
+    }
     let is_list = first & 0xFE40 == 0xE800;
     [(first, 0), (second, 0), (second, 8), (second, 12)]
         .into_iter()

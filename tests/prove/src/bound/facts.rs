@@ -39,7 +39,7 @@ pub struct Most {
 }
 
 impl Most {
-    const fn base(base: i64) -> Self {
+    pub(super) const fn base(base: i64) -> Self {
         Self { base, roots: 0, nodes: 0, triangles: 0 }
     }
 
@@ -83,41 +83,47 @@ const NO_TIES: Never = (
 );
 
 /// For a plain query: unsigned.
-pub const PLAIN: Facts = Facts { groups: &[ROWS], never: &[NO_SIDE, NO_TIES] };
+pub const PLAIN: Facts = Facts { groups: &[ROWS, COPIES], never: &[NO_SIDE, NO_TIES] };
 
 /// The same on a surface between two frames.
-pub const MOVING: Facts = Facts { groups: &[ROWS, KEPT], never: &[NO_SIDE, NO_TIES] };
+pub const MOVING: Facts = Facts { groups: &[ROWS, COPIES, KEPT], never: &[NO_SIDE, NO_TIES] };
 
 /// The same on a surface that nodes move.
-pub const EMBEDDED: Facts = Facts { groups: &[ROWS, KEPT, NAMED], never: &[NO_SIDE, NO_TIES] };
+pub const EMBEDDED: Facts =
+    Facts { groups: &[ROWS, COPIES, KEPT, NAMED], never: &[NO_SIDE, NO_TIES] };
 
 /// The same on a surface that [`MODES`] modes move.
 pub const MODAL: Facts =
-    Facts { groups: &[ROWS, KEPT, NAMED, BLENDED], never: &[NO_SIDE, NO_TIES] };
+    Facts { groups: &[ROWS, COPIES, KEPT, NAMED, BLENDED], never: &[NO_SIDE, NO_TIES] };
 
 /// The same with a wrong fact, which a trace must refute.
 pub const WITHOUT_EDGES: Facts =
-    Facts { groups: &[ROWS], never: &[NO_SIDE, NO_TIES, ("", "edge::edge_to_segment", "wrong")] };
+    Facts { groups: &[ROWS, COPIES], never: &[NO_SIDE, NO_TIES, WITHOUT_EDGE] };
+
+pub(super) const WITHOUT_EDGE: Never = ("", "edge::edge_to_segment", "wrong");
 
 /// Functions that a program must only call from these callers, because the facts about them are about those calls.
 pub const ONLY_FROM: &[(&str, &str)] = &[("mem::memcpy", "__aeabi_memcpy4")];
 
-const NODE: &str = "dibs-nostd/src/query/search/node.rs";
+pub(super) const NODE: &str = "dibs-nostd/src/query/search/node.rs";
 const LEAF: &str = "dibs-nostd/src/query/search/leaf.rs";
 const ROOTS: &str = "dibs-nostd/src/query/search/roots.rs";
 const PLANE: &str = "dibs-nostd/src/query/plane.rs";
 const SURFACE: &str = "dibs-nostd/src/modes/surface.rs";
-const SEARCH: &str = "dibs-nostd/src/query/search.rs";
+pub(super) const SEARCH: &str = "dibs-nostd/src/query/search.rs";
 
 const CHILD: Count = Count::Passes(&[Function("run"), Line(NODE, "if squared > far * far {")]);
-const LEAF_PLANE: Count = Count::Calls(&[Function("run"), Function("expand")], "Plane::beyond");
-const VISIT: Count = Count::Calls(&[Function("run"), Function("leaf")], "Plane::beyond");
-const TRIANGLE: Count =
+pub(super) const LEAF_PLANE: Count =
+    Count::Calls(&[Function("run"), Function("expand")], "Plane::beyond");
+pub(super) const VISIT: Count = Count::Calls(&[Function("run"), Function("leaf")], "Plane::beyond");
+pub(super) const TRIANGLE: Count =
     Count::Passes(&[Function("run"), Line(LEAF, "if patch_plane.has_beyond(a) &&")]);
-const TURN: Count =
+pub(super) const TURN: Count =
     Count::Passes(&[Function("run"), Line(LEAF, "if triangle == self.best_triangle {")]);
-const TEST: Count = Count::Calls(&[Function("leaf"), Function("test_triangle")], "closest_to_");
-const WARM: Count = Count::Calls(&[Function("start"), Function("test_triangle")], "closest_to_");
+pub(super) const TEST: Count =
+    Count::Calls(&[Function("leaf"), Function("test_triangle")], "closest_to_");
+pub(super) const WARM: Count =
+    Count::Calls(&[Function("start"), Function("test_triangle")], "closest_to_");
 const POP: Count =
     Count::Heads(&[Line(SEARCH, "while let Some(Waiting { lower, link }) = self.pop() {")]);
 const PUSH: Count = Count::Passes(&[
@@ -203,6 +209,10 @@ const ROWS: &[Fact] = &[
         most: Most { base: 0, roots: 31, nodes: 0, triangles: 0 },
         because: "the k-th moves at most the k - 1 before it, and a tree has at most 63 of them",
     },
+];
+
+/// Copies, whatever is asked.
+pub(super) const COPIES: &[Fact] = &[
     Fact {
         name: "copied words",
         terms: &[

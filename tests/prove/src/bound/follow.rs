@@ -7,11 +7,12 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 
 use super::analysis::Analysis;
-use super::facts::{PLAIN, WITHOUT_EDGES};
-use super::queries::{Kind, Proven, counts, to_trace};
+use super::facts::{Facts, WITHOUT_EDGES};
+use super::queries::{KINDS, Kind, Proven, counts, to_trace};
+use super::sided::SIDED_WITHOUT_EDGES;
 use super::trace::{Follower, OffGraph, Run};
 use super::walk::UNIT;
-use crate::probe::script::Script;
+use crate::probe::script::{Script, Table};
 use crate::probe::{Answers, traced};
 
 /// Node tests of an answer that are counted in addition to the executed ones.
@@ -45,10 +46,13 @@ pub fn trace(proven: &[Proven], probe: &Path, scripts: &[Script]) -> Result<Vec<
     let ranges: Vec<_> = ranges.into_values().collect();
     let mut followed: Vec<Followed<'_>> = proven.iter().map(Followed::new).collect();
     for script in scripts {
+        // Kinds with and without a side are the same function, so a script has one of them.
+        let is_of = |one: &&mut Followed<'_>| one.proven.kind.has_part_in(script);
+        let mut now: Vec<&mut Followed<'_>> = followed.iter_mut().filter(is_of).collect();
         let answers = traced(probe, script, &ranges, |at| {
-            followed.iter_mut().try_for_each(|one| one.follower.step(at as u32))
+            now.iter_mut().try_for_each(|one| one.follower.step(at as u32))
         })?;
-        for one in &mut followed {
+        for one in now {
             one.compare(&answers)?;
         }
     }
@@ -129,7 +133,10 @@ fn compare(proven: &Proven, run: &Run, counts: [i64; 3], state: &mut [Seen]) -> 
     {
         let row = proven.analysis.system.rows.iter().find(|row| row.name == name);
         let left = run.left(row.with_context(|| format!("no fact of {name}"))?);
-        let is_counted = (counted - spare..=counted).contains(&left);
+        // The work for a side is counted where it is done, but not at an edge.
+        let is_side = proven.kind.is_signed && name == "node tests";
+        let least = if is_side { 0 } else { counted - spare };
+        let is_counted = (least..=counted).contains(&left);
         ensure!(is_counted, "{counted} {name} were counted, and {left} were executed");
     }
     let took = run.instructions;
@@ -141,15 +148,37 @@ fn compare(proven: &Proven, run: &Run, counts: [i64; 3], state: &mut [Seen]) -> 
 }
 
 /// Tests whether a trace finds each of two planted errors: a wrong fact, and a path that the graph does not contain.
-pub fn planted(kind: &'static Kind, probe: &Path) -> Result<[bool; 2]> {
+pub fn planted(kind: &'static Kind, probe: &Path, fault: &Fault) -> Result<[bool; 2]> {
     let scripts = to_trace(40)?;
-    let scripts = scripts.get(..1).context("no script")?;
-    let mut wrong = Proven::new(kind, probe, &PLAIN)?;
-    wrong.analysis.system.narrow("turns of a leaf");
-    let traced = trace(&[wrong], probe, scripts)?;
+    let is_of = |script: &&Script| kind.has_part_in(script);
+    let script = scripts.iter().find(is_of).context("no script")?;
+    let script = std::slice::from_ref(script);
+    let mut wrong = Proven::new(kind, probe, kind.facts)?;
+    wrong.analysis.system.narrow(fault.narrowed);
+    let traced = trace(&[wrong], probe, script)?;
     let is_broken = traced.iter().any(|traced| !traced.broken.is_empty());
-    let shorter = Proven::new(kind, probe, &WITHOUT_EDGES)?;
-    let left = trace(&[shorter], probe, scripts).err();
+    let shorter = Proven::new(kind, probe, fault.shorter)?;
+    let left = trace(&[shorter], probe, script).err();
     let is_left = left.is_some_and(|error| error.downcast_ref::<OffGraph>().is_some());
     Ok([is_broken, is_left])
+}
+
+/// The errors that are planted in a kind of query.
+pub struct Fault {
+    /// The fact that is made wrong.
+    pub narrowed: &'static str,
+    /// The facts with a call that is never made, and is.
+    pub shorter: &'static Facts,
+}
+
+/// The kinds with planted errors.
+pub fn faults() -> impl Iterator<Item = (&'static Kind, Fault)> {
+    KINDS.iter().filter(|kind| kind.is_capsule && kind.table == Table::Rows).map(|kind| {
+        let (narrowed, shorter) = if kind.is_signed {
+            ("planes of ties", &SIDED_WITHOUT_EDGES)
+        } else {
+            ("turns of a leaf", &WITHOUT_EDGES)
+        };
+        (kind, Fault { narrowed, shorter })
+    })
 }

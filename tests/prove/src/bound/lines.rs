@@ -33,9 +33,13 @@ impl Frame {
 pub enum Within {
     /// A function with this name.
     Function(&'static str),
+    /// A function with this name and this among its generic arguments.
+    Of(&'static str, &'static str),
     /// The only line of a file that contains this text: the line is still found if it moves, but not if it changes.
     Line(&'static str, &'static str),
 }
+
+type Predicate = Box<dyn Fn(&Frame) -> bool>;
 
 /// The debug information of a program, and its source.
 pub struct Lines {
@@ -67,31 +71,35 @@ impl Lines {
 
     /// A predicate that tells whether an instruction has all these frames.
     pub fn all(&self, wanted: &[Within]) -> Result<impl Fn(u32) -> bool> {
-        let wanted: Vec<_> = wanted.iter().map(|one| self.number(one)).collect::<Result<_>>()?;
+        let wanted: Vec<_> = wanted.iter().map(|one| self.wanted(one)).collect::<Result<_>>()?;
         Ok(move |at: u32| {
             let frames = self.of(at);
-            wanted.iter().all(|(name, line)| {
-                frames.iter().any(|frame| match line {
-                    Some(line) => frame.line == *line && frame.file.ends_with(name),
-                    None => frame.bare() == *name,
-                })
-            })
+            wanted.iter().all(|wanted| frames.iter().any(wanted))
         })
     }
 
-    fn number(&self, wanted: &Within) -> Result<(&'static str, Option<u32>)> {
-        match *wanted {
-            Within::Function(name) => Ok((name, None)),
-            Within::Line(file, text) => {
-                let path = self.source.join(file);
-                let source = fs::read_to_string(&path)
-                    .with_context(|| format!("cannot read {}", path.display()))?;
-                let mut found = source.lines().zip(1..).filter(|(line, _)| line.contains(text));
-                let (_, line) = found.next().with_context(|| format!("{file} has no `{text}`"))?;
-                ensure!(found.next().is_none(), "{file} has `{text}` twice");
-                Ok((file, Some(line)))
+    fn wanted(&self, wanted: &Within) -> Result<Predicate> {
+        Ok(match *wanted {
+            Within::Function(name) => Box::new(move |frame| frame.bare() == name),
+            Within::Of(name, argument) => {
+                Box::new(move |frame| frame.bare() == name && frame.name.contains(argument))
             }
-        }
+            Within::Line(file, text) => {
+                let line = self.number(file, text)?;
+                Box::new(move |frame| frame.line == line && frame.file.ends_with(file))
+            }
+        })
+    }
+
+    /// The number of the only line of a file that contains a text.
+    fn number(&self, file: &str, text: &str) -> Result<u32> {
+        let path = self.source.join(file);
+        let source =
+            fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+        let mut found = source.lines().zip(1..).filter(|(line, _)| line.contains(text));
+        let (_, line) = found.next().with_context(|| format!("{file} has no `{text}`"))?;
+        ensure!(found.next().is_none(), "{file} has `{text}` twice");
+        Ok(line)
     }
 }
 

@@ -20,6 +20,7 @@ pub mod prices;
 pub mod queries;
 pub mod report;
 pub mod second;
+pub mod sided;
 pub mod system;
 pub mod trace;
 pub mod walk;

@@ -14,6 +14,7 @@ use super::analysis::Analysis;
 use super::facts::{EMBEDDED, Facts, MODAL, MODES, MOVING, Most, PLAIN};
 use super::prices::{Bound, least};
 use super::second;
+use super::sided::{RING, SIDED_CAPSULE, SIDED_SPHERE};
 use super::walk::UNIT;
 use crate::checks::cost::unseen;
 use crate::probe::script::{Draw, Record, Script, Subject, Table};
@@ -28,6 +29,8 @@ pub struct Kind {
     root: &'static str,
     pub is_capsule: bool,
     pub table: Table,
+    /// Whether it asks for the side.
+    pub is_signed: bool,
     pub facts: &'static Facts,
     /// The fitted constants for typical queries.
     pub fitted: Option<Cost>,
@@ -36,19 +39,26 @@ pub struct Kind {
 impl Kind {
     /// Whether a record is of a query of this kind.
     pub fn is_of(&self, record: Record) -> bool {
-        let own = (self.is_capsule, self.table);
-        matches!(record, Record::Query { is_capsule, table, .. } if (is_capsule, table) == own)
+        let own = (self.is_capsule, self.table, self.is_signed);
+        matches!(record, Record::Query { is_capsule, table, is_signed, .. }
+            if (is_capsule, table, is_signed) == own)
+    }
+
+    /// Whether a script has queries of this kind.
+    pub fn has_part_in(&self, script: &Script) -> bool {
+        script.records.iter().any(|&record| self.is_of(record))
     }
 }
 
-/// Plain queries.
-pub const KINDS: [Kind; 8] = [
+/// Plain queries, then those with side.
+pub const KINDS: [Kind; 10] = [
     Kind {
         name: "sphere",
         id: "sphere",
         root: "timed::{closure_env#0}<dibs_nostd::tool::sphere::Sphere",
         is_capsule: false,
         table: Table::Rows,
+        is_signed: false,
         facts: &PLAIN,
         fitted: Some(Cost::M7_SPHERE),
     },
@@ -58,6 +68,7 @@ pub const KINDS: [Kind; 8] = [
         root: "timed::{closure_env#0}<dibs_nostd::tool::capsule::Capsule",
         is_capsule: true,
         table: Table::Rows,
+        is_signed: false,
         facts: &PLAIN,
         fitted: Some(Cost::M7_CAPSULE),
     },
@@ -67,6 +78,7 @@ pub const KINDS: [Kind; 8] = [
         root: "timed::{closure_env#4}<dibs_nostd::tool::sphere::Sphere",
         is_capsule: false,
         table: Table::Moving,
+        is_signed: false,
         facts: &MOVING,
         fitted: None,
     },
@@ -76,6 +88,7 @@ pub const KINDS: [Kind; 8] = [
         root: "timed::{closure_env#4}<dibs_nostd::tool::capsule::Capsule",
         is_capsule: true,
         table: Table::Moving,
+        is_signed: false,
         facts: &MOVING,
         fitted: None,
     },
@@ -85,6 +98,7 @@ pub const KINDS: [Kind; 8] = [
         root: "timed::{closure_env#5}<dibs_nostd::tool::sphere::Sphere",
         is_capsule: false,
         table: Table::Nodes,
+        is_signed: false,
         facts: &EMBEDDED,
         fitted: None,
     },
@@ -94,6 +108,7 @@ pub const KINDS: [Kind; 8] = [
         root: "timed::{closure_env#5}<dibs_nostd::tool::capsule::Capsule",
         is_capsule: true,
         table: Table::Nodes,
+        is_signed: false,
         facts: &EMBEDDED,
         fitted: None,
     },
@@ -103,6 +118,7 @@ pub const KINDS: [Kind; 8] = [
         root: "timed::{closure_env#2}<dibs_nostd::tool::sphere::Sphere",
         is_capsule: false,
         table: Table::Modes,
+        is_signed: false,
         facts: &MODAL,
         fitted: None,
     },
@@ -112,7 +128,28 @@ pub const KINDS: [Kind; 8] = [
         root: "timed::{closure_env#2}<dibs_nostd::tool::capsule::Capsule",
         is_capsule: true,
         table: Table::Modes,
+        is_signed: false,
         facts: &MODAL,
+        fitted: None,
+    },
+    Kind {
+        name: "sphere with side",
+        id: "sided-sphere",
+        root: "timed::{closure_env#0}<dibs_nostd::tool::sphere::Sphere",
+        is_capsule: false,
+        table: Table::Rows,
+        is_signed: true,
+        facts: &SIDED_SPHERE,
+        fitted: None,
+    },
+    Kind {
+        name: "capsule with side, outside",
+        id: "sided-capsule",
+        root: "timed::{closure_env#0}<dibs_nostd::tool::capsule::Capsule",
+        is_capsule: true,
+        table: Table::Rows,
+        is_signed: true,
+        facts: &SIDED_CAPSULE,
         fitted: None,
     },
 ];
@@ -189,6 +226,10 @@ fn counted(queries: usize) -> Result<Vec<Script>> {
     let mut scripts: Vec<Script> = draws.into_iter().map(about).collect();
     scripts.push(several(queries / 10, 54));
     scripts.extend(moved(queries / 10, 57)?);
+    let closed = closed(generate::heart(2_562)?.mesh, ball(4));
+    for (draw, seed) in [(Draw::Exhausting, 59), (Draw::Any, 60), (Draw::Short, 61)] {
+        scripts.push(Script::sided(&closed, RING, queries / 10, draw, seed)?);
+    }
     Ok(scripts)
 }
 
@@ -202,7 +243,14 @@ pub fn to_trace(queries: usize) -> Result<Vec<Script>> {
     let script = Script::about_all(&one, false, queries * 4 / 5, Draw::Any, 55);
     let mut scripts = vec![script, several(queries / 5, 56)];
     scripts.extend(moved(queries / 2, 58)?);
+    let closed = closed(generate::heart(1_280)?.mesh, ball(3));
+    scripts.push(Script::sided(&closed, RING, queries / 2, Draw::Any, 62)?);
     Ok(scripts)
+}
+
+/// Closed surfaces.
+fn closed(heart: Mesh, ball: Mesh) -> [Subject; 2] {
+    [Subject::new("heart", heart, 8), Subject::new("ball", ball, 4)]
 }
 
 /// Queries of three surfaces in one tree.

@@ -9,9 +9,10 @@ use anyhow::{Context, Result, ensure};
 use xtask::toolchain::Cross;
 use xtask::{qemu, workspace};
 
-use super::facts::{MODAL, ONLY_FROM, PLAIN};
-use super::follow::{Traced, planted, trace};
+use super::facts::{Facts, MODAL, ONLY_FROM};
+use super::follow::{Traced, faults, planted, trace};
 use super::queries::{Counted, KINDS, Proven, count, to_trace};
+use super::sided::{RING, SIDED_CAPSULE};
 use super::walk::UNIT;
 use crate::harness::run::Run;
 use crate::probe::build_for_board;
@@ -59,8 +60,9 @@ pub fn findings(probe: &Path, queries: usize, traces: usize) -> Result<Findings>
         let decoded = proven.decoded(probe)?;
         rows.push(Row { proven, counted, traced, decoded });
     }
-    let capsule = KINDS.iter().find(|kind| kind.is_capsule).context("no capsule")?;
-    let found = planted(capsule, probe)?;
+    let found: Vec<_> =
+        faults().map(|(kind, fault)| planted(kind, probe, &fault)).collect::<Result<_>>()?;
+    let found = found.as_flattened();
     let unnoticed = found.iter().filter(|is_found| !**is_found).count();
     Ok(Findings { rows, planted: found.len(), unnoticed, seconds })
 }
@@ -101,6 +103,29 @@ fn untried(rows: &[Row]) -> String {
     format!("No traced query executes what these facts limit: {}.", all.join("; "))
 }
 
+/// The prices of facts in some rows, and the calls that are never made.
+fn facts(text: &mut String, facts: &Facts, rows: &[&Row]) -> Result<()> {
+    writeln!(text, "| fact | price | reason |\n|---|---:|---|")?;
+    for fact in facts.rows() {
+        let price = |row: &Row| {
+            let mut rows = row.proven.analysis.system.rows.iter();
+            let place = rows.position(|row| row.name == fact.name)?;
+            Some(format!("{:.2}", row.proven.bound.prices[place] as f64 / UNIT as f64))
+        };
+        let prices = rows.iter().map(|row| price(row).unwrap_or_else(|| "–".to_owned()));
+        let prices: Vec<String> = prices.collect();
+        writeln!(text, "| {} | {} | {} |", fact.name, prices.join(", "), fact.because)?;
+    }
+    *text += "\nCalls that are never made:\n\n";
+    for (caller, callee, because) in facts.never {
+        let of =
+            |name: &str| if name.is_empty() { "anything".to_owned() } else { format!("`{name}`") };
+        writeln!(text, "- from {} to {}: {because}", of(caller), of(callee))?;
+    }
+    *text += "\n";
+    Ok(())
+}
+
 fn page(findings: &Findings, run: &Run) -> Result<String> {
     let mut text = format!(
         "# A proven bound on instructions\n\n\
@@ -113,13 +138,23 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
          facts, that the debug information places them, the calls declared as never made, the reader of the program, and \
          that an instruction counts one, as it does for the emulator; without interrupts. A bound is of \
          one linked program, here the probe's, of 16-bit indices; `n` is `Proximity::node_tests`. Instructions, not cycles.\n\n\
+         A query *with side* is of a table of vertices, for a closed surface of one root with at most {RING} triangles around a \
+         vertex, none of them flat, and of a capsule whose axis is outside (`Side::Outside`): it searches no depth. Its facts are of \
+         [sided.rs](../../tests/prove/src/bound/sided.rs). Its base holds up to 32 tied triangles, each at another \
+         vertex; its node test holds the work in f64, by software on this processor, which is counted as node tests of typical \
+         time.\n\n\
          | query | base | root | node test | triangle test | times the typical base, node and triangle test | functions | instructions in the graph |\n\
          |---|---:|---:|---:|---:|---|---:|---:|\n",
         run.commit, run.compiler, run.emulator
     );
     for Row { proven, .. } in &findings.rows {
         let ratios = proven.ratios().map(|ratios| ratios.map(|one| format!("{one:.2}")).join(", "));
-        let constants = proven.whole().map(|constant| constant.to_string()).join(" | ");
+        let mut constants = proven.whole().map(|constant| constant.to_string());
+        if proven.kind.is_signed {
+            // Of a tree of one root.
+            constants[1] = "–".to_owned();
+        }
+        let constants = constants.join(" | ");
         writeln!(
             text,
             "| {} | {constants} | {} | {} | {} |",
@@ -161,30 +196,20 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
     writeln!(
         text,
         "\nA traced query is followed instruction by instruction: each must be where the graph leads, and each fact is \
-         compared with the numbers of executions; triangle tests are as many as the answer says, and node tests as many or one fewer. \
-         {} Planted were {} errors, a wrong fact and a path that the graph does not \
+         compared with the numbers of executions; triangle tests are as many as the answer says, and node tests as many or one fewer (with side, at most as many). \
+         {} Planted were {} errors, in capsules without and with side a wrong fact and a path that the graph does not \
          have; not found: {}.\n\n## Flow facts\n\nThe price of a fact is what one more of its right side adds to the bound, in \
-         instructions, in the order of the queries above.\n\n| fact | price | reason |\n|---|---:|---|",
+         instructions, in the order of the queries above.\n",
         untried(&findings.rows),
         findings.planted,
         findings.unnoticed
     )?;
-    for fact in MODAL.rows() {
-        let price = |row: &Row| {
-            let mut rows = row.proven.analysis.system.rows.iter();
-            let place = rows.position(|row| row.name == fact.name)?;
-            Some(format!("{:.2}", row.proven.bound.prices[place] as f64 / UNIT as f64))
-        };
-        let prices: Vec<String> =
-            findings.rows.iter().map(|row| price(row).unwrap_or_else(|| "–".to_owned())).collect();
-        writeln!(text, "| {} | {} | {} |", fact.name, prices.join(", "), fact.because)?;
-    }
-    text += "\nCalls that are never made:\n\n";
-    for (caller, callee, because) in PLAIN.never {
-        let of =
-            |name: &str| if name.is_empty() { "anything".to_owned() } else { format!("`{name}`") };
-        writeln!(text, "- from {} to {}: {because}", of(caller), of(callee))?;
-    }
+    let (with_side, without): (Vec<_>, Vec<_>) =
+        findings.rows.iter().partition(|row| row.proven.kind.is_signed);
+    facts(&mut text, &MODAL, &without)?;
+    text += "## Flow facts with side\n\n";
+    facts(&mut text, &SIDED_CAPSULE, &with_side)?;
+    text += "## Of all\n\n";
     for (callee, caller) in ONLY_FROM {
         writeln!(
             text,

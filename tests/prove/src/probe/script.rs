@@ -1,9 +1,10 @@
 //! Scripts for the probe: surfaces, frames and queries, as words.
 //!
 //! One file, because a script and its words belong together; [`moved`] has those for surfaces that are not a table of
-//! rows.
+//! rows, [`sided`] those with side.
 
 mod moved;
+mod sided;
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, generate};
 use dibs_nostd::{Budget, Cost, Options, Query, Tool};
@@ -46,6 +47,8 @@ pub enum Record {
         /// Roots of the tree besides the first.
         roots: u32,
         table: Table,
+        /// Whether it asks for the side.
+        is_signed: bool,
         /// Number of instructions that the budget was made for, if any.
         deadline: Option<u32>,
     },
@@ -377,9 +380,10 @@ impl Script {
         self.words.extend(points.as_flattened());
         self.words.push(tool.radius.to_bits());
         let how = self.how | if measured { how::MEASURED } else { 0 };
+        let is_signed = how & how::SIGNED != 0;
         self.words.extend([u32::from(is_capsule), how, warm, budget.tests()]);
         let (roots, table) = (self.roots, self.table);
-        self.records.push(Record::Query { is_capsule, roots, table, deadline });
+        self.records.push(Record::Query { is_capsule, roots, table, is_signed, deadline });
     }
 }
 

@@ -202,7 +202,7 @@ fn a_trace_that_leaves_the_graph_or_breaks_a_fact_is_found() {
 #[test]
 fn what_may_write_a_register_is_found() {
     // ADDS r2, #1; LDR r2, [r0]; POP {r2, pc}; MOV r2, r9; MOVW r2; LDRD r4, r2; LDM r0, {r2, r3}; VMOV r2, s0; VMOV r2, r3, d0;
-    // VLDMIA r2!; LDR r2, [sp]; LDR r2, [pc]; ADD r2, sp; LSLS r2, r0
+    // VLDMIA r2!; LDR r2, [sp]; LDR r2, [pc]; ADD r2, sp; LSLS r2, r0; LDRB r2, [r0, #4]; LDR r0, [r2], #4
     let writes = [
         (0x3201, 0),
         (0x6802, 0),
@@ -218,9 +218,12 @@ fn what_may_write_a_register_is_found() {
         (0x4A00, 0),
         (0xAA00, 0),
         (0x0042, 0),
+        (0xF890, 0x2004),
+        (0xF852, 0x0B04),
     ];
     assert!(writes.iter().all(|&(first, second)| may_write(2, first, second)), "{writes:x?}");
-    // STR r0, [sp, #104]; LDR r0, [pc, #8]; ADD r0, sp, #8; CMP r1, #2; ADDS r3, #1; LDR r4, [r0]; MOVW r3; VADD.F32 s4, s4, s4; VLDR s5, [r2].
+    // STR r0, [sp, #104]; LDR r0, [pc, #8]; ADD r0, sp, #8; CMP r1, #2; ADDS r3, #1; LDR r4, [r0]; MOVW r3; VADD.F32 s4, s4, s4; VLDR s5, [r2];
+    // LDRB r12, [sp, #719]; LDR r3, [r0, #514].
     let others = [
         (0x901A, 0),
         (0x4802, 0),
@@ -231,6 +234,8 @@ fn what_may_write_a_register_is_found() {
         (0xF240, 0x0310),
         (0xEE32, 0x2A02),
         (0xEDD2, 0x2A00),
+        (0xF89D, 0xC2CF),
+        (0xF8D0, 0x3202),
     ];
     assert!(!others.iter().any(|&(first, second)| may_write(2, first, second)), "{others:x?}");
 }

@@ -1,0 +1,261 @@
+//! The flow facts of a query with side, of a table of vertices and a tree of one root: those of the search, and of the
+//! side of a point.
+
+// Requirement: A-06
+
+use super::facts::{
+    COPIES, Count, Fact, Facts, LEAF_PLANE, Most, NODE, Never, SEARCH, TEST, TRIANGLE, TURN, VISIT,
+    WARM, WITHOUT_EDGE,
+};
+use super::lines::Within::{self, Function, Line, Of};
+
+/// Most triangles around a vertex of a surface with a bound. (The walks themselves end after 256.)
+pub const RING: u32 = 16;
+
+/// For a sphere, whose axis is a point: it has no depth.
+pub const SIDED_SPHERE: Facts =
+    Facts { groups: &[SEARCHES, SIDE_OF_POINT, COPIES], never: &[ONE_SOLID, ONE_ROOT, CLOSED] };
+
+/// For a capsule whose axis is outside: no depth is searched.
+pub const SIDED_CAPSULE: Facts = Facts {
+    groups: &[SEARCHES, SIDE_OF_POINT, COPIES],
+    never: &[ONE_SOLID, ONE_ROOT, CLOSED, NO_DEPTH, NO_MEMORY, NO_TOUCHES],
+};
+
+/// The same with a wrong fact, which a trace must refute.
+pub const SIDED_WITHOUT_EDGES: Facts = Facts {
+    groups: &[SEARCHES, SIDE_OF_POINT, COPIES],
+    never: &[ONE_SOLID, ONE_ROOT, CLOSED, NO_DEPTH, NO_MEMORY, NO_TOUCHES, WITHOUT_EDGE],
+};
+
+const ONE_SOLID: Never = ("query::separation::signed", "solids::signed", "the tree has one root");
+const ONE_ROOT: Never = ("", "Roots::with_others", "the tree has one root");
+
+const CLOSED: Never = ("side::of_point", "is_crowded", "the surface is closed");
+
+const NO_DEPTH: Never = (
+    "query::separation::signed",
+    "Depth<I,V,T>::run",
+    "the axis neither crosses the surface nor is inside",
+);
+
+const NO_MEMORY: Never =
+    ("query::separation::signed", "KnownDepthMut::now", "a query remembers no earlier tick");
+
+const NO_TOUCHES: Never = (
+    "query::separation::signed",
+    "__aeabi_memclr",
+    "it clears the memory for a depth, of an axis that crosses the surface or is inside",
+);
+
+const TIES: &str = "dibs-nostd/src/query/search/ties.rs";
+const SIDE: &str = "dibs-nostd/src/query/side.rs";
+const EXACT: &str = "dibs-nostd/src/query/exact.rs";
+const NORMAL: &str = "dibs-nostd/src/query/normal.rs";
+
+const CHILD: Count = Count::Passes(&[Line(NODE, "if squared > far * far {")]);
+const EXPANSION: Count = Count::Entries(&[Line(NODE, "let position = self.position(node.pin)?;")]);
+const PUSH: Count = Count::Passes(&[
+    Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
+    Line(NODE, "*self.stack.get_mut(at)? = subtree;"),
+]);
+const SHIFT: Count = Count::Passes(&[
+    Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
+    Line(NODE, "*self.stack.get_mut(at)? = below;"),
+]);
+const POPS: &str = "while let Some(Waiting { lower, link }) = self.pop() {";
+const SEARCH_POPS: &[Within] = &[Line(SEARCH, POPS)];
+const TIE_POPS: &[Within] = &[Line(TIES, POPS)];
+const SEARCHED: Count = Count::Entries(SEARCH_POPS);
+const TIE_TEST: Count = Count::Calls(&[Function("each_tie")], "closest_to_");
+const TIE_TURNS: &[Within] = &[Line(TIES, "if self.meter.triangle().is_none() {")];
+const FIRST_PUSH: &[Within] = &[Line(SEARCH, "search.push(0, subtree)"), Function("push")];
+
+const ROUGH: &[Within] = &[Line(SIDE, "let above = rough.of(rows)?;")];
+const FINE: &[Within] = &[Line(SIDE, "let above = fine.of(again)?;")];
+const ACROSS: &[Within] = &[Function("across")];
+const EDGE: Within = Line(EXACT, "for (edge, along, from, to) in [(0, ab, a, b)");
+const EDGES_F32: &[Within] = &[Of("closest", "f32>"), EDGE];
+const EDGES_F64: &[Within] = &[Of("closest", "f64>"), EDGE];
+const AROUND: &[Within] =
+    &[Line(EXACT, "let (next, back) = self.tree.across(at, corner).ok_or(NoSide::OpenBoundary)?;")];
+const RING_LINE: Within =
+    Line(EXACT, "let Some((next, back)) = self.tree.across(row, corner) else {");
+const TURN_F32: &[Within] = &[Of("add", "f32>"), RING_LINE];
+const TURN_F64: &[Within] = &[Of("add", "f64>"), RING_LINE];
+const TURNED: Within = Line(EXACT, "let cosine = -P::dot(to_centre, edge);");
+const TURNED_F32: Count = Count::Passes(&[Of("add", "f32>"), TURNED]);
+const TURNED_F64: Count = Count::Passes(&[Of("add", "f64>"), TURNED]);
+const ADDED_F32: Count = Count::Calls(&[Of("add", "f32>")], "::closest");
+const ADDED_F64: Count = Count::Calls(&[Of("add", "f64>")], "::closest");
+const NORMALS: &[Within] = &[Line(NORMAL, "let [centre, from, to] = turned(at(row)?, corner);")];
+const PLANES: &[Within] = &[Line(SIDE, "for row in rows {")];
+const DROP: &[Within] = &[Line(TIES, "self.rows.retain(|tie| tie.square <= self.limit);")];
+
+/// Of the searches: the query's own, and those for ties.
+pub(super) const SEARCHES: &[Fact] = &[
+    Fact {
+        name: "node tests",
+        terms: &[
+            (1, CHILD),
+            (1, LEAF_PLANE),
+            (1, VISIT),
+            (1, TRIANGLE),
+            (1, TIE_TEST),
+            (4, ADDED_F32),
+            (96, ADDED_F64),
+            (3, TURNED_F32),
+            (48, TURNED_F64),
+        ],
+        most: Most { base: 0, roots: 0, nodes: 1, triangles: 0 },
+        because: "counted by the meter as in a plain query; the side's work is counted before it is done, as 4 for a triangle and 3 \
+                  for one around a vertex, in f64 96 and 48",
+    },
+    Fact {
+        name: "triangle tests",
+        terms: &[(1, TEST), (1, WARM), (1, TIE_TEST)],
+        most: Most { base: 0, roots: 0, nodes: 0, triangles: 1 },
+        because: "the meter counts each exact test before its call, the warm ones and those of ties too",
+    },
+    Fact {
+        name: "eight children",
+        terms: &[(1, CHILD), (-8, EXPANSION)],
+        most: Most::base(0),
+        because: "a link has three bits for the number of children, less one",
+    },
+    Fact {
+        name: "moves for each entry",
+        terms: &[(2, SHIFT), (-7, PUSH)],
+        most: Most::base(0),
+        because: "a node's entries are sorted among themselves: k of them take at most k (k - 1) / 2 moves, and k is at most 8",
+    },
+    Fact {
+        name: "waiting entries",
+        terms: &[
+            (1, Count::Heads(&[Function("least_waiting")])),
+            (1, Count::Heads(SEARCH_POPS)),
+            (1, Count::Heads(TIE_POPS)),
+            (-1, PUSH),
+            (-3, SEARCHED),
+            (-3, Count::Entries(TIE_POPS)),
+        ],
+        most: Most::base(0),
+        because: "what waits was pushed and not popped; each search pushes the root before; each loop has a turn more where it ends",
+    },
+    Fact {
+        name: "turns of a leaf",
+        terms: &[(1, TURN), (-1, TRIANGLE), (-1, VISIT), (-1, SEARCHED)],
+        most: Most::base(0),
+        because: "only the best triangle is passed over without a count, at most once a visit; out of budget the search ends",
+    },
+    Fact {
+        name: "turns of a leaf of ties",
+        terms: &[(1, Count::Heads(TIE_TURNS)), (-1, TIE_TEST), (-1, Count::Entries(TIE_TURNS))],
+        most: Most::base(0),
+        because: "each turn tests a triangle, unless the budget ends the search",
+    },
+    Fact {
+        name: "visits of leaves",
+        terms: &[(1, VISIT), (-1, LEAF_PLANE), (-1, SEARCHED)],
+        most: Most::base(0),
+        because: "a leaf waits once its plane did not reject it, except a root, and where the budget cannot cover its visit \
+                  either",
+    },
+    Fact {
+        name: "the first entry",
+        terms: &[(1, Count::Heads(FIRST_PUSH)), (-1, Count::Entries(FIRST_PUSH))],
+        most: Most::base(0),
+        because: "a search's stack is empty when the root is pushed",
+    },
+    Fact {
+        name: "ties that make room",
+        terms: &[(1, Count::Heads(DROP)), (-34, Count::Calls(&[], "Ties::drop_farther"))],
+        most: Most::base(0),
+        because: "a list has at most 32 ties, which two loops share; each loop has a turn more where it ends",
+    },
+];
+
+/// Of the side of a point whose closest triangles are known.
+pub(super) const SIDE_OF_POINT: &[Fact] = &[
+    Fact {
+        name: "rows of one code",
+        terms: &[(1, Count::Heads(ACROSS)), (-5, Count::Entries(ACROSS))],
+        most: Most::base(0),
+        because: "at most four triangles of a tree of 16-bit indices share the low bits of their row; one turn where they end",
+    },
+    Fact {
+        name: "edges of a triangle",
+        terms: &[(1, Count::Heads(EDGES_F32)), (-4, Count::Entries(EDGES_F32))],
+        most: Most::base(0),
+        because: "a triangle has three; one turn where they end",
+    },
+    Fact {
+        name: "edges of a triangle, in f64",
+        terms: &[(1, Count::Heads(EDGES_F64)), (-4, Count::Entries(EDGES_F64))],
+        most: Most::base(0),
+        because: "the same",
+    },
+    Fact {
+        name: "planes of ties",
+        terms: &[(1, Count::Heads(PLANES)), (-33, Count::Entries(PLANES))],
+        most: Most::base(0),
+        because: "a list has at most 32 ties; one turn where they end",
+    },
+    Fact {
+        name: "deciding ties",
+        terms: &[(1, Count::Heads(ROUGH)), (-33, Count::Entries(ROUGH))],
+        most: Most::base(0),
+        because: "a list has at most 32 ties, each passed over or added; one turn where they end",
+    },
+    Fact {
+        name: "deciding ties, in f64",
+        terms: &[(1, Count::Heads(FINE)), (-33, Count::Entries(FINE))],
+        most: Most::base(0),
+        because: "the same",
+    },
+    Fact {
+        name: "the first around a vertex",
+        terms: &[(1, Count::Heads(AROUND)), (-(RING as i64), Count::Entries(AROUND))],
+        most: Most::base(0),
+        because: "one turn for each triangle around the vertex",
+    },
+    Fact {
+        name: "edges around a vertex",
+        terms: &[(1, Count::Heads(TURN_F32)), (-(RING as i64), Count::Entries(TURN_F32))],
+        most: Most::base(0),
+        because: "one turn for each triangle around the vertex",
+    },
+    Fact {
+        name: "edges around a vertex, in f64",
+        terms: &[(1, Count::Heads(TURN_F64)), (-(RING as i64), Count::Entries(TURN_F64))],
+        most: Most::base(0),
+        because: "the same",
+    },
+    Fact {
+        name: "normals around a vertex",
+        terms: &[(1, Count::Heads(NORMALS)), (-(RING as i64), Count::Entries(NORMALS))],
+        most: Most::base(0),
+        because: "one turn for each triangle around the vertex",
+    },
+    Fact {
+        name: "normals of a walked vertex",
+        terms: &[
+            (1, Count::Heads(NORMALS)),
+            (-1, TURNED_F32),
+            (-1, TURNED_F64),
+            (-(RING as i64), Count::Calls(&[Function("outward")], "pseudonormal")),
+            (-(RING as i64), Count::Entries(ROUGH)),
+            (-(RING as i64), Count::Entries(FINE)),
+            (-(RING as i64), Count::Entries(TIE_POPS)),
+        ],
+        most: Most::base(0),
+        because: "those of a direction, and those that confirm a vertex after the walk along its edges, which ends early only \
+                  where the budget does: the ties end there",
+    },
+    Fact {
+        name: "flat triangles",
+        terms: &[(1, Count::Calls(&[], "normal::flat_normal"))],
+        most: Most::base(0),
+        because: "no triangle has a corner of a sine below 1 in 1,024, or an area whose square leaves f32",
+    },
+];
