@@ -95,6 +95,9 @@ pub struct Args {
     /// frame
     #[arg(long)]
     to: Target,
+    /// Send a frame's UDP packets without pauses: sooner, for a receiver whose buffer holds a whole frame
+    #[arg(long)]
+    at_once: bool,
     #[command(flatten)]
     motion_rate: MotionRate,
     /// Send 6 bytes a vertex instead of 12, quantised in a box around each frame

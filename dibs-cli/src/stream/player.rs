@@ -220,7 +220,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
     fn send(&mut self, frame: &Due<'_>) -> Result<()> {
         // Any other line blocks until it has room; a datagram that does not fit in the receiver's buffer is lost.
         let spread = match self.args.to {
-            Target::Udp { .. } => SPREAD.min(frame.period / 2),
+            Target::Udp { .. } if !self.args.at_once => SPREAD.min(frame.period / 2),
             _ => Duration::ZERO,
         };
         let sender = &mut self.sender;

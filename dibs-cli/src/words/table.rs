@@ -62,6 +62,7 @@ pub const WORDS: &[Row] = &[
     ("mtu", "BYTES", "the largest packet", "stream"),
     ("loop", "", "start over at the end", "stream"),
     ("frames", "FRAMES", "how many frames are sent", "stream"),
+    ("at-once", "", "without pauses", "stream"),
     ("window", "WINDOW", "frames on their way", "stream"),
     ("retry", "SECONDS", "time to connect again", "stream"),
     ("page", "PAGE", "the page without data", "view"),
