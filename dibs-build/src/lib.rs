@@ -40,6 +40,7 @@ mod script;
 mod stretch;
 mod surface_rows;
 mod volume_file;
+mod warnings;
 mod write;
 
 pub use array::{BuiltTree, ModesSummary, Summary, VolumeSummary, summarise};

@@ -3,9 +3,6 @@
 use dibs_nostd::format::Unit;
 use glam::{DVec3, Vec3};
 
-use crate::crossing::crossing_parts;
-use crate::orient::check_winding;
-
 /// A triangle mesh: fixed connectivity, and the positions of one frame.
 ///
 /// Coordinates are in the mesh's own unit (mm in the examples), and f32 as on the controller: geodesics computed on
@@ -27,17 +24,6 @@ impl Mesh {
     #[must_use]
     pub fn local(&self, positions: &[DVec3]) -> Vec<Vec3> {
         positions.iter().map(|&position| (position - self.origin).as_vec3()).collect()
-    }
-
-    /// What makes a side of the surface wrong or uncertain, each in a sentence: its winding ([`check_winding`]), and closed
-    /// parts that cross or touch at rest.
-    ///
-    /// Cost: that of `check_winding`, and the comparison of up to four million pairs of triangles.
-    #[must_use]
-    pub fn warnings(&self) -> Vec<String> {
-        let winding = check_winding(self).err().map(|error| error.to_string());
-        let crossing = crossing_parts(self).into_iter().map(|parts| parts.to_string());
-        winding.into_iter().chain(crossing).collect()
     }
 
     /// Positions of a triangle's corners.
