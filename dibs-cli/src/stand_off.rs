@@ -4,11 +4,11 @@ use std::path::Path;
 use std::str::FromStr;
 
 use anyhow::{Context, Result, anyhow, bail};
-use dibs_nostd::filter::{Filter, MOST_PAIRS};
+use dibs_nostd::filter::Filter;
 use dibs_nostd::{Index, Tree};
 
 /// Most labels with a stand-off of their own.
-pub const LABELS: usize = MOST_PAIRS - 1;
+pub const LABELS: usize = <Filter>::MOST_PAIRS - 1;
 
 /// A stand-off (mm): `1` of all tissue, `2=3` of the label 2.
 #[derive(Clone, Copy)]

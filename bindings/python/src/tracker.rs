@@ -221,7 +221,7 @@ impl Tracked {
 pub type Admitted = ([f32; 3], [f32; 3], f32, &'static str, u32, u32);
 
 /// Most labels with a stand-off of their own.
-const LABELS: usize = filter::MOST_PAIRS - 1;
+const LABELS: usize = <filter::Filter>::MOST_PAIRS - 1;
 
 /// A filter of commands.
 #[pyclass(frozen, module = "dibs._dibs")]

@@ -87,9 +87,7 @@ pub use row::MotionRow;
 use session::Session;
 pub use uncertainty::Uncertainty;
 
-/// Most pairs of tool and surface, and of tool and a label's part of one: each tool and surface is a pair once more for
-/// each label with a stand-off that is larger than the filter's.
-pub const MOST_PAIRS: usize = 8;
+const MOST_PAIRS: usize = 8;
 
 /// By how much (mm) a verified separation may be below the stand-off.
 const EPSILON: f32 = 0.01;
@@ -116,6 +114,10 @@ pub struct Filter<const LABELS: usize = 0> {
 }
 
 impl Filter {
+    /// Most pairs of tool and surface, and of tool and a label's part of one: each tool and surface is a pair once more
+    /// for each label with a stand-off that is larger than the filter's.
+    pub const MOST_PAIRS: usize = MOST_PAIRS;
+
     /// A filter that keeps every tool `stand_off` (mm, at least 0) from the tissue, for a robot whose reference point
     /// moves at most at `speed` (mm/s, above 0), and whose rotation moves the end of the [lever](Self::lever) at most
     /// at that speed. Faster commands are shortened.
