@@ -1,4 +1,4 @@
-//! Surfaces that a volume's nodes move: coverage, stretch, answers, motion and cost.
+//! Surfaces that a volume's nodes move: coverage, stretch, answers and motion.
 //!
 //! One file, because all tests need the same trees.
 
@@ -424,45 +424,4 @@ fn the_monitor_compares_frames_itself() {
     assert!(slices >= work / 25 && slices <= work / 25 + 2, "{slices} {work}");
     let too_fast = decide(&moved, Millis(2));
     assert!(matches!(too_fast, Err(StretchError::TooFast { vertex: 57, .. })), "{too_fast:?}");
-}
-
-/// A tool at some distance outside of the surface.
-fn beside(at: &[Vec3], rng: &mut Rng) -> Instrument {
-    let middle = at.iter().sum::<Vec3>() / at.len() as f32;
-    let near = at[rng.usize(..at.len())];
-    let random = |rng: &mut Rng| Vec3::from([(); 3].map(|()| rng.f32() - 0.5));
-    let start = near + (near - middle).normalize() * 30.0 * rng.f32() + random(rng) * 10.0;
-    let end = if rng.bool() { start } else { start + random(rng) * 40.0 };
-    Instrument::capsule(start, end, 2.5)
-}
-
-/// Node tests on meshes in lattices of two thousand nodes, compared with those of geodesics along the surface at the
-/// same stretch: fewer, because straight lines are shorter than paths along the surface.
-#[test]
-fn straight_radii_take_fewer_node_tests() {
-    let mut rng = Rng::with_seed(8);
-    let heart = generate::heart(5_000).expect("a valid size").mesh;
-    let brain = generate::brain(5_000).expect("a valid size");
-    let mut found = Vec::new();
-    for (name, mesh, most) in [("brain", brain, 0.85), ("heart", heart, 0.87)] {
-        let lattice = Volume::lattice(&mesh, [14, 12, 10]).expect("a lattice");
-        let embedded = Builder::new().stretch(1.1).nodes(&lattice).build(&mesh).expect("held");
-        let plain = Builder::new().stretch(1.1).build(&mesh).expect("valid");
-        let at_rest = [&embedded, &plain].map(|built| built.to_rows(&mesh.positions));
-        let trees = [&embedded, &plain].map(|built| built.tree::<u16>().expect("valid"));
-        let mut counts = [0_u64; 2];
-        for _ in 0..400 {
-            let tool = beside(&at_rest[0], &mut rng);
-            for ((tree, rest), count) in trees.iter().zip(&at_rest).zip(&mut counts) {
-                let mut query = Query::<u16, MAX_STACK>::new(tree).expect("deep enough");
-                let options = Options::cold().unsigned();
-                let answer = ask::closest(&mut query, &rest[..], &tool, &options).expect("sound");
-                *count += u64::from(answer.node_tests);
-            }
-        }
-        let part = counts[0] as f64 / counts[1] as f64;
-        println!("{name}: {counts:?} {part:.3}");
-        found.push((name, part, most));
-    }
-    assert!(found.iter().all(|(_, part, most)| part <= most), "{found:?}");
 }

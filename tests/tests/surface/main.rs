@@ -5,6 +5,7 @@ mod embedded;
 mod embedded_damaged;
 mod embedded_limits;
 mod embedded_outside;
+mod embedded_radii;
 mod facts;
 mod frames;
 mod memory;
