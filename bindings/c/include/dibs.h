@@ -41,7 +41,7 @@
 /**
  * Bytes of a bus's storage.
  */
-#define DIBS_BUS_SIZE 3072
+#define DIBS_BUS_SIZE 3136
 
 /**
  * Bytes of a list's storage.

@@ -19,7 +19,7 @@ use crate::tool::dibs_vec3;
 use crate::tree::{Row, dibs_tree};
 
 /// Bytes of a bus's storage.
-pub const DIBS_BUS_SIZE: usize = 3_072;
+pub const DIBS_BUS_SIZE: usize = 3_136;
 
 /// The bus's end of a guarded surface: it receives packets, checks complete frames in slices, publishes them, checks
 /// the tree's bytes in the background, and writes the statuses for the sender.
