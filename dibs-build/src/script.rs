@@ -142,7 +142,7 @@ impl TreeScript {
     /// the remedy.
     pub fn emit(self, name: &str) {
         if let Err(error) = self.try_emit(name) {
-            println!("cargo::error={}", of_script(error.to_string()));
+            println!("cargo::error={error}");
             std::process::exit(1);
         }
     }
@@ -162,7 +162,7 @@ impl TreeScript {
             MeshSource::File(path) => path.display().to_string(),
             MeshSource::Mesh(_) => name.to_owned(),
         };
-        let built = self.build(&label)?;
+        let built = self.build(&label).map_err(|error| of_script(error.to_string()))?;
         built.write_rust(Path::new(&out).join(name).with_extension("rs"), name)?;
         Ok(built)
     }

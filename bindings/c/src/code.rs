@@ -70,7 +70,7 @@ pub enum dibs_code {
     Margin = 207,
     /// The query failed for another cause.
     QueryFailed = 208,
-    /// No surface was published, or the frame is empty.
+    /// No surface was published, the frame is empty, or the guard's start was not acknowledged.
     NoSurface = 300,
     /// The surface is older than allowed.
     Stale = 301,
@@ -321,7 +321,7 @@ impl dibs_code {
             Self::Uncovered => c"the surface is stretched beyond what the query was told",
             Self::Margin => c"the margin is negative, not finite or larger than asked for",
             Self::QueryFailed => c"the query failed",
-            Self::NoSurface => c"there is no surface",
+            Self::NoSurface => c"there is no surface, or the start was not acknowledged",
             Self::Stale => c"the surface is older than allowed",
             Self::LinkLost => c"no good packet came for longer than allowed",
             Self::HeartbeatLost => c"no heartbeat came for longer than allowed",

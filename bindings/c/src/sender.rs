@@ -220,6 +220,7 @@ pub extern "C" fn dibs_sender_challenge(sender: *mut dibs_sender, challenge: u64
 /// @param sent       Receives the frame's number and size; or null.
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are not a frame of the surface: nothing was
 ///         sent; `DIBS_CODE_SENDER_LINE` if the connection broke: close the sender, and make another;
+///         `DIBS_CODE_SENDER_NO_CHALLENGE` with a key, before `dibs_sender_poll` has met the receiver's challenge;
 ///         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the
 ///         full text.
 #[unsafe(no_mangle)]

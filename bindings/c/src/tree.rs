@@ -149,8 +149,8 @@ pub extern "C" fn dibs_tree_rest_position(
 
 /// Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows,
 /// as a frame needs them. A frame in the file's order gives wrong distances without an error, unless it is measured.
-/// Only the order changes: positions are in mm relative to the tree's origin, which is not zero for a mesh far from its
-/// file's; subtract it from positions of the file, and not from velocities (mm/s).
+/// Only the order changes. Positions are in mm, less the tree's origin, which is not zero for a mesh far from the origin
+/// of its file; velocities are in mm/s.
 ///
 /// Cost: linear in the vertices.
 ///

@@ -125,7 +125,7 @@ fn packets_of_rust_have_the_same_outcomes_in_c() {
 }
 
 /// C's sender sends nothing before the receiver's challenge, which it asks for. C's bus then publishes its frame, and
-/// neither those of senders with another key, receiver, challenge or no key. Nor does Rust's bus, given the same packets.
+/// none of senders with another key, receiver or challenge, or without a key. Rust's bus does the same with the same packets.
 #[test]
 fn frames_go_from_c_with_tags() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -374,7 +374,7 @@ class Guards(unittest.TestCase):
         block = next(block for block in re.findall(r"```python\n(.*?)```", readme, re.DOTALL) if "Guard(" in block)
         sender = dibs.Sender(TREE, heartbeat=None)
         sender.send(BEAT.frames[0], age=0)
-        here = {"dibs": dibs, "tree": TREE, "packets": sender.packets(), "now": 7, "tool": SPHERE}
+        here = {"dibs": dibs, "tree": TREE, "packets": sender.packets(), "now": 7, "tool": SPHERE, "pressed": True}
         exec(compile(block, "README.md", "exec"), here)
         self.assertEqual(here["guard"].counters["published"], 1)
         self.assertEqual(here["force"].state, dibs.ForceState.SAFE)

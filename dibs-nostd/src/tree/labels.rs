@@ -1,9 +1,9 @@
 //! The labels that a tree's triangles have.
 
-/// A set of labels: one bit each. It is made once, at validation, so that a control tick can tell a label that no
-/// triangle has without a look at every triangle.
+/// A set of labels: one bit each. A tracker has it, so that a control tick can tell a label that no triangle has without a
+/// look at every triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct LabelSet([u64; 4]);
+pub(crate) struct LabelSet([u64; 4]);
 
 impl LabelSet {
     pub const fn of(mut labels: &[u8]) -> Self {

@@ -18,7 +18,6 @@ mod facts;
 pub mod format;
 mod header;
 mod index;
-#[cfg(feature = "control")]
 mod labels;
 mod order;
 mod row;
@@ -33,6 +32,7 @@ pub use error::FormatError;
 pub use facts::SurfaceFacts;
 pub use format::PathKind;
 pub use index::Index;
+pub(crate) use labels::LabelSet;
 #[cfg(feature = "control")]
 pub(crate) use order::VertexOrder;
 pub use row::{TriangleRow, VertexNumber};
@@ -63,8 +63,6 @@ pub struct Tree<'a, I> {
     /// The checksum if no edge of the surface is a border, else its complement. After a memory fault it is neither, and
     /// the tree counts as open: then a depth takes longer, but is correct.
     closed: u32,
-    #[cfg(feature = "control")]
-    labels: labels::LabelSet,
     width: PhantomData<I>,
 }
 
@@ -84,14 +82,7 @@ impl<'a, I: Index> Tree<'a, I> {
         let header = tri!(header::read::<I>(bytes));
         let sections = tri!(sections::find::<I>(bytes, &header));
         tri!(validate::well_formed::<I>(&header, &sections));
-        let mut tree = Self {
-            sections,
-            header,
-            closed: !header.checksum,
-            #[cfg(feature = "control")]
-            labels: labels::LabelSet::of(sections.labels),
-            width: PhantomData,
-        };
+        let mut tree = Self { sections, header, closed: !header.checksum, width: PhantomData };
         if tri!(adjacency::check(&tree)) {
             tree.closed = header.checksum;
         }
@@ -351,11 +342,15 @@ impl<'a, I: Index> Tree<'a, I> {
 
     /// Whether a triangle has this label.
     ///
-    /// Cost: some ten instructions; which labels there are is noted at validation.
-    #[cfg(feature = "control")]
+    /// Cost: linear in the triangles: ask at start-up.
     #[must_use]
     pub const fn has_label(&self, label: u8) -> bool {
-        self.labels.contains(label)
+        self.labels().contains(label)
+    }
+
+    /// The labels that triangles have.
+    pub(crate) const fn labels(&self) -> LabelSet {
+        LabelSet::of(self.sections.labels)
     }
 
     /// Pin, geodesic radius (mm, rounded up) and link of a node, for programs that walk the tree; `None` outside the

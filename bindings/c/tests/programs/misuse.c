@@ -42,7 +42,7 @@ static void storage(const unsigned char *bytes, size_t length) {
     EXPECT(NULL, dibs_tree_init(tree_memory, sizeof tree_memory, NULL, length, &t));
     EXPECT(NULL, dibs_tree_init(tree_memory, sizeof tree_memory, bytes, length, NULL));
     EXPECT(STORAGE_SIZE, dibs_tree_init(tree_memory, DIBS_TREE_SIZE - 1, bytes, length, &t));
-    EXPECT(STORAGE_ALIGNMENT, dibs_tree_init(tree_memory + 4, sizeof tree_memory, bytes, length, &t));
+    EXPECT(STORAGE_ALIGNMENT, dibs_tree_init(tree_memory + DIBS_ALIGNMENT / 2, sizeof tree_memory, bytes, length, &t));
     EXPECT(TREE_LENGTH, dibs_tree_init(tree_memory, sizeof tree_memory, bytes, 20, &t));
     EXPECT(TREE_LENGTH, dibs_tree_init(tree_memory, sizeof tree_memory, bytes, length - 4, &t));
     EXPECT(ARGUMENT, dibs_tree_init(tree_memory, sizeof tree_memory, bytes, SIZE_MAX, &t));

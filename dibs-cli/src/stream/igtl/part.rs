@@ -14,8 +14,9 @@ pub struct Part<T> {
 
 impl<T: PartialEq> Part<T> {
     /// Takes the next message's part in the place of the last one's, and returns it. A part that repeats the last one stays
-    /// as old as that, unless its header has a time of its own: so an image that is sent again grows old, also beside a pose
-    /// that moves, and an organ at rest that is measured anew does not.
+    /// as old as that, unless its header has a time of its own: so an image that is sent again under the same time grows
+    /// old, also beside a pose that moves, and an organ at rest that is measured anew does not. A source must state there when
+    /// it measured: one that states when it sends hides that it is frozen.
     pub fn replace(last: &mut Option<Self>, next: Self) -> &Self {
         let repeats = |last: &Self| {
             last.value == next.value

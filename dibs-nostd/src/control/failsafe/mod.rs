@@ -24,7 +24,7 @@
 //!
 //! | from | to | when |
 //! |---|---|---|
-//! | (start) | safe | always: no surface was published yet |
+//! | (start) | safe | always: no surface was published, or the start was not acknowledged |
 //! | nominal | degraded | an input is beyond its first limit |
 //! | nominal, degraded | safe | an input is beyond its second limit, the query failed, the tree's bytes changed, or there is no surface |
 //! | degraded | nominal | the run reaches [`Limits::recovery`]'s frames, and the calm is long enough |

@@ -242,7 +242,7 @@ impl<const LABELS: usize> Filter<LABELS> {
         }
         let mut labels = self.parts().map(|part| part.label);
         if let Some(label) =
-            labels.find(|&label| !pairs.iter().any(|(tracker, ..)| tracker.tree().has_label(label)))
+            labels.find(|&label| !pairs.iter().any(|(tracker, ..)| tracker.has_label(label)))
         {
             return Err(FilterError::Unlabelled { label });
         }

@@ -18,6 +18,8 @@ use super::memory::{Lost, Memory};
 use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
 use super::{Budget, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
+#[cfg(feature = "control")]
+use crate::tree::LabelSet;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
@@ -77,6 +79,8 @@ use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 #[derive(Clone, Debug)]
 pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize, const RANGE: usize = 0> {
     tree: Tree<'t, I>,
+    #[cfg(feature = "control")]
+    labels: LabelSet,
     stack: [Waiting; STACK],
     memory: Memory<STACK, OPENED, RANGE>,
     last: Option<Last>,
@@ -175,12 +179,20 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         }
         Ok(Self {
             tree: *tree,
+            #[cfg(feature = "control")]
+            labels: tree.labels(),
             stack: [Waiting { lower: 0.0, link: 0 }; STACK],
             memory: Memory::new(Unit::of(tree)),
             last: None,
             ties: Ties::new(),
             triangle: None,
         })
+    }
+
+    /// Whether a triangle of the tree has this label.
+    #[cfg(feature = "control")]
+    pub(crate) const fn has_label(&self, label: u8) -> bool {
+        self.labels.contains(label)
     }
 
     /// The tree that is searched.

@@ -118,4 +118,11 @@ pub const ANOMALIES: &[Anomaly] = &[
         "Each row of docs/evidence/guarantees.md says of which.",
         "tests/prove/src/harness/record.rs",
     ),
+    anomaly(
+        "K-21",
+        "A source of OpenIGTLink that repeats an image under new times is taken for fresh: its times must be those of \
+         the measurement.",
+        "Let the source send the time of its measurement, or none.",
+        "dibs-cli/src/stream/igtl/part.rs",
+    ),
 ];
