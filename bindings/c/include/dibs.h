@@ -367,7 +367,7 @@ enum dibs_code
    */
   DIBS_CODE_QUERY_FAILED = 208,
   /**
-   * No surface was published, or the frame is empty.
+   * No surface was published, the frame is empty, or the guard's start was not acknowledged.
    */
   DIBS_CODE_NO_SURFACE = 300,
   /**
@@ -3069,6 +3069,7 @@ dibs_code dibs_sender_challenge(dibs_sender *sender, uint64_t challenge);
  * @param sent       Receives the frame's number and size; or null.
  * @return `DIBS_CODE_OK`; `DIBS_CODE_SENDER_FRAME` for positions that are not a frame of the surface: nothing was
  *         sent; `DIBS_CODE_SENDER_LINE` if the connection broke: close the sender, and make another;
+ *         `DIBS_CODE_SENDER_NO_CHALLENGE` with a key, before `dibs_sender_poll` has met the receiver's challenge;
  *         `DIBS_CODE_SENDER_SUPERSEDED`; `DIBS_CODE_SENDER_OTHER_SURFACE`; or a misuse. `dibs_sender_error` has the
  *         full text.
  */
@@ -3381,8 +3382,8 @@ dibs_code dibs_tree_rest_position(dibs_tree *tree,
 /**
  * Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows,
  * as a frame needs them. A frame in the file's order gives wrong distances without an error, unless it is measured.
- * Only the order changes: positions are in mm relative to the tree's origin, which is not zero for a mesh far from its
- * file's; subtract it from positions of the file, and not from velocities (mm/s).
+ * Only the order changes. Positions are in mm, less the tree's origin, which is not zero for a mesh far from the origin
+ * of its file; velocities are in mm/s.
  *
  * Cost: linear in the vertices.
  *
