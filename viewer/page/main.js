@@ -100,8 +100,7 @@ class Viewer {
 
   // The tick's line of the path and of the record, or -1 while a hand has the instrument.
   get line() {
-    const { path } = this.facts;
-    return this.tick >= 0 && path.length > 0 && this.controls.value("tool") === "path" ? this.tick % path.length : -1;
+    return this.controls.value("tool") === "path" && this.tick < this.facts.path.length ? this.tick : -1;
   }
 
   configure() {
@@ -126,26 +125,27 @@ class Viewer {
 
   // So many ticks, during which time goes on unless it is stopped.
   advance(ticks) {
-    const start = this.tick;
-    const end = this.isPlaying ? start + ticks : start;
     const isOnPath = this.isPlaying && this.controls.value("tool") === "path";
     const before = performance.now();
     let counts = [0, 0, 0, 0];
     if (isOnPath) {
       const { path } = this.facts;
-      // A line of the path is a tick.
-      for (let tick = start + 1; tick <= end; tick++) {
+      // A line of the path is a tick. After the last one path and motion begin anew together, as they were recorded.
+      for (let left = ticks; left > 0; left--) {
+        if (this.tick + 1 >= path.length && path.length > 1) this.restart();
+        this.tick++;
         this.from = this.to;
-        this.to = path[tick % path.length];
-        const one = this.session.advance(this.from, this.to, this.seconds(tick - 1), this.seconds(tick), 1);
+        this.to = path[this.tick % path.length];
+        const one = this.session.advance(this.from, this.to, this.seconds(this.tick - 1), this.seconds(this.tick), 1);
         counts = counts.map((count, at) => count + one[at]);
       }
     } else {
-      counts = [...this.session.advance(this.from, this.to, this.seconds(start), this.seconds(end), ticks)];
+      const start = this.tick;
+      if (this.isPlaying) this.tick += ticks;
+      counts = [...this.session.advance(this.from, this.to, this.seconds(start), this.seconds(this.tick), ticks)];
     }
     const milliseconds = performance.now() - before;
     this.from = this.to;
-    this.tick = end;
     return { counts, milliseconds };
   }
 
