@@ -244,6 +244,32 @@ fn nothing_unverified_is_admitted() {
     assert!((1..5).contains(&admitted), "{admitted}");
 }
 
+/// A budget for little more than the queries' base costs leaves no pair out: each has the last tick's interval, less the
+/// motion since.
+#[test]
+fn no_pair_goes_without_an_answer() {
+    let bench = Bench::new(&ball(3), 1.0);
+    let tree = bench.built.tree::<u16>().expect("16-bit indices");
+    let surface = Odometer::new(&tree).start(bench.rows.as_slice());
+    let tools =
+        [-20.0, 0.0, 20.0].map(|x| capsule(Vec3::new(x, 0.0, 50.0), Vec3::new(x, 0.0, 90.0)));
+    let mut trackers =
+        tools.map(|_| Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough"));
+    let command = Motion::translation(Vec3::X * 0.1);
+    for budget in [200_000, 3 * Cost::M7_CAPSULE.base] {
+        let mut pairs: Vec<_> = trackers
+            .iter_mut()
+            .zip(&tools)
+            .map(|(tracker, tool)| (tracker, &surface, tool))
+            .collect();
+        let filter = bench.filter.budget(budget, Cost::M7_CAPSULE);
+        let admitted = filter.admit(&mut pairs, &command, 0.001, &Uncertainty::NONE, &[]);
+        let admitted = admitted.expect("an answer");
+        assert_eq!(admitted.reason, Reason::Commanded, "{budget}: {admitted:?}");
+        assert!(admitted.instructions <= budget, "{budget}: {admitted:?}");
+    }
+}
+
 /// Straight towards a wall with a time constant of 20 ms the speed decreases with the distance, and the stand-off is
 /// reached; along the wall and away from it nothing changes.
 #[test]

@@ -23,7 +23,8 @@ const SHORTENED: u32 = 4;
 /// Rounding of a tool's pose and of a distance's terms, relative to the coordinates' size.
 const ROUNDING: f32 = 16.0 / 16_777_216.0;
 
-/// With fewer node tests a query is not worth its base cost.
+/// With fewer node tests a query is not worth its base cost, but for the first of a pair: it also gives the last tick's
+/// interval, less the motion since.
 const LEAST_TESTS: u32 = 32;
 
 /// Motions (mm) of a period within which a wall is near.
@@ -102,8 +103,10 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<Admitted, FilterError> {
         let rest = Motion { about: self.about, ..Motion::translation(Vec3::ZERO) };
         for part in self.filter.layers() {
+            let mut to_come = pairs.len() as u32;
             for (number, pair) in pairs.iter_mut().enumerate() {
-                self.start(pair, (number, part), &rest)?;
+                to_come -= 1;
+                self.start(pair, (number, part), to_come, &rest)?;
             }
         }
         let stand_still = self.verify(pairs, &rest)?;
@@ -158,11 +161,13 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         }
     }
 
-    /// Searches a pair at its current pose, or a part of its surface.
+    /// Searches a pair at its current pose, or a part of its surface. As many pairs are still `to_come`, and each of them
+    /// gets an answer, if only the last tick's.
     fn start<P: Pair>(
         &mut self,
         pair: &mut P,
         (number, part): (usize, Option<Part>),
+        to_come: u32,
         rest: &Motion,
     ) -> Result<(), FilterError> {
         let (ends, radius) = (pair.ends(), pair.radius());
@@ -178,10 +183,16 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let near = kept + self.grow + NEAR * self.most;
         let found = match (part, whole) {
             (Some(part), Some(whole)) if whole > 0.0 && whole < near => {
-                self.search(pair, ends, false, Some((part.label, near)))?
+                let near = Some((part.label, near));
+                self.worthwhile()
+                    .map(|left| self.search(pair, ends, false, near, left))
+                    .transpose()?
             }
             (Some(_), _) => None,
-            (None, _) => self.search(pair, ends, false, None)?,
+            (None, _) => {
+                let left = self.left(to_come.saturating_mul(self.filter.cost.base));
+                left.map(|left| self.search(pair, ends, false, None, left)).transpose()?
+            }
         };
         let least_known = whole.filter(|_| part.is_some()).unwrap_or(f32::NEG_INFINITY);
         let distance = found.map_or(least_known, |found| larger(found.distance, least_known));
@@ -319,8 +330,9 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         // At rest the start's search suffices.
         if !is_enough(nearest)
             && moved > 0.0
-            && let Some(searched) = self.search(pair, ends, start.distance > 0.0, near)?
+            && let Some(left) = self.worthwhile()
         {
+            let searched = self.search(pair, ends, start.distance > 0.0, near, left)?;
             last = larger(last, searched.distance);
             nearest = on_path(last);
             let known = Known { ends, distance: last };
@@ -347,22 +359,31 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         Ok(())
     }
 
-    /// The closest pair with the axis at these ends, or that of a label's triangles within a distance, within the remaining
-    /// budget; `None` if that is too small. A tool that `is_outside` at the start of its path needs no side later.
+    /// The budget left for a query, less what is reserved for others (instructions); `None` if that is below the base
+    /// cost.
+    fn left(&self, reserved: u32) -> Option<Budget> {
+        let Filter { instructions, cost, .. } = self.filter;
+        let left = instructions.checked_sub(self.instructions)?.checked_sub(reserved)?;
+        (left >= cost.base).then(|| Budget::for_instructions(left, cost))
+    }
+
+    /// The same, if a query is worth its base cost.
+    fn worthwhile(&self) -> Option<Budget> {
+        self.left(0).filter(|left| left.tests() >= LEAST_TESTS)
+    }
+
+    /// The closest pair with the axis at these ends, or that of a label's triangles within a distance, within a budget. A
+    /// tool that `is_outside` at the start of its path needs no side later.
     fn search<P: Pair>(
         &mut self,
         pair: &mut P,
         ends: [Vec3; 2],
         is_outside: bool,
         near: Option<(u8, f32)>,
-    ) -> Result<Option<Found>, FilterError> {
-        let Filter { instructions, cost, options, .. } = self.filter;
-        let left = instructions.saturating_sub(self.instructions);
-        let budget = Budget::for_instructions(left, cost);
-        if budget.tests() < LEAST_TESTS {
-            return Ok(None);
-        }
-        let options = options.signed().budget(budget);
+        left: Budget,
+    ) -> Result<Found, FilterError> {
+        let Filter { cost, options, .. } = self.filter;
+        let options = options.signed().budget(left);
         let found = match near {
             // Without labels that is not compiled.
             Some(near) if LABELS > 0 => {
@@ -376,6 +397,6 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);
         self.instructions = self.instructions.saturating_add(spent);
         self.queries += 1;
-        Ok(Some(found))
+        Ok(found)
     }
 }
