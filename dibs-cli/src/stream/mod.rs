@@ -6,6 +6,7 @@ mod key;
 mod live;
 mod memory;
 mod parse;
+mod part;
 mod place;
 mod player;
 mod report;
@@ -224,12 +225,12 @@ fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> 
     let (name, live, exchange) = match source {
         LiveSource::Input => {
             let (name, input) = ("standard input".to_owned(), std::io::stdin());
-            let mut parser = Parser::new(name.clone(), args.format, place, input);
+            let mut parser = Parser::new(name.clone(), args.format, place, keeps_all, input);
             (name, Live::start(move || parser.next(), keeps_all), None)
         }
         LiveSource::Memory(memory) => {
             let (name, input) = (format!("shm:{memory}"), Memory::open(memory, order.positions())?);
-            let mut parser = Parser::new(name.clone(), Format::Raw, place, input);
+            let mut parser = Parser::new(name.clone(), Format::Raw, place, keeps_all, input);
             (name, Live::start(move || parser.next(), keeps_all), None)
         }
         LiveSource::Igtl(address) => {
