@@ -86,6 +86,9 @@ const TURN_F64: &[Within] = &[Of("add", "f64>"), RING_LINE];
 const TURNED: Within = Line(EXACT, "let cosine = -P::dot(to_centre, edge);");
 const TURNED_F32: Count = Count::Passes(&[Of("add", "f32>"), TURNED]);
 const TURNED_F64: Count = Count::Passes(&[Of("add", "f64>"), TURNED]);
+const OTHER: Within = Line(EXACT, "Ok(seen.above_edge(&self.see(other)?))");
+const ACROSS_F32: Count = Count::Passes(&[Of("add", "f32>"), OTHER]);
+const ACROSS_F64: Count = Count::Passes(&[Of("add", "f64>"), OTHER]);
 const ADDED_F32: Count = Count::Calls(&[Of("add", "f32>")], "::closest");
 const ADDED_F64: Count = Count::Calls(&[Of("add", "f64>")], "::closest");
 const NORMALS: &[Within] = &[Line(NORMAL, "let [centre, from, to] = turned(at(row)?, corner);")];
@@ -106,10 +109,12 @@ pub(super) const SEARCHES: &[Fact] = &[
             (96, ADDED_F64),
             (3, TURNED_F32),
             (48, TURNED_F64),
+            (3, ACROSS_F32),
+            (48, ACROSS_F64),
         ],
         most: Most { base: 0, roots: 0, nodes: 1, triangles: 0 },
         because: "counted by the meter as in a plain query; the side's work is counted before it is done, as 4 for a triangle and 3 \
-                  for one around a vertex, in f64 96 and 48",
+                  for one across an edge or around a vertex, in f64 96 and 48",
     },
     Fact {
         name: "triangle tests",
