@@ -105,7 +105,7 @@ impl Igtl {
             let mut peer = match self.peer.take() {
                 Some(peer) => peer,
                 None => {
-                    let peer = self.door.next(self.heard)?;
+                    let peer = self.door.next(self.heard, self.number > 0)?;
                     self.exchange.connected();
                     self.delay = Delay::new();
                     self.topology.forget();
