@@ -307,6 +307,70 @@ mod tests {
         assert_eq!(side(tree(mesh).orient()), dibs_nostd::Side::Outside);
     }
 
+    /// The text of a call, which compiles as it stands.
+    macro_rules! compiled {
+        (.$call:ident($($given:expr)?)) => {{
+            let _: fn(TreeScript) -> TreeScript = |script| script.$call($($given)?);
+            concat!("`.", stringify!($call), "(", $(stringify!($given),)? ")`").to_owned()
+        }};
+        ($field:ident: $given:expr) => {{
+            let _ = ReadOptions { $field: $given, ..ReadOptions::default() };
+            concat!("`", stringify!($field), ": ", stringify!($given), "`").to_owned()
+        }};
+    }
+
+    #[test]
+    fn each_option_in_a_sentence_becomes_a_call_that_compiles() {
+        let mut compiled = vec![
+            compiled!(.orient()),
+            compiled!(.reading(ReadOptions::default())),
+            compiled!(weld_tolerance: Some(0.0)),
+            compiled!(strict: true),
+            compiled!(largest_component: true),
+            compiled!(.unit(Unit::Millimetre)),
+            compiled!(.unit(Unit::Centimetre)),
+            compiled!(.unit(Unit::Metre)),
+            compiled!(.unit(Unit::Inch)),
+            compiled!(.unit(Unit::Micrometre)),
+        ];
+        // A sentence may leave out what a call or a field is given.
+        for end in ["(", ": "] {
+            let short = |text: &String| text.split_once(end).map(|(name, _)| name.to_owned());
+            let shorts: Vec<String> = compiled.iter().filter_map(short).collect();
+            let left_out = if end == "(" { "(..)`" } else { "`" };
+            compiled.extend(shorts.into_iter().map(|name| name + left_out));
+        }
+        let crates = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut sentences = String::new();
+        for folder in ["src", "../dibs-nostd/src"] {
+            read_all(&crates.join(folder), &mut sentences);
+        }
+        for unit in Unit::ALL {
+            sentences += &format!(" --unit {unit} ");
+            let call = of_script(format!("--unit {unit}"));
+            assert_eq!(call, format!("`.unit(Unit::{unit:?})`"));
+        }
+        for (option, call) in CALLS {
+            assert!(sentences.contains(option), "no sentence has {option}");
+            assert_eq!(of_script(option.to_owned()), call, "an earlier row takes it");
+            for piece in call.split('`').skip(1).step_by(2) {
+                assert!(compiled.contains(&format!("`{piece}`")), "{option}: `{piece}`");
+            }
+        }
+    }
+
+    /// The text of all sources in a folder but this one.
+    fn read_all(folder: &Path, text: &mut String) {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                read_all(&path, text);
+            } else if !path.ends_with("script.rs") {
+                *text += &std::fs::read_to_string(path).unwrap();
+            }
+        }
+    }
+
     #[test]
     fn a_files_groups_are_labels_if_the_script_says_so() {
         let folder = tempfile::tempdir().unwrap();

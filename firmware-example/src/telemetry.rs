@@ -125,6 +125,7 @@ pub const fn cause_code(cause: &Unavailable) -> u32 {
         Unavailable::SourceStale { .. } => 10,
         Unavailable::Forgeries { .. } => 11,
         Unavailable::CutShort => 12,
+        Unavailable::Unacknowledged => 13,
         _ => 8,
     }
 }
@@ -145,6 +146,7 @@ pub const fn cause_name(code: u32) -> &'static str {
         10 => "source stands still",
         11 => "forgeries",
         12 => "budget too small",
+        13 => "not acknowledged",
         _ => "number not finite",
     }
 }

@@ -367,7 +367,7 @@ enum dibs_code
    */
   DIBS_CODE_QUERY_FAILED = 208,
   /**
-   * No surface was published, the frame is empty, or the guard's start was not acknowledged.
+   * No surface was published, or not for long enough since the start, or the frame is empty.
    */
   DIBS_CODE_NO_SURFACE = 300,
   /**
@@ -438,6 +438,10 @@ enum dibs_code
    * The tool has no pose at this tick.
    */
   DIBS_CODE_NO_POSE = 317,
+  /**
+   * The surface was good for long enough, and the safe state waits for its acknowledgement.
+   */
+  DIBS_CODE_UNACKNOWLEDGED = 318,
   /**
    * The packet's checksum does not match, or it is too short for one.
    */
@@ -3051,11 +3055,13 @@ dibs_code dibs_sender_init_with_key(void *storage,
                                     dibs_sender **sender);
 
 /**
- * Sets the challenge of a receiver from which nothing comes back: that of its `dibs_tags_init`.
+ * Sets the challenge that the receiver gave to its `dibs_tags_init`, for a line without a way back: over any other line the
+ * receiver reports it.
  *
  * @return `DIBS_CODE_OK`; `DIBS_CODE_ARGUMENT` if the sender has no key; or a misuse.
  */
-dibs_code dibs_sender_challenge(dibs_sender *sender, uint64_t challenge);
+dibs_code dibs_sender_challenge(dibs_sender *sender,
+                                uint64_t challenge);
 
 /**
  * Sends a frame, with heartbeats between its packets when due. From the third whole frame on over UDP, this thread

@@ -256,7 +256,7 @@ struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
     Code init(dibs_tree *tree, const char *target, Key key, uint32_t receiver, const dibs_sender_settings *settings = nullptr) {
         return init_by<dibs_sender_init_with_key>(tree, target, settings, &key[0], receiver);
     }
-    /** That of a receiver from which nothing comes back. */
+    /** The challenge that the receiver was given, for a line without a way back. */
     Code challenge(uint64_t challenge) { return dibs_sender_challenge(*this, challenge); }
     /** x, y and z of each vertex, in the mesh's order, so many milliseconds ago. */
     Code send(Span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent *sent = nullptr) {

@@ -30,6 +30,7 @@ pub const DIBS_BUS_SIZE: usize = 3_136;
 pub struct dibs_bus(TheBus);
 
 type OfRows<R, M> = Bus<'static, 'static, Row, M, R>;
+type Variant<R, M> = fn(OfRows<R, M>) -> TheBus;
 type Tags = &'static AesCmac;
 
 /// For frames of vertices, or of the nodes that move the surface; in packets without tags, or with them.
@@ -94,11 +95,7 @@ pub extern "C" fn dibs_bus_init(
 ) -> dibs_code {
     dibs_code::of(|| {
         storage.make(size, bus, || {
-            let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?);
-            Ok(dibs_bus(match tree.nodes {
-                None => TheBus::Vertices(bus_of(surface, tree, limits, NoMac)?),
-                Some(_) => TheBus::Nodes(bus_of(surface, tree, limits, NoMac)?),
-            }))
+            bus_of(surface, tree, limits, NoMac, (TheBus::Vertices, TheBus::Nodes))
         })
     })
 }
@@ -125,17 +122,28 @@ pub extern "C" fn dibs_bus_init_with_tags(
 ) -> dibs_code {
     dibs_code::of(|| {
         storage.make(size, bus, || {
-            let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?);
             let tags = tags.share()?.mac();
-            Ok(dibs_bus(match tree.nodes {
-                None => TheBus::TaggedVertices(bus_of(surface, tree, limits, tags)?),
-                Some(_) => TheBus::TaggedNodes(bus_of(surface, tree, limits, tags)?),
-            }))
+            bus_of(surface, tree, limits, tags, (TheBus::TaggedVertices, TheBus::TaggedNodes))
         })
     })
 }
 
-fn bus_of<R: Rows<Poses = Poses>, M: Mac>(
+/// The bus of a tree's kind of rows, as one of these variants.
+fn bus_of<M: Mac>(
+    surface: *mut dibs_surface,
+    tree: *mut dibs_tree,
+    limits: *const dibs_guard_limits,
+    mac: M,
+    (vertices, nodes): (Variant<OfVertices, M>, Variant<OfNodes, M>),
+) -> Result<dibs_bus, dibs_code> {
+    let (surface, tree, limits) = (surface.share()?, tree.share()?, limits.get()?);
+    Ok(dibs_bus(match tree.nodes {
+        None => vertices(of_rows(surface, tree, limits, mac)?),
+        Some(_) => nodes(of_rows(surface, tree, limits, mac)?),
+    }))
+}
+
+fn of_rows<R: Rows<Poses = Poses>, M: Mac>(
     surface: &'static dibs_surface,
     tree: &'static dibs_tree,
     limits: dibs_guard_limits,

@@ -59,6 +59,7 @@ impl From<Unavailable> for dibs_code {
     fn from(cause: Unavailable) -> Self {
         match cause {
             Unavailable::NoSurface => Self::NoSurface,
+            Unavailable::Unacknowledged => Self::Unacknowledged,
             Unavailable::Stale { .. } => Self::Stale,
             Unavailable::Query(error) => error.into(),
             Unavailable::CorruptTree => Self::TreeCorrupt,

@@ -70,7 +70,7 @@ pub enum dibs_code {
     Margin = 207,
     /// The query failed for another cause.
     QueryFailed = 208,
-    /// No surface was published, the frame is empty, or the guard's start was not acknowledged.
+    /// No surface was published, or not for long enough since the start, or the frame is empty.
     NoSurface = 300,
     /// The surface is older than allowed.
     Stale = 301,
@@ -106,6 +106,8 @@ pub enum dibs_code {
     InsideOut = 316,
     /// The tool has no pose at this tick.
     NoPose = 317,
+    /// The surface was good for long enough, and the safe state waits for its acknowledgement.
+    Unacknowledged = 318,
     /// The packet's checksum does not match, or it is too short for one.
     PacketDamaged = 400,
     /// The packet is of another version of the protocol.
@@ -245,6 +247,7 @@ impl dibs_code {
         Self::NoSide,
         Self::InsideOut,
         Self::NoPose,
+        Self::Unacknowledged,
         Self::PacketDamaged,
         Self::PacketVersion,
         Self::PacketForm,
@@ -321,7 +324,7 @@ impl dibs_code {
             Self::Uncovered => c"the surface is stretched beyond what the query was told",
             Self::Margin => c"the margin is negative, not finite or larger than asked for",
             Self::QueryFailed => c"the query failed",
-            Self::NoSurface => c"there is no surface, or the start was not acknowledged",
+            Self::NoSurface => c"there is no surface, or not for long enough yet",
             Self::Stale => c"the surface is older than allowed",
             Self::LinkLost => c"no good packet came for longer than allowed",
             Self::HeartbeatLost => c"no heartbeat came for longer than allowed",
@@ -329,7 +332,7 @@ impl dibs_code {
             Self::Delayed => c"the surface was longer in transit than allowed",
             Self::SourceStale => c"the surface was older than allowed when it was sent",
             Self::Forgeries => c"more packets were forged than allowed",
-            Self::NoDirection => c"no direction leads out",
+            Self::NoDirection => c"the tool's axis touches the surface",
             Self::CutShort => c"the budget ended before the side or the contacts were known",
             Self::NotFinite => c"a number is not finite",
             Self::StretchExceeded => c"a triangle or tetrahedron is stretched beyond its limit",
@@ -339,6 +342,7 @@ impl dibs_code {
             Self::NoSide => c"the tool's side is not known",
             Self::InsideOut => c"the surface or a tetrahedron is mirrored or inside out",
             Self::NoPose => c"the tool has no pose",
+            Self::Unacknowledged => c"the safe state was not acknowledged",
             Self::PacketDamaged => c"the packet is damaged",
             Self::PacketVersion => c"the packet is of another protocol version",
             Self::PacketForm => c"the packet is malformed",

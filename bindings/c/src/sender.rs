@@ -195,7 +195,8 @@ fn ends(
     Ok((line, SurfaceOrder::of(&tree.tree), settings))
 }
 
-/// Sets the challenge of a receiver from which nothing comes back: that of its `dibs_tags_init`.
+/// Sets the challenge that the receiver gave to its `dibs_tags_init`, for a line without a way back: over any other line the
+/// receiver reports it.
 ///
 /// @return `DIBS_CODE_OK`; `DIBS_CODE_ARGUMENT` if the sender has no key; or a misuse.
 #[unsafe(no_mangle)]

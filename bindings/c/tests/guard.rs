@@ -406,12 +406,16 @@ fn refusal(error: &ReceiveError) -> u32 {
     }
 }
 
-fn cause(cause: Unavailable) -> u32 {
+pub fn cause(cause: Unavailable) -> u32 {
     match cause {
         Unavailable::NoSurface => 300,
+        Unavailable::Unacknowledged => 318,
         Unavailable::Stale { .. } => 301,
         Unavailable::Delayed { .. } => 305,
+        Unavailable::NoDirection => 308,
+        Unavailable::CutShort => 309,
         Unavailable::NotFinite => 310,
+        Unavailable::NoSide => 315,
         Unavailable::NoPose => 317,
         Unavailable::Query(QueryError::Uncovered { .. }) => 206,
         other => panic!("{other:?}"),

@@ -11,6 +11,7 @@ mod nodes;
 mod pose;
 mod programs;
 mod readme;
+mod receiver;
 mod ros2;
 mod script;
 mod sender;

@@ -23,5 +23,19 @@ fn misuse_is_a_code_under_the_sanitizers() {
 
         let said = run(Command::new(program).args(&files));
         assert!(said.contains(" checks, 0 failures"), "{name}: {said}");
+        if name == "misuse" {
+            causes_read_as_in_rust(&said);
+        }
+    }
+}
+
+/// A code and the cause without a parameter that it stands for have one sentence.
+fn causes_read_as_in_rust(said: &str) {
+    use dibs_nostd::Unavailable::{
+        CutShort, NoDirection, NoPose, NoSide, NoSurface, NotFinite, Unacknowledged,
+    };
+    for cause in [NoSurface, Unacknowledged, NoDirection, CutShort, NotFinite, NoSide, NoPose] {
+        let row = format!("{} {cause}", crate::guard::cause(cause));
+        assert!(said.lines().any(|line| line == row), "{row}");
     }
 }

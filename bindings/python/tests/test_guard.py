@@ -246,6 +246,8 @@ class Guards(unittest.TestCase):
         answer = loop.run(1_200)
         self.assertEqual((answer.state, answer.waits_for_acknowledgement), (dibs.State.SAFE, True))
         self.assertIsNone(answer.closest)
+        self.assertEqual(answer.reason, "the safe state was not acknowledged")
+        self.assertEqual(answer.cause, answer.reason)
         loop.guard.acknowledge()
         self.assertEqual(loop.tick().state, dibs.State.NOMINAL)
         states = [loop.tick() for _ in range(100)]

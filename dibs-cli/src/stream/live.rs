@@ -20,29 +20,13 @@ pub struct Parsed {
     pub pose: Option<RigidPose>,
     /// When its last byte came.
     pub came: Instant,
-    pub age: Age,
-}
-
-/// What a source states about a frame's age.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Age {
-    /// The time since the capture, even for repeated frames.
-    Stated(Duration),
-    /// A lower bound on the delay. A frame that equals the previous one is as old as that one.
-    Delay(Duration),
+    /// Its age then.
+    pub age: Duration,
 }
 
 /// A frame of a live source.
 pub struct Frame {
-    /// In the mesh's order.
-    pub positions: Vec<Vec3>,
-    pub pose: Option<RigidPose>,
-    /// Its arrival time.
-    pub came: Instant,
-    /// The arrival time of the first of equal frames: a source that states no age and stops moving ages.
-    pub first: Instant,
-    /// The age at time `first`.
-    pub age: Duration,
+    pub parsed: Parsed,
     /// Time since the previous frame.
     pub gap: Duration,
 }
@@ -119,23 +103,15 @@ impl Shared {
     }
 
     fn fill(&self, mut next: impl FnMut() -> Result<Option<Parsed>>, keeps_all: bool) {
-        // The last positions, their arrival time, the arrival time of the first equal frame, and its age then.
-        let mut last: Option<(Vec<Vec3>, Instant, Instant, Duration)> = None;
+        let mut last: Option<Instant> = None;
         let end = loop {
-            let Parsed { positions, pose, came, age } = match next() {
+            let parsed = match next() {
                 Ok(Some(parsed)) => parsed,
                 Ok(None) => break Ok(()),
                 Err(error) => break Err(error),
             };
-            let (first, age) = match (age, &last) {
-                (Age::Delay(_), Some((before, _, first, age))) if *before == positions => {
-                    (*first, *age)
-                }
-                (Age::Delay(age) | Age::Stated(age), _) => (came, age),
-            };
-            let gap = last.as_ref().map_or(FIRST_GAP, |(_, last, ..)| came - *last);
-            last = Some((positions.clone(), came, first, age));
-            let frame = Frame { positions, pose, came, first, age, gap };
+            let gap = last.replace(parsed.came).map_or(FIRST_GAP, |last| parsed.came - last);
+            let frame = Frame { parsed, gap };
             let mut place = self.place();
             if keeps_all {
                 let is_full = |place: &mut Place| place.frame.is_some();

@@ -6,6 +6,7 @@ mod key;
 mod live;
 mod memory;
 mod parse;
+mod part;
 mod place;
 mod player;
 mod report;
@@ -63,7 +64,8 @@ wrong frame ends the stream.
 
 Frames of --from igtl:HOST:PORT are the POLYDATA, POINT and NDARRAY messages of OpenIGTLink. One that equals the one before
 is as old as that, unless its message has another time: a source states there when it measured, not when it sends. A wrong
-message is refused and counted, and the stream goes on.
+message is refused and counted, and the stream goes on. Once the server ends, it is connected to again for --retry seconds,
+and then the stream ends with an error. With igtl-listen:PORT a client that ends may be followed by another at any time.
 
 An emulated serial line is a server for this: qemu-system-arm -serial unix:/tmp/uart,server=on,wait=off")]
 pub struct Args {
@@ -131,8 +133,8 @@ pub struct Args {
     /// Most frames in flight before the next one waits, if the receiver reports
     #[arg(long, default_value_t = 2)]
     window: u32,
-    /// How long to try to reconnect after the connection broke, and to connect to an OpenIGTLink server at the start; 0
-    /// gives up at once
+    /// How long to try to reconnect after the connection broke, and to connect to an OpenIGTLink server, at the start or
+    /// after it ended; 0 gives up at once
     #[arg(long, value_name = "SECONDS", default_value_t = 10)]
     retry: u64,
     #[command(flatten)]
@@ -224,12 +226,12 @@ fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> 
     let (name, live, exchange) = match source {
         LiveSource::Input => {
             let (name, input) = ("standard input".to_owned(), std::io::stdin());
-            let mut parser = Parser::new(name.clone(), args.format, place, input);
+            let mut parser = Parser::new(name.clone(), args.format, place, keeps_all, input);
             (name, Live::start(move || parser.next(), keeps_all), None)
         }
         LiveSource::Memory(memory) => {
             let (name, input) = (format!("shm:{memory}"), Memory::open(memory, order.positions())?);
-            let mut parser = Parser::new(name.clone(), Format::Raw, place, input);
+            let mut parser = Parser::new(name.clone(), Format::Raw, place, keeps_all, input);
             (name, Live::start(move || parser.next(), keeps_all), None)
         }
         LiveSource::Igtl(address) => {

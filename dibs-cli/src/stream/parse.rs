@@ -1,8 +1,10 @@
 //! Frames from a stream of bytes: raw numbers, or JSON lines.
 
-use super::live::{Age, Parsed};
+use super::live::Parsed;
+use super::part::Part;
 use super::place::Place;
 use anyhow::{Result, anyhow, bail};
+use dibs_build::glam::Vec3;
 use serde::Deserialize;
 use std::io::{BufRead, BufReader, Read};
 use std::time::{Duration, Instant};
@@ -29,6 +31,10 @@ pub struct Parser<R> {
     input: BufReader<R>,
     format: Format,
     place: Place,
+    /// Whether a stated rate gives the frames their times, so that their arrival says nothing of their age.
+    is_paced: bool,
+    /// The last frame.
+    last: Option<Part<Vec<Vec3>>>,
     /// Number of the next frame, from 0.
     number: usize,
 }
@@ -47,9 +53,9 @@ struct Object {
 }
 
 impl<R: Read> Parser<R> {
-    pub fn new(name: String, format: Format, place: Place, input: R) -> Self {
+    pub fn new(name: String, format: Format, place: Place, is_paced: bool, input: R) -> Self {
         let input = BufReader::with_capacity(1 << 18, input);
-        Self { name, input, format, place, number: 0 }
+        Self { name, input, format, place, is_paced, last: None, number: 0 }
     }
 
     /// The next frame; `None` at the end.
@@ -70,7 +76,12 @@ impl<R: Read> Parser<R> {
         self.number += 1;
         let positions = self.place.frame(positions, number);
         let positions = positions.map_err(|error| anyhow!("{name}: {error}"))?;
-        let age = age.map_or(Age::Delay(Duration::ZERO), Age::Stated);
+        if age.is_some() || self.is_paced {
+            self.last = None;
+        }
+        let delay = age.unwrap_or_default();
+        let part = Part { value: positions.clone(), time: 0.0, came, delay };
+        let age = Part::replace(&mut self.last, part).age(came);
         Ok(Some(Parsed { positions, pose: None, came, age }))
     }
 

@@ -2,7 +2,7 @@
 
 use super::igtl::Exchange;
 use super::interrupt::Interrupt;
-use super::live::Next;
+use super::live::{Frame, Next, Parsed};
 use super::report::{self, Display, Outcome};
 use super::timing::Timing;
 use super::{Args, Frames, Source};
@@ -199,16 +199,15 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         };
         while !self.interrupt.is_raised() {
             match live.next(GLANCE)? {
-                Next::Frame(frame) => {
-                    *due = frame.came.max(*due);
+                Next::Frame(Frame { parsed: Parsed { positions, pose, came, age }, gap }) => {
+                    *due = came.max(*due);
                     self.outcome.passed_over = live.passed_over();
-                    let rows = Rows::Positions(Cow::Owned(frame.positions), frame.pose);
+                    let rows = Rows::Positions(Cow::Owned(positions), pose);
                     // Frames of a program that prints faster than the rate are due later, so their waiting is no age.
                     let is_waiting = period.is_zero() || is_due_when_it_came;
-                    let waited = if is_waiting { frame.first.elapsed() } else { Duration::ZERO };
-                    let period = if period.is_zero() { frame.gap } else { period };
-                    let (ago, came) = (frame.age + waited, Some(frame.came));
-                    return Ok(Some(Due { rows, ago, period, came }));
+                    let waited = if is_waiting { came.elapsed() } else { Duration::ZERO };
+                    let period = if period.is_zero() { gap } else { period };
+                    return Ok(Some(Due { rows, ago: age + waited, period, came: Some(came) }));
                 }
                 Next::Later => self.poll()?,
                 Next::End => break,

@@ -14,9 +14,11 @@ use crate::time::Millis;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Unavailable {
-    /// No surface was ever published, or none has been trusted since the start: a [fail-safe machine](crate::failsafe) begins
-    /// in its safe state.
+    /// No surface was ever published, or not for long enough since the start: a [fail-safe machine](crate::failsafe)
+    /// begins in its safe state.
     NoSurface,
+    /// The surface was good for long enough, and the [fail-safe machine](crate::failsafe) waits for its acknowledgement.
+    Unacknowledged,
     /// The surface is older than allowed.
     Stale {
         /// Its age.
@@ -71,12 +73,11 @@ pub enum Unavailable {
 impl fmt::Display for Unavailable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoSurface => {
-                write!(f, "no surface was published, or the start was not acknowledged")
-            }
+            Self::NoSurface => write!(f, "there is no surface, or not for long enough yet"),
+            Self::Unacknowledged => write!(f, "the safe state was not acknowledged"),
             Self::Stale { age } => write!(f, "the surface is {age} old"),
             Self::Query(error) => error.fmt(f),
-            Self::CorruptTree => write!(f, "the tree's bytes changed"),
+            Self::CorruptTree => write!(f, "the tree's bytes changed since they were validated"),
             Self::LinkLost { silence } => write!(f, "no good packet came for {silence}"),
             Self::HeartbeatLost { silence } => write!(f, "no heartbeat came for {silence}"),
             Self::Rejections { streak } => {

@@ -32,6 +32,8 @@ uint32_t telemetry_cause(dibs_code cause) {
         return 11;
     case DIBS_CODE_CUT_SHORT:
         return 12;
+    case DIBS_CODE_UNACKNOWLEDGED:
+        return 13;
     case DIBS_CODE_NOT_FINITE:
         return 8;
     default:

@@ -141,7 +141,11 @@ fn the_state_is_safe_until_acknowledged_and_after_the_age() {
         }
         let answer = world.tick(at);
         assert_eq!(answer.trust.state, State::Safe, "nobody acknowledged");
-        assert!(matches!(answer.force(&wall).state, ConstraintState::Safe(_)));
+        let waits = answer.trust.waits_for_acknowledgement;
+        let cause = if waits { Unavailable::Unacknowledged } else { Unavailable::NoSurface };
+        assert_eq!(waits, tick >= 1_000, "a second of good ticks");
+        assert_eq!(answer.closest, Err(cause));
+        assert_eq!(answer.force(&wall).state, ConstraintState::Safe(cause));
     }
     world.ends.1.acknowledge().expect("it waits");
     let mut found = Vec::new();

@@ -281,7 +281,7 @@ static void in_use(void) {
     EXPECT(OK, is_seen ? DIBS_CODE_OK : DIBS_CODE_IN_USE);
 }
 
-/* No two codes share a text. */
+/* No two codes share a text. Each is printed after its number. */
 static void texts(void) {
     const char *unknown = dibs_code_text(99999);
     unsigned codes = 0;
@@ -290,6 +290,7 @@ static void texts(void) {
             continue;
         }
         codes++;
+        printf("%u %s\n", a, dibs_code_text(a));
         for (uint32_t b = 0; b < a; b++) {
             EXPECT(OK, strcmp(dibs_code_text(a), dibs_code_text(b)) == 0 ? DIBS_CODE_ARGUMENT : DIBS_CODE_OK);
         }

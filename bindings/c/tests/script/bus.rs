@@ -187,6 +187,7 @@ fn code(error: &ReceiveError) -> u32 {
 fn cause_code(cause: &Unavailable) -> u32 {
     match cause {
         Unavailable::NoSurface => 300,
+        Unavailable::Unacknowledged => 318,
         Unavailable::Stale { .. } => 301,
         Unavailable::LinkLost { .. } => 302,
         Unavailable::Rejections { .. } => 304,

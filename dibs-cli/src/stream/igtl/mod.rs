@@ -8,7 +8,6 @@ mod delay;
 mod exchange;
 mod matching;
 mod message;
-mod part;
 mod peer;
 mod pose;
 #[cfg(test)]
@@ -18,7 +17,8 @@ mod topology;
 pub use exchange::{Exchange, Report};
 pub use peer::Address;
 
-use super::live::{Age, Parsed};
+use super::live::Parsed;
+use super::part::Part;
 use super::place::Place;
 use anyhow::Result;
 use content::{Content, Kind};
@@ -27,7 +27,6 @@ use dibs_build::glam::Vec3;
 use dibs_nostd::RigidPose;
 use exchange::Cause;
 use message::{BodyError, Header};
-use part::Part;
 use peer::{Door, Ended, Peer};
 use pose::PoseError;
 use std::sync::Arc;
@@ -43,7 +42,7 @@ pub struct Igtl {
     device: Option<String>,
     /// If given, the device whose pose every frame gets.
     pose_device: Option<String>,
-    /// The last pose, and the last positions of frames that have one.
+    /// The last pose and positions.
     pose: Option<Part<RigidPose>>,
     positions: Option<Part<Vec<Vec3>>>,
     place: Place,
@@ -106,7 +105,7 @@ impl Igtl {
             let mut peer = match self.peer.take() {
                 Some(peer) => peer,
                 None => {
-                    let peer = self.door.next(self.heard)?;
+                    let peer = self.door.next(self.heard, self.number > 0)?;
                     self.exchange.connected();
                     self.delay = Delay::new();
                     self.topology.forget();
@@ -283,14 +282,14 @@ impl Igtl {
         let part = Part { value: positions.clone(), time: header.time, came, delay };
         let age = Part::replace(&mut self.positions, part).age(came);
         let Some(device) = &self.pose_device else {
-            return Ok(Parsed { positions, pose: None, came, age: Age::Stated(age) });
+            return Ok(Parsed { positions, pose: None, came, age });
         };
         let Some(pose) = &self.pose else {
             let why = format!("no pose of device \"{device}\" has come before it");
             return Err((Cause::Pose, why));
         };
         // A frame is as old as its older part.
-        let age = Age::Stated(age.max(pose.age(came)));
+        let age = age.max(pose.age(came));
         Ok(Parsed { positions, pose: Some(pose.value), came, age })
     }
 }

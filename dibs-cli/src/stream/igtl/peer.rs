@@ -101,7 +101,8 @@ impl Door {
     }
 
     /// The next connection: to a server within the user's time limit from `since` on; from a client at any time.
-    pub fn next(&mut self, since: Instant) -> Result<Peer> {
+    /// `has_ended` is for the error: whether the server sent frames before.
+    pub fn next(&mut self, since: Instant, has_ended: bool) -> Result<Peer> {
         loop {
             let made = match self {
                 Self::Listen(listener, waiting) => match waiting.take() {
@@ -115,9 +116,12 @@ impl Door {
                 (Err(error), Self::Server { address, patience, .. })
                     if since.elapsed() >= *patience =>
                 {
+                    let within = format!("within {} s ({error})", patience.as_secs());
+                    if has_ended {
+                        bail!("{address}: ended, and cannot be reached again {within}");
+                    }
                     bail!(
-                        "{address}: cannot be reached within {} s ({error}); is the program that sends frames running?",
-                        patience.as_secs()
+                        "{address}: cannot be reached {within}; is the program that sends frames running?"
                     );
                 }
                 _ => thread::sleep(GLANCE),

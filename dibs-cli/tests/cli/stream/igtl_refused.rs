@@ -174,6 +174,29 @@ fn a_receiver_that_falls_silent_is_reported() {
     assert!(ready.is_some_and(|ready| silent.is_some_and(|silent| ready < silent)), "{said:?}");
 }
 
+/// All frames of a server that ends arrive. Then the bridge tries to connect again, and fails with one sentence.
+#[test]
+fn a_server_that_ends_for_good_ends_the_bridge() {
+    let folder = heart();
+    let folder = folder.path();
+    let (frames, _) = organ(folder);
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let line = format!("--from igtl:{} --motion-rate 200 --retry 1", server.local_addr().unwrap());
+    let (seen, output, _) = bridged_to(folder, &line, Duration::MAX, move || {
+        let mut peer = accepted(&server);
+        for frame in &frames[..3] {
+            peer.write_all(&message(1, "NDARRAY", "", &array(frame))).unwrap();
+        }
+    });
+    let error = String::from_utf8(output.stderr).unwrap();
+    let is_told = error.contains("ended, and cannot be reached again within 1 s");
+    assert!(output.status.code() == Some(1) && is_told, "{error}");
+    assert_eq!(error.lines().filter(|line| line.starts_with("error: ")).count(), 1, "{error}");
+    assert_eq!(seen.published, 3);
+    let totals: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(totals["frames"], 3);
+}
+
 #[test]
 fn what_no_source_is_is_one_sentence() {
     let folder = heart();

@@ -47,6 +47,24 @@ fn answer(folder: &Path, line: &str, input: &[u8]) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
 }
 
+/// The age in ms that each frame's begin states, until the program ends.
+fn ages(child: &mut Child, socket: &UdpSocket) -> Vec<u16> {
+    socket.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
+    let (mut ages, mut buffer) = (Vec::new(), [0; 2048]);
+    loop {
+        let has_ended = child.try_wait().unwrap().is_some();
+        let Ok(bytes) = socket.recv(&mut buffer) else {
+            if has_ended {
+                return ages;
+            }
+            continue;
+        };
+        if let Body::Begin(begin) = Packet::decode(&buffer[..bytes]).unwrap().body {
+            ages.push(begin.freshness.age_ms);
+        }
+    }
+}
+
 /// With a rate every frame is sent, however fast they come; the line is kept alive while none comes.
 #[test]
 fn every_frame_of_a_pipe_arrives_at_a_rate() {
@@ -92,7 +110,6 @@ fn the_newest_frame_is_sent() {
     let folder = folder.path();
     let frames = motion(folder);
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-    socket.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
     let mut child = live(folder, &format!("--to udp:{}", socket.local_addr().unwrap()));
     let mut pipe = child.stdin.take().unwrap();
     let input = frames.concat();
@@ -101,19 +118,7 @@ fn the_newest_frame_is_sent() {
         thread::sleep(Duration::from_millis(400));
         pipe.write_all(&raw(&input[input.len() - N..])).unwrap();
     });
-    let (mut ages, mut buffer) = (Vec::new(), [0; 2048]);
-    loop {
-        let has_ended = child.try_wait().unwrap().is_some();
-        let Ok(bytes) = socket.recv(&mut buffer) else {
-            if has_ended {
-                break;
-            }
-            continue;
-        };
-        if let Body::Begin(begin) = Packet::decode(&buffer[..bytes]).unwrap().body {
-            ages.push(begin.freshness.age_ms);
-        }
-    }
+    let ages = ages(&mut child, &socket);
     writer.join().unwrap();
     let totals = totals(&child.wait_with_output().unwrap());
     let [sent, passed_over] = ["frames", "passed_over"].map(|name| totals[name].as_u64().unwrap());
@@ -122,6 +127,27 @@ fn the_newest_frame_is_sent() {
     assert!((2..=FRAMES as u64).contains(&sent), "{totals}");
     // The last frame repeats one that was read some time after it was written.
     assert!(ages[0] < 300 && ages.last().is_some_and(|age| *age >= 300), "{ages:?}");
+}
+
+/// With a rate a frame is as new as it is due, even if it repeats one that came long before it.
+#[test]
+fn a_frame_that_has_a_rate_does_not_age() {
+    let folder = heart();
+    let folder = folder.path();
+    let frame = raw(&motion(folder)[0]);
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let to = socket.local_addr().unwrap();
+    let mut child = live(folder, &format!("--to udp:{to} --motion-rate 200"));
+    let mut pipe = child.stdin.take().unwrap();
+    let writer = thread::spawn(move || {
+        pipe.write_all(&frame).unwrap();
+        thread::sleep(Duration::from_millis(400));
+        pipe.write_all(&frame).unwrap();
+    });
+    let ages = ages(&mut child, &socket);
+    writer.join().unwrap();
+    totals(&child.wait_with_output().unwrap());
+    assert_eq!(ages, [0, 0]);
 }
 
 #[test]

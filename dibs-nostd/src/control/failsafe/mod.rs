@@ -24,7 +24,7 @@
 //!
 //! | from | to | when |
 //! |---|---|---|
-//! | (start) | safe | always: no surface was published, or the start was not acknowledged |
+//! | (start) | safe | always |
 //! | nominal | degraded | an input is beyond its first limit |
 //! | nominal, degraded | safe | an input is beyond its second limit, the query failed, the tree's bytes changed, or there is no surface |
 //! | degraded | nominal | the run reaches [`Limits::recovery`]'s frames, and the calm is long enough |
@@ -32,9 +32,9 @@
 //!
 //! Safe never changes to degraded, and no fault recovers without new frames, so a surface that only looks fresh,
 //! because a clock wrapped, does not help. An acknowledgement is accepted only once the run is complete, and becomes
-//! void at the first step that is not clear, so nobody can acknowledge in advance. Recovery is manual by default, as in
-//! the da Vinci Research Kit. The calm bounds how often the state changes, even if an attacker moves an input across
-//! its limit.
+//! void at the first step that is not clear, so nobody can acknowledge in advance; while it is all that is missing, it
+//! is the cause, [`Unavailable::Unacknowledged`]. Recovery is manual by default, as in the da Vinci Research Kit. The
+//! calm bounds how often the state changes, even if an attacker moves an input across its limit.
 //!
 //! # Time
 //!
@@ -104,7 +104,8 @@ pub struct Verdict {
     /// The state after the step.
     pub state: State,
     /// Why the state is not nominal: the first input that requires it, in the order missing surface, answer, tree, age,
-    /// link. If no input requires it any more, the last cause remains.
+    /// link. If no input requires it any more, the last cause remains, until only an acknowledgement is missing:
+    /// [`Unavailable::Unacknowledged`].
     pub cause: Option<Unavailable>,
     /// Most that the tissue may have moved from the surface that was searched, in mm: its lag and transit, times the
     /// speed.
@@ -153,6 +154,7 @@ impl Verdict {
 pub struct FailSafe {
     limits: Limits,
     state: State,
+    /// The last cause that was an input's.
     cause: Option<Unavailable>,
     /// Epoch and clock of the last step's frame.
     frame: Option<(u32, Millis)>,
@@ -232,14 +234,19 @@ impl FailSafe {
         if self.state == State::Nominal {
             self.acknowledged = false;
         }
+        let waits_for_acknowledgement = self.state == State::Safe && has_recovered;
         Verdict {
             state: self.state,
-            cause: self.cause,
+            cause: if waits_for_acknowledgement {
+                Some(Unavailable::Unacknowledged)
+            } else {
+                self.cause
+            },
             margin: match seen.frame {
                 Some(frame) => self.margin(frame, seen.lag, &seen.link),
                 None => 0.0,
             },
-            waits_for_acknowledgement: self.state == State::Safe && has_recovered,
+            waits_for_acknowledgement,
         }
     }
 

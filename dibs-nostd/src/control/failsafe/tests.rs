@@ -189,9 +189,12 @@ fn recovery_takes_its_frames_in_a_row_and_from_safe_an_acknowledgement() {
                 }
                 assert_eq!(verdict.state, State::Safe);
                 assert!(verdict.waits_for_acknowledgement);
+                assert_eq!(verdict.cause, Some(Unavailable::Unacknowledged));
                 machine.acknowledge().unwrap();
-                // A fault before the next step voids the acknowledgement.
-                assert_eq!(machine.step(&broken).state, State::Safe);
+                // A fault before the next step voids the acknowledgement, which is no longer all that is missing.
+                let verdict = machine.step(&broken);
+                assert_eq!(verdict.state, State::Safe);
+                assert_eq!(verdict.cause, Some(Unavailable::Stale { age: Millis(201) }));
                 for epoch in 0..u32::from(frames) {
                     now += 1;
                     assert_eq!(machine.step(&seen(now, 400 + epoch, 0)).state, State::Safe);

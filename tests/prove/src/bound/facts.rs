@@ -105,14 +105,14 @@ pub(super) const WITHOUT_EDGE: Never = ("", "edge::edge_to_segment", "wrong");
 /// Functions that a program must only call from these callers, because the facts about them are about those calls.
 pub const ONLY_FROM: &[(&str, &str)] = &[("mem::memcpy", "__aeabi_memcpy4")];
 
-pub(super) const NODE: &str = "dibs-nostd/src/query/search/node.rs";
+const NODE: &str = "dibs-nostd/src/query/search/node.rs";
 const LEAF: &str = "dibs-nostd/src/query/search/leaf.rs";
 const ROOTS: &str = "dibs-nostd/src/query/search/roots.rs";
 const PLANE: &str = "dibs-nostd/src/query/plane.rs";
 const SURFACE: &str = "dibs-nostd/src/modes/surface.rs";
 pub(super) const SEARCH: &str = "dibs-nostd/src/query/search.rs";
 
-const CHILD: Count = Count::Passes(&[Function("run"), Line(NODE, "if squared > far * far {")]);
+pub(super) const CHILD: Count = Count::Passes(&[Line(NODE, "if squared > far * far {")]);
 pub(super) const LEAF_PLANE: Count =
     Count::Calls(&[Function("run"), Function("expand")], "Plane::beyond");
 pub(super) const VISIT: Count = Count::Calls(&[Function("run"), Function("leaf")], "Plane::beyond");
@@ -126,7 +126,7 @@ pub(super) const WARM: Count =
     Count::Calls(&[Function("start"), Function("test_triangle")], "closest_to_");
 const POP: Count =
     Count::Heads(&[Line(SEARCH, "while let Some(Waiting { lower, link }) = self.pop() {")]);
-const PUSH: Count = Count::Passes(&[
+pub(super) const PUSH: Count = Count::Passes(&[
     Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
     Line(NODE, "*self.stack.get_mut(at)? = subtree;"),
 ]);
@@ -138,8 +138,21 @@ const OTHERS: Count = Count::Calls(&[], "Roots::with_others");
 const FOR_EACH_ROOT: Most = Most { base: 0, roots: 1, nodes: 0, triangles: 0 };
 const BLEND: &[Within] = &[Line(SURFACE, "for (&gain, mode) in self.gains")];
 const SCAN: &[Within] = &[Line(PLANE, "for (before, [_, _, corner]) in (1..).zip(triangles)")];
-const EXPANSION: Count =
-    Count::Entries(&[Function("run"), Line(NODE, "let position = self.position(node.pin)?;")]);
+const EXPANSION: Count = Count::Entries(&[Line(NODE, "let position = self.position(node.pin)?;")]);
+
+pub(super) const EIGHT_CHILDREN: Fact = Fact {
+    name: "eight children",
+    terms: &[(1, CHILD), (-8, EXPANSION)],
+    most: Most::base(0),
+    because: "a link has three bits for the number of children, less one",
+};
+
+pub(super) const MOVES_FOR_EACH_ENTRY: Fact = Fact {
+    name: "moves for each entry",
+    terms: &[(2, SHIFT), (-7, PUSH)],
+    most: Most::base(0),
+    because: "a node's entries are sorted among themselves: k of them take at most k (k - 1) / 2 moves, and k is at most 8",
+};
 
 const ROWS: &[Fact] = &[
     Fact {
@@ -154,18 +167,8 @@ const ROWS: &[Fact] = &[
         most: Most { base: 0, roots: 0, nodes: 0, triangles: 1 },
         because: "the meter counts each exact test before its call, the warm one too",
     },
-    Fact {
-        name: "eight children",
-        terms: &[(1, CHILD), (-8, EXPANSION)],
-        most: Most::base(0),
-        because: "a link has three bits for the number of children, less one",
-    },
-    Fact {
-        name: "moves for each entry",
-        terms: &[(2, SHIFT), (-7, PUSH)],
-        most: Most::base(0),
-        because: "a node's entries are sorted among themselves: k of them take at most k (k - 1) / 2 moves, and k is at most 8",
-    },
+    EIGHT_CHILDREN,
+    MOVES_FOR_EACH_ENTRY,
     Fact {
         name: "waiting entries",
         terms: &[(1, Count::Heads(&[Function("least_waiting")])), (1, POP), (-1, PUSH)],
@@ -211,7 +214,7 @@ const ROWS: &[Fact] = &[
     },
 ];
 
-/// Copies, whatever is asked.
+/// Of copies: the same for every kind of query.
 pub(super) const COPIES: &[Fact] = &[
     Fact {
         name: "copied words",

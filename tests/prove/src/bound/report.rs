@@ -196,7 +196,7 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
     writeln!(
         text,
         "\nA traced query is followed instruction by instruction: each must be where the graph leads, and each fact is \
-         compared with the numbers of executions; triangle tests are as many as the answer says, and node tests as many or one fewer (with side, at most as many). \
+         compared with the numbers of executions; triangle tests are as many as the answer says, and node tests as many or one fewer. \
          {} Planted were {} errors, in capsules without and with side a wrong fact and a path that the graph does not \
          have; not found: {}.\n\n## Flow facts\n\nThe price of a fact is what one more of its right side adds to the bound, in \
          instructions, in the order of the queries above.\n",

@@ -1,11 +1,11 @@
-//! The flow facts of a query with side, of a table of vertices and a tree of one root: those of the search, and of the
-//! side of a point.
+//! The flow facts of a query with side, on a table of vertices and a tree of one root: for the searches, and for the side
+//! of a point.
 
 // Requirement: A-06
 
 use super::facts::{
-    COPIES, Count, Fact, Facts, LEAF_PLANE, Most, NODE, Never, SEARCH, TEST, TRIANGLE, TURN, VISIT,
-    WARM, WITHOUT_EDGE,
+    CHILD, COPIES, Count, EIGHT_CHILDREN, Fact, Facts, LEAF_PLANE, MOVES_FOR_EACH_ENTRY, Most,
+    Never, PUSH, SEARCH, TEST, TRIANGLE, TURN, VISIT, WARM, WITHOUT_EDGE,
 };
 use super::lines::Within::{self, Function, Line, Of};
 
@@ -13,18 +13,20 @@ use super::lines::Within::{self, Function, Line, Of};
 pub const RING: u32 = 16;
 
 /// For a sphere, whose axis is a point: it has no depth.
-pub const SIDED_SPHERE: Facts =
-    Facts { groups: &[SEARCHES, SIDE_OF_POINT, COPIES], never: &[ONE_SOLID, ONE_ROOT, CLOSED] };
+pub const SIDED_SPHERE: Facts = Facts {
+    groups: &[SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
+    never: &[ONE_SOLID, ONE_ROOT, CLOSED],
+};
 
 /// For a capsule whose axis is outside: no depth is searched.
 pub const SIDED_CAPSULE: Facts = Facts {
-    groups: &[SEARCHES, SIDE_OF_POINT, COPIES],
+    groups: &[SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
     never: &[ONE_SOLID, ONE_ROOT, CLOSED, NO_DEPTH, NO_MEMORY, NO_TOUCHES],
 };
 
 /// The same with a wrong fact, which a trace must refute.
 pub const SIDED_WITHOUT_EDGES: Facts = Facts {
-    groups: &[SEARCHES, SIDE_OF_POINT, COPIES],
+    groups: &[SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
     never: &[ONE_SOLID, ONE_ROOT, CLOSED, NO_DEPTH, NO_MEMORY, NO_TOUCHES, WITHOUT_EDGE],
 };
 
@@ -53,16 +55,6 @@ const SIDE: &str = "dibs-nostd/src/query/side.rs";
 const EXACT: &str = "dibs-nostd/src/query/exact.rs";
 const NORMAL: &str = "dibs-nostd/src/query/normal.rs";
 
-const CHILD: Count = Count::Passes(&[Line(NODE, "if squared > far * far {")]);
-const EXPANSION: Count = Count::Entries(&[Line(NODE, "let position = self.position(node.pin)?;")]);
-const PUSH: Count = Count::Passes(&[
-    Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
-    Line(NODE, "*self.stack.get_mut(at)? = subtree;"),
-]);
-const SHIFT: Count = Count::Passes(&[
-    Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
-    Line(NODE, "*self.stack.get_mut(at)? = below;"),
-]);
 const POPS: &str = "while let Some(Waiting { lower, link }) = self.pop() {";
 const SEARCH_POPS: &[Within] = &[Line(SEARCH, POPS)];
 const TIE_POPS: &[Within] = &[Line(TIES, POPS)];
@@ -71,21 +63,18 @@ const TIE_TEST: Count = Count::Calls(&[Function("each_tie")], "closest_to_");
 const TIE_TURNS: &[Within] = &[Line(TIES, "if self.meter.triangle().is_none() {")];
 const FIRST_PUSH: &[Within] = &[Line(SEARCH, "search.push(0, subtree)"), Function("push")];
 
-const ROUGH: &[Within] = &[Line(SIDE, "let above = rough.of(rows)?;")];
-const FINE: &[Within] = &[Line(SIDE, "let above = fine.of(again)?;")];
 const ACROSS: &[Within] = &[Function("across")];
 const EDGE: Within = Line(EXACT, "for (edge, along, from, to) in [(0, ab, a, b)");
-const EDGES_F32: &[Within] = &[Of("closest", "f32>"), EDGE];
-const EDGES_F64: &[Within] = &[Of("closest", "f64>"), EDGE];
 const AROUND: &[Within] =
     &[Line(EXACT, "let (next, back) = self.tree.across(at, corner).ok_or(NoSide::OpenBoundary)?;")];
 const RING_LINE: Within =
     Line(EXACT, "let Some((next, back)) = self.tree.across(row, corner) else {");
-const TURN_F32: &[Within] = &[Of("add", "f32>"), RING_LINE];
-const TURN_F64: &[Within] = &[Of("add", "f64>"), RING_LINE];
 const TURNED: Within = Line(EXACT, "let cosine = -P::dot(to_centre, edge);");
 const TURNED_F32: Count = Count::Passes(&[Of("add", "f32>"), TURNED]);
 const TURNED_F64: Count = Count::Passes(&[Of("add", "f64>"), TURNED]);
+const OTHER: Within = Line(EXACT, "Ok(seen.above_edge(&self.see(other)?))");
+const ACROSS_F32: Count = Count::Passes(&[Of("add", "f32>"), OTHER]);
+const ACROSS_F64: Count = Count::Passes(&[Of("add", "f64>"), OTHER]);
 const ADDED_F32: Count = Count::Calls(&[Of("add", "f32>")], "::closest");
 const ADDED_F64: Count = Count::Calls(&[Of("add", "f64>")], "::closest");
 const NORMALS: &[Within] = &[Line(NORMAL, "let [centre, from, to] = turned(at(row)?, corner);")];
@@ -106,10 +95,12 @@ pub(super) const SEARCHES: &[Fact] = &[
             (96, ADDED_F64),
             (3, TURNED_F32),
             (48, TURNED_F64),
+            (3, ACROSS_F32),
+            (48, ACROSS_F64),
         ],
         most: Most { base: 0, roots: 0, nodes: 1, triangles: 0 },
         because: "counted by the meter as in a plain query; the side's work is counted before it is done, as 4 for a triangle and 3 \
-                  for one around a vertex, in f64 96 and 48",
+                  for one across an edge or around a vertex, in f64 96 and 48",
     },
     Fact {
         name: "triangle tests",
@@ -117,18 +108,8 @@ pub(super) const SEARCHES: &[Fact] = &[
         most: Most { base: 0, roots: 0, nodes: 0, triangles: 1 },
         because: "the meter counts each exact test before its call, the warm ones and those of ties too",
     },
-    Fact {
-        name: "eight children",
-        terms: &[(1, CHILD), (-8, EXPANSION)],
-        most: Most::base(0),
-        because: "a link has three bits for the number of children, less one",
-    },
-    Fact {
-        name: "moves for each entry",
-        terms: &[(2, SHIFT), (-7, PUSH)],
-        most: Most::base(0),
-        because: "a node's entries are sorted among themselves: k of them take at most k (k - 1) / 2 moves, and k is at most 8",
-    },
+    EIGHT_CHILDREN,
+    MOVES_FOR_EACH_ENTRY,
     Fact {
         name: "waiting entries",
         terms: &[
@@ -184,52 +165,16 @@ pub(super) const SIDE_OF_POINT: &[Fact] = &[
         because: "at most four triangles of a tree of 16-bit indices share the low bits of their row; one turn where they end",
     },
     Fact {
-        name: "edges of a triangle",
-        terms: &[(1, Count::Heads(EDGES_F32)), (-4, Count::Entries(EDGES_F32))],
-        most: Most::base(0),
-        because: "a triangle has three; one turn where they end",
-    },
-    Fact {
-        name: "edges of a triangle, in f64",
-        terms: &[(1, Count::Heads(EDGES_F64)), (-4, Count::Entries(EDGES_F64))],
-        most: Most::base(0),
-        because: "the same",
-    },
-    Fact {
         name: "planes of ties",
         terms: &[(1, Count::Heads(PLANES)), (-33, Count::Entries(PLANES))],
         most: Most::base(0),
         because: "a list has at most 32 ties; one turn where they end",
     },
     Fact {
-        name: "deciding ties",
-        terms: &[(1, Count::Heads(ROUGH)), (-33, Count::Entries(ROUGH))],
-        most: Most::base(0),
-        because: "a list has at most 32 ties, each passed over or added; one turn where they end",
-    },
-    Fact {
-        name: "deciding ties, in f64",
-        terms: &[(1, Count::Heads(FINE)), (-33, Count::Entries(FINE))],
-        most: Most::base(0),
-        because: "the same",
-    },
-    Fact {
         name: "the first around a vertex",
         terms: &[(1, Count::Heads(AROUND)), (-(RING as i64), Count::Entries(AROUND))],
         most: Most::base(0),
         because: "one turn for each triangle around the vertex",
-    },
-    Fact {
-        name: "edges around a vertex",
-        terms: &[(1, Count::Heads(TURN_F32)), (-(RING as i64), Count::Entries(TURN_F32))],
-        most: Most::base(0),
-        because: "one turn for each triangle around the vertex",
-    },
-    Fact {
-        name: "edges around a vertex, in f64",
-        terms: &[(1, Count::Heads(TURN_F64)), (-(RING as i64), Count::Entries(TURN_F64))],
-        most: Most::base(0),
-        because: "the same",
     },
     Fact {
         name: "normals around a vertex",
@@ -244,8 +189,8 @@ pub(super) const SIDE_OF_POINT: &[Fact] = &[
             (-1, TURNED_F32),
             (-1, TURNED_F64),
             (-(RING as i64), Count::Calls(&[Function("outward")], "pseudonormal")),
-            (-(RING as i64), Count::Entries(ROUGH)),
-            (-(RING as i64), Count::Entries(FINE)),
+            (-(RING as i64), Count::Entries(&[Line(SIDE, ROUGH)])),
+            (-(RING as i64), Count::Entries(&[Line(SIDE, FINE)])),
             (-(RING as i64), Count::Entries(TIE_POPS)),
         ],
         most: Most::base(0),
@@ -259,3 +204,44 @@ pub(super) const SIDE_OF_POINT: &[Fact] = &[
         because: "no triangle has a corner of a sine below 1 in 1,024, or an area whose square leaves f32",
     },
 ];
+
+const ROUGH: &str = "let above = rough.of(rows)?;";
+const FINE: &str = "let above = fine.of(again)?;";
+
+/// Of the exact comparison in a precision: the end of its functions' names, of its facts' names, and the line that starts it.
+macro_rules! exact {
+    ($of:literal, $in:literal, $start:ident) => {
+        &[
+            Fact {
+                name: concat!("edges of a triangle", $in),
+                terms: &[
+                    (1, Count::Heads(&[Of("closest", $of), EDGE])),
+                    (-4, Count::Entries(&[Of("closest", $of), EDGE])),
+                ],
+                most: Most::base(0),
+                because: "a triangle has three; one turn where they end",
+            },
+            Fact {
+                name: concat!("deciding ties", $in),
+                terms: &[
+                    (1, Count::Heads(&[Line(SIDE, $start)])),
+                    (-33, Count::Entries(&[Line(SIDE, $start)])),
+                ],
+                most: Most::base(0),
+                because: "a list has at most 32 ties, each passed over or added; one turn where they end",
+            },
+            Fact {
+                name: concat!("edges around a vertex", $in),
+                terms: &[
+                    (1, Count::Heads(&[Of("add", $of), RING_LINE])),
+                    (-(RING as i64), Count::Entries(&[Of("add", $of), RING_LINE])),
+                ],
+                most: Most::base(0),
+                because: "one turn for each triangle around the vertex",
+            },
+        ]
+    };
+}
+
+const IN_F32: &[Fact] = exact!("f32>", "", ROUGH);
+const IN_F64: &[Fact] = exact!("f64>", ", in f64", FINE);

@@ -145,7 +145,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// What was measured of a small budget, and what did not narrow its interval.
+/// How the small budgets were chosen, and what did not narrow their intervals.
 const SMALL: &str = "The budget is the largest whose dearest tick was measured within the instructions; the median tick that uses it up \
      takes {bounded.40k.spent}, because tests differ in cost. Four designs did not narrow the interval: an unfinished \
      search among the leaves as its lower end, a certain depth of the last deepest point from its leaves, half of the \

@@ -1,6 +1,7 @@
 //! `cargo xtask demo`: a beating heart streamed to the controller, while a simulated hand pushes the instrument against it.
 
 mod bridge;
+pub mod bridged;
 mod bus;
 pub mod check;
 mod contacts;

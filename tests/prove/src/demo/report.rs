@@ -15,6 +15,7 @@ use serde::Serialize;
 use serde_json::Value;
 use xtask::qemu;
 
+use super::bridged::Bridged;
 use super::check;
 use super::faults::{Faults, Silence};
 use super::forces::Forces;
@@ -258,27 +259,8 @@ impl Report {
             promise(self.silence.is_some(), "the silent line did not make it safe".to_owned());
             promise(recovered.is_some(), "it did not recover from the silence".to_owned());
         } else if let Some(bridge) = &self.bridge {
-            // The program keeps this computer's time, the emulated board a slower one. So frames bunch up, and one that
-            // begins while the last is checked is refused; and by the board's time the program states too great ages,
-            // so that one may seem to be of an earlier capture than the published one.
-            let of = |event: Event| self.bus_events.get(event.name()).copied().unwrap_or(0);
-            let causes = [Event::Abandoned, Event::Busy, Event::Stale, Event::TooFast];
-            let refused: u32 = causes.into_iter().map(of).sum();
-            promise(
-                published + refused + 1 >= sent,
-                format!("of {sent} frames {published} were published and {refused} refused"),
-            );
-            let packets = bridge["packets"].as_u64().unwrap_or(0) as f64;
-            let each = packets / bridge["frames"].as_f64().unwrap_or(0.0);
-            let (left, expected) = (of(Event::Unexpected), f64::from(refused) * each);
-            promise(
-                f64::from(left) <= expected,
-                format!("{left} packets of no frame, of refused ones at most {expected:.0}"),
-            );
-            let heard = [Event::Heartbeat, Event::Published, Event::Duplicate, Event::Throttled];
-            let all: u32 = self.bus_events.values().sum();
-            let known = refused + left + heard.into_iter().map(of).sum::<u32>();
-            promise(known == all, format!("{} rejections of another cause", all - known));
+            let bridged = Bridged { sent, events: &self.bus_events, totals: bridge };
+            bridged.broken().into_iter().for_each(|sentence| promise(false, sentence));
         } else {
             promise(rejected == 0, format!("{rejected} packets or frames were rejected"));
             // The last frame may have been in flight when the run ended.

@@ -3,6 +3,7 @@
 mod accuracy;
 mod boards;
 mod bound;
+mod bridged;
 mod path;
 mod processors;
 mod proofs;

@@ -123,6 +123,6 @@ pub const ANOMALIES: &[Anomaly] = &[
         "A source of OpenIGTLink that repeats an image under new times is taken for fresh: its times must be those of \
          the measurement.",
         "Let the source send the time of its measurement, or none.",
-        "dibs-cli/src/stream/igtl/part.rs",
+        "dibs-cli/src/stream/part.rs",
     ),
 ];

@@ -1,5 +1,6 @@
 //! The rows of the table of bounded ticks: a scene and the most instructions of a tick each. A tracker's budget is in
-//! tests; the largest one whose ticks all stay within a row's instructions is measured on the board.
+//! tests, and is measured on the board: a large one whose ticks all stay within a row's instructions. Halving finds it, to a
+//! 128th of the range that it starts with, and supposes that the dearest tick takes more if the budget grows.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -102,8 +103,7 @@ impl Row {
         Ok(())
     }
 
-    /// The most tests with which every tick stays within the instructions, by halving; none if the mesh is not on this
-    /// machine.
+    /// Tests with which every tick stays within the instructions, by halving; none if the mesh is not on this machine.
     fn fitting(&self) -> Result<Option<u32>> {
         let Some(scene) = self.scene()? else { return Ok(None) };
         let (mut fits, mut over) = (0_u32, self.most / CHEAPEST);

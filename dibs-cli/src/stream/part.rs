@@ -1,22 +1,22 @@
-//! The parts of a frame, positions and pose, each with the time of its measurement.
+//! The age of a frame's positions and of its pose.
 
 use std::time::{Duration, Instant};
 
-/// A part as a message brought it.
+/// Positions or a pose as a source sent them.
 pub struct Part<T> {
     pub value: T,
-    /// The time in the message's header; 0 where it has none.
+    /// The time that the source states of the measurement; 0 where it states none.
     pub time: f64,
     pub came: Instant,
-    /// How late the message was.
+    /// Its age when it came.
     pub delay: Duration,
 }
 
 impl<T: PartialEq> Part<T> {
-    /// Takes the next message's part in the place of the last one's, and returns it. A part that repeats the last one stays
-    /// as old as that, unless its header has a time of its own: so an image that is sent again under the same time grows
-    /// old, also beside a pose that moves, and an organ at rest that is measured anew does not. A source must state there when
-    /// it measured: one that states when it sends hides that it is frozen.
+    /// Takes the next part in the place of the last one, and returns it. A part that repeats the last one is as old as that,
+    /// unless it has a time of its own: so an image that is sent again under the same time grows old, also beside a pose that
+    /// moves, and an organ at rest that is measured anew does not. A source must state there when it measured: one that
+    /// states when it sends hides that it is frozen.
     pub fn replace(last: &mut Option<Self>, next: Self) -> &Self {
         let repeats = |last: &Self| {
             last.value == next.value
