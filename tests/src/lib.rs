@@ -4,6 +4,7 @@ pub mod ask;
 #[cfg(feature = "builder")]
 pub mod baselines;
 pub mod bus;
+pub mod climb;
 #[cfg(feature = "builder")]
 pub mod deform;
 #[cfg(feature = "builder")]

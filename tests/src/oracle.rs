@@ -182,18 +182,20 @@ fn is_beyond(least: f64, first: f64, [a, b, c]: [DVec3; 3]) -> bool {
 ///
 /// Equivalent to an exhaustive search: triangles are only skipped as in [`least_distance`].
 ///
+/// Positions are in f32 or f64.
+///
 /// # Panics
 /// If a triangle names a vertex that does not exist.
-pub fn exhaustive(
-    positions: &[Vec3],
+pub fn exhaustive<P: Copy + Into<DVec3>>(
+    positions: &[P],
     triangles: &[[u32; 3]],
     tool: &Instrument,
 ) -> Option<OraclePair> {
     let (start, end) = (tool.start.as_dvec3(), tool.end.as_dvec3());
-    let corners = |triangle: &[u32; 3]| triangle.map(|v| positions[v as usize].as_dvec3());
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| positions[v as usize].into());
     let first: Vec<f64> = triangles
         .iter()
-        .map(|t| point_distance(start, end, positions[t[0] as usize].as_dvec3()))
+        .map(|t| point_distance(start, end, positions[t[0] as usize].into()))
         .collect();
     let mut nearest = first.iter().copied().fold(f64::INFINITY, f64::min);
     let mut best: Option<OraclePair> = None;

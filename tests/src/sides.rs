@@ -8,9 +8,13 @@ use crate::oracle::{Instrument, OraclePair, closest_pair, exhaustive};
 ///
 /// The sum of the triangles' solid angles (van Oosterom & Strackee 1983; Jacobson et al. 2013).
 #[must_use]
-pub fn winding_number(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> f64 {
+pub fn winding_number<P: Copy + Into<DVec3>>(
+    positions: &[P],
+    triangles: &[[u32; 3]],
+    point: DVec3,
+) -> f64 {
     let solid_angle = |triangle: &[u32; 3]| {
-        let [a, b, c] = triangle.map(|v| positions[v as usize].as_dvec3() - point);
+        let [a, b, c] = triangle.map(|v| positions[v as usize].into() - point);
         let (la, lb, lc) = (a.length(), b.length(), c.length());
         let volume = a.dot(b.cross(c));
         2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb)
@@ -21,7 +25,11 @@ pub fn winding_number(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) 
 /// Whether a point is inside a closed surface; `None` if the winding number is neither 0 nor 1, because the surface
 /// intersects itself or the point lies on it.
 #[must_use]
-pub fn is_inside(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> Option<bool> {
+pub fn is_inside<P: Copy + Into<DVec3>>(
+    positions: &[P],
+    triangles: &[[u32; 3]],
+    point: DVec3,
+) -> Option<bool> {
     let winding = winding_number(positions, triangles, point);
     if winding.abs() < 0.1 {
         Some(false)
@@ -34,7 +42,11 @@ pub fn is_inside(positions: &[Vec3], triangles: &[[u32; 3]], point: DVec3) -> Op
 
 /// Depth of a point in a closed surface, negative outside; `None` if the winding number is ambiguous.
 #[must_use]
-pub fn depth(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> Option<f64> {
+pub fn depth<P: Copy + Into<DVec3>>(
+    positions: &[P],
+    triangles: &[[u32; 3]],
+    point: Vec3,
+) -> Option<f64> {
     let nearest = exhaustive(positions, triangles, &Instrument::sphere(point, 0.0))?;
     let inside = is_inside(positions, triangles, point.as_dvec3())?;
     Some(if inside { nearest.axis_distance } else { -nearest.axis_distance })
@@ -43,8 +55,12 @@ pub fn depth(positions: &[Vec3], triangles: &[[u32; 3]], point: Vec3) -> Option<
 /// The side of the nearest sheet: the sign of the angle-weighted pseudonormal at the closest point, over all triangles.
 /// It differs from [`is_inside`] only where the surface intersects itself.
 #[must_use]
-pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
-    let corners = |triangle: [u32; 3]| triangle.map(|v| positions[v as usize].as_dvec3());
+pub fn is_below<P: Copy + Into<DVec3>>(
+    positions: &[P],
+    triangles: &[[u32; 3]],
+    pair: &OraclePair,
+) -> bool {
+    let corners = |triangle: [u32; 3]| triangle.map(|v| positions[v as usize].into());
     let is_at = |p: DVec3| p.distance(pair.on_surface) < 1e-9;
     let row = triangles[pair.triangle];
     let vertex = (0..3).find(|&i| is_at(corners(row)[i])).map(|i| row[i]);
@@ -77,9 +93,13 @@ pub fn is_below(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -
 /// faces outwards and does not intersect itself, `k` is 0. The tested points lie next to the closest point, above and
 /// below each triangle that touches it, so close that no fold is between them.
 #[must_use]
-pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> bool {
+pub fn is_cut<P: Copy + Into<DVec3>>(
+    positions: &[P],
+    triangles: &[[u32; 3]],
+    pair: &OraclePair,
+) -> bool {
     let winds = |at: DVec3| winding_number(positions, triangles, at);
-    let corners = |triangle: &[u32; 3]| triangle.map(|v| positions[v as usize].as_dvec3());
+    let corners = |triangle: &[u32; 3]| triangle.map(|v| positions[v as usize].into());
     let proves = |triangle: &[u32; 3], (share, height): (f64, f64)| {
         let [a, b, c] = corners(triangle);
         let at = pair.on_surface.lerp((a + b + c) / 3.0, share);
@@ -103,8 +123,8 @@ pub fn is_cut(positions: &[Vec3], triangles: &[[u32; 3]], pair: &OraclePair) -> 
 /// Whether a surface is proven to intersect itself next to one of `points + 1` points of an axis, so that the depth
 /// jumps along the axis.
 #[must_use]
-pub fn is_cut_along(
-    positions: &[Vec3],
+pub fn is_cut_along<P: Copy + Into<DVec3>>(
+    positions: &[P],
     triangles: &[[u32; 3]],
     tool: &Instrument,
     points: u32,
@@ -124,8 +144,8 @@ fn along(a: DVec3, b: DVec3, point: DVec3) -> f64 {
 /// An interval that contains the signed separation of a tool whose axis crosses a closed surface or is inside, from the
 /// depths of `points + 1` points of the axis.
 #[must_use]
-pub fn deepest_separation(
-    positions: &[Vec3],
+pub fn deepest_separation<P: Copy + Into<DVec3>>(
+    positions: &[P],
     triangles: &[[u32; 3]],
     tool: &Instrument,
     points: u32,
@@ -148,8 +168,8 @@ pub fn deepest_separation(
 /// An interval that contains the signed separation of any tool from a closed surface. If the axis is within `accuracy`
 /// of the surface, the interval covers crossing and not crossing; where it intersects itself, both sides.
 #[must_use]
-pub fn signed_separation(
-    positions: &[Vec3],
+pub fn signed_separation<P: Copy + Into<DVec3>>(
+    positions: &[P],
     triangles: &[[u32; 3]],
     tool: &Instrument,
     pair: &OraclePair,

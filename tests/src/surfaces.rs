@@ -145,3 +145,22 @@ pub fn sheet(cells: u32, size: f32, height: impl Fn(f32, f32) -> f32) -> Mesh {
     }
     mesh
 }
+
+/// Meshes as parts of one, in this order.
+#[must_use]
+pub fn joined(parts: &[Mesh]) -> Mesh {
+    let mut all = Mesh::default();
+    for part in parts {
+        let first = all.positions.len() as u32;
+        all.positions.extend(&part.positions);
+        all.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| v + first)));
+    }
+    all
+}
+
+/// A mesh at another place.
+#[must_use]
+pub fn moved(part: &Mesh, by: Vec3) -> Mesh {
+    let positions = part.positions.iter().map(|&p| p + by).collect();
+    Mesh { positions, ..part.clone() }
+}

@@ -33,8 +33,8 @@ pub(crate) struct Embedding {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bound {
     pub tetrahedron: u32,
-    /// Fractions in units of 1 / [`WHOLE`], whose sum is 1. The first three fit the 16 bits of a
-    /// [stored](Embedding::stored) weight.
+    /// Fractions in units of 1 / [`WHOLE`], whose sum is 1. Each fits the 16 bits of a [stored](Embedding::stored)
+    /// weight.
     pub weights: [i32; 4],
 }
 
@@ -314,11 +314,9 @@ fn rounded(weights: [f64; 4], step: u32) -> [i32; 4] {
             std::cmp::Ordering::Greater => rounded[at] -= i32::from(rounded[at] != 0),
         }
     }
-    // A stored weight has 16 bits, so no stored weight may be the whole.
-    for at in 0..3 {
-        if rounded[at] == WHOLE as i32 {
-            (rounded[at], rounded[3]) = (WHOLE as i32 - 1, 1);
-        }
+    // A stored weight has 16 bits, so none may be the whole: the stretch check decides which three are stored.
+    if let Some(at) = rounded.iter().position(|&weight| weight == WHOLE as i32) {
+        (rounded[at], rounded[(at + 1) % 4]) = (WHOLE as i32 - 1, 1);
     }
     rounded.map(|weight| weight * step as i32)
 }

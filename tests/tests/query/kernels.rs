@@ -338,7 +338,7 @@ fn exhaustive_search_finds_the_closest_triangle() {
         assert_eq!(found.axis_distance, closest);
         assert_eq!(found.separation, closest - 0.5);
     }
-    assert!(exhaustive(&[], &[], &Instrument::sphere(Vec3::ZERO, 1.0)).is_none());
+    assert!(exhaustive::<Vec3>(&[], &[], &Instrument::sphere(Vec3::ZERO, 1.0)).is_none());
 }
 
 #[test]

@@ -12,7 +12,7 @@ use dibs_tests::ask::{closest, closest_wide};
 use dibs_tests::deform::{Deformation, unit};
 use dibs_tests::oracle::exhaustive;
 use dibs_tests::poses::pose;
-use dibs_tests::surfaces::{self, ball, sheet, slivers};
+use dibs_tests::surfaces::{self, ball, joined, moved, sheet, slivers};
 use dibs_tests::tree_bytes::reseal;
 use fastrand::Rng;
 use glam::Vec3;
@@ -22,21 +22,6 @@ fn crumb() -> Mesh {
     let positions = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|p| p * 2.0).to_vec();
     let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
     Mesh { positions, triangles, ..Mesh::default() }
-}
-
-fn joined(parts: &[Mesh]) -> Mesh {
-    let mut all = Mesh::default();
-    for part in parts {
-        let first = all.positions.len() as u32;
-        all.positions.extend(&part.positions);
-        all.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| v + first)));
-    }
-    all
-}
-
-fn moved(part: &Mesh, by: Vec3) -> Mesh {
-    let positions = part.positions.iter().map(|&p| p + by).collect();
-    Mesh { positions, ..part.clone() }
 }
 
 /// Each part deformed and moved independently.

@@ -1,10 +1,10 @@
-//! Surfaces that a volume's nodes move: coverage, stretch, answers and motion.
+//! Surfaces that a volume's nodes move: coverage, stretch and motion.
 //!
 //! One file, because all tests need the same trees.
 
 // Requirement: F-07
 
-use dibs_build::{Builder, BuiltTree, Mesh, Volume, generate};
+use dibs_build::{Builder, Mesh, Volume, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::{NodeMonitor, Nodes};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
@@ -14,49 +14,27 @@ use dibs_nostd::{
     Tracker, VertexTable,
 };
 use dibs_tests::bus::collect;
+use dibs_tests::climb::climb;
 use dibs_tests::embedded::{
-    NodeMotion, Section, exact, gradient, hull, largest_stretch, rows, sections, shrunk, stretch_of,
+    Carried, NodeMotion, Section, all, exact, gradient, largest_stretch, rest, rows, sections,
+    stretch_of,
 };
 use dibs_tests::oracle::{Instrument, exhaustive};
-use dibs_tests::poses::pose;
-use dibs_tests::{ask, sample, surfaces};
+use dibs_tests::{sample, surfaces};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
-/// A heart and a brain in lattices, in volumes that are not boxes, and in a volume with vertices outside.
-fn built(rng: &mut Rng) -> Vec<(Mesh, BuiltTree)> {
-    let heart = generate::heart(1_000).expect("a valid size").mesh;
-    let brain = generate::brain(2_000).expect("a valid size");
-    let mut trees = Vec::new();
-    for (mesh, stretch) in [(heart, 1.3), (brain, 1.6)] {
-        let hull = hull(&mesh, [9, 8, 7], rng);
-        let volumes = [
-            Volume::lattice(&mesh, [3, 4, 5]).expect("a lattice"),
-            shrunk(&hull, 0.9, 20.0),
-            hull,
-            Volume::lattice(&mesh, [1, 1, 1]).expect("a lattice"),
-        ];
-        for volume in volumes {
-            let built = Builder::new().stretch(stretch).nodes(&volume).build(&mesh);
-            trees.push((mesh.clone(), built.expect("the volume holds the surface")));
-        }
-    }
-    trees
-}
-
-/// Every vertex is within its spheres' radii times the measured stretch, in f64, whatever the motion. The radius is
-/// needed: if all elements are stretched to the limit along the line from a pin to a vertex, straight through a box, it
-/// is reached.
+/// Every vertex is within its spheres' radii times the measured stretch, in f64, and where queries read it up to the
+/// stated rounding, whatever the motion.
 #[test]
 fn coverage_holds_in_every_admitted_frame() {
     let mut rng = Rng::with_seed(1);
-    let mut closest = 0.0_f64;
-    for (_, built) in built(&mut rng) {
+    for Carried { built, .. } in all(&mut rng) {
         let tree = built.tree::<u16>().expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
         let sections = sections(&tree);
         for trial in 0..sample(60) {
-            let kind = NodeMotion::ALL[trial % 6];
+            let kind = NodeMotion::ALL[trial % NodeMotion::ALL.len()];
             let frame = kind.apply(&nodes, &mut rng);
             let sigma = f64::from(nodes.measure(frame.as_slice()).expect("weakened").sigma());
             let now: Vec<DVec3> =
@@ -67,29 +45,14 @@ fn coverage_holds_in_every_admitted_frame() {
                 let away = away.fold(0.0, f64::max);
                 assert!(away <= sigma * radius + 1e-9, "{kind:?}: {away} {sigma} {radius}");
             }
-        }
-        // Along the line from a pin to a vertex.
-        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
-        for _ in 0..sample(400) {
-            let Section { pin, radius, covered } = &sections[rng.usize(..sections.len())];
-            let at = |row| exact(&nodes, &rest, row);
-            let far = |row: &&u32| at(**row).distance(at(*pin));
-            let far = covered.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
-            let along = (at(*far.expect("not empty")) - at(*pin)).normalize_or_zero().as_vec3();
-            let strain = (tree.stretch() - 1.0) * 0.9999;
-            let frame: Vec<Vec3> =
-                rest.iter().map(|&at| at + along * along.dot(at - rest[0]) * strain).collect();
-            let measured = nodes.measure(frame.as_slice()).expect("within the limit");
-            let now = |row| exact(&nodes, &frame, row);
-            let away = covered.iter().map(|&row| now(row).distance(now(*pin))).fold(0.0, f64::max);
-            let most = f64::from(measured.sigma()) * radius;
-            assert!(away <= most + 1e-9, "{away} {most}");
-            if *radius > 1.0 {
-                closest = closest.max(away / most);
+            let surface = nodes.surface(frame.as_slice());
+            let stated = surface.position_error();
+            for (exact, position) in now.iter().zip(rows(&surface)) {
+                let away = exact.distance(position.as_dvec3());
+                assert!(away <= f64::from(stated) / 2.0, "{away} {stated}");
             }
         }
     }
-    assert!(closest > 0.999, "{closest}");
 }
 
 /// Climbs, over the shape of an element and its deformation, towards a stretch above the measured one: there is none.
@@ -125,11 +88,14 @@ fn no_admitted_element_is_stretched_further_than_measured() {
         };
         let excess = |frame: &[Vec3]| {
             let measured = nodes.measure(frame).ok()?;
-            Some((now(frame).0 / f64::from(measured.sigma()), now(frame)))
+            let (stretch, determinant) = now(frame);
+            let part = stretch / f64::from(measured.sigma());
+            assert!(part <= 1.0 && stretch <= f64::from(tree.stretch()), "{part} {stretch}");
+            assert!(determinant > 0.0, "{determinant}");
+            Some(part)
         };
-        let mut frame = corners.to_vec();
-        let mut best = excess(&frame).map_or(0.0, |(part, _)| part);
-        for step in 0..600 {
+        let mut step = 0;
+        let change = |frame: &Vec<Vec3>| {
             let mut next = frame.clone();
             if step % 3 == 0 {
                 let by = gradient(&mut rng, if step < 100 { 0.4 } else { 0.01 });
@@ -139,14 +105,10 @@ fn no_admitted_element_is_stretched_further_than_measured() {
                 let by = Vec3::from([(); 3].map(|()| rng.f32() - 0.5));
                 next[node] += by * scale * 10.0_f32.powf(-1.0 - 5.0 * rng.f32());
             }
-            if let Some((part, (stretch, determinant))) = excess(&next) {
-                assert!(part <= 1.0 && stretch <= f64::from(tree.stretch()), "{part} {stretch}");
-                assert!(determinant > 0.0, "{determinant}");
-                if part > best {
-                    (best, frame) = (part, next);
-                }
-            }
-        }
+            step += 1;
+            next
+        };
+        let (_, best) = climb(corners.to_vec(), 600, change, |frame| excess(frame));
         highest = highest.max(best);
         loosest = loosest.max(1.0 / best - 1.0);
     }
@@ -157,10 +119,10 @@ fn no_admitted_element_is_stretched_further_than_measured() {
 #[test]
 fn frames_beyond_the_limit_are_refused() {
     let mut rng = Rng::with_seed(3);
-    let (_, built) = &built(&mut rng)[2];
+    let built = &all(&mut rng)[2].built;
     let tree = built.tree::<u16>().expect("valid");
     let nodes = Nodes::of(&tree).expect("valid");
-    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let rest = rest(&nodes);
     let refusal = |change: &dyn Fn(Vec3) -> Vec3| {
         let frame: Vec<Vec3> = rest.iter().map(|&at| change(at)).collect();
         nodes.measure(frame.as_slice()).err()
@@ -188,58 +150,11 @@ fn frames_beyond_the_limit_are_refused() {
     }
 }
 
-/// Number of tools for each frame, each with the tree's limit and with the measured stretch.
-const TOOLS: usize = 8;
-
-/// Answers on embedded surfaces agree with exhaustive search, on vertices blended in f64, within the stated accuracy.
-/// `DIBS_EMBEDDED_QUERIES` sets the number of queries.
-#[test]
-fn answers_are_right() {
-    let mut rng = Rng::with_seed(4);
-    let trees = built(&mut rng);
-    let asked = std::env::var("DIBS_EMBEDDED_QUERIES").ok();
-    let asked = asked.map(|text| text.parse::<usize>().expect("a number of queries"));
-    let few = || trees.len() * TOOLS * 2 * sample(120);
-    let frames = asked.unwrap_or_else(few).div_ceil(trees.len() * TOOLS * 2);
-    let (mut queries, mut largest) = (0, 0.0_f64);
-    for (_, built) in &trees {
-        let tree = built.tree::<u16>().expect("valid");
-        let nodes = Nodes::of(&tree).expect("valid");
-        let triangles = surfaces::triangles(&tree);
-        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-        for trial in 0..frames {
-            let frame = NodeMotion::ALL[trial % 6].apply(&nodes, &mut rng);
-            let measured = nodes.measure(frame.as_slice()).expect("weakened");
-            let surface = nodes.surface(frame.as_slice());
-            let positions = rows(&surface);
-            let stated = surface.position_error();
-            for (row, position) in (0..).zip(&positions) {
-                let away = exact(&nodes, &frame, row).distance(position.as_dvec3());
-                assert!(away <= f64::from(stated) / 2.0, "{away} {stated}");
-            }
-            for _ in 0..TOOLS {
-                let tool = pose(&positions, &triangles, &mut rng);
-                let truth = exhaustive(&positions, &triangles, &tool).expect("has triangles");
-                for options in [Options::cold(), Options::cold().stretch(measured)] {
-                    let answer = ask::closest(&mut query, &surface, &tool, &options);
-                    let answer = answer.expect("sound");
-                    let error = (truth.separation - f64::from(answer.separation)).abs();
-                    let part = error / f64::from(answer.accuracy);
-                    assert!(part <= 1.0, "frame {trial}: {error} {}", answer.accuracy);
-                    largest = largest.max(part);
-                    queries += 1;
-                }
-            }
-        }
-    }
-    println!("{queries} queries, errors up to {largest:.3} of the accuracy");
-}
-
 /// The wide query, the side and a tracker give the same answers as on the same vertices in a table.
 #[test]
 fn every_query_takes_embedded_surfaces() {
     let mut rng = Rng::with_seed(5);
-    for (_, built) in built(&mut rng) {
+    for Carried { built, .. } in all(&mut rng) {
         let tree = built.tree::<u16>().expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
         let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
@@ -295,7 +210,7 @@ fn nodes_come_over_the_bus() {
     let gate = NodeMonitor::continuous(&nodes).limits(limits);
     let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 500.0);
     let mut tracker = Tracker::<u16, MAX_STACK, 96>::new(&tree).expect("deep enough");
-    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let rest = rest(&nodes);
     let (mut good, mut held) = (rest.clone(), rest.clone());
     let (mut published, mut refused, mut unknown, mut moving) = (0, [0; 4], 0, 0);
     for epoch in 1..sample(600) as u32 {
@@ -396,10 +311,10 @@ fn nodes_come_over_the_bus() {
 #[test]
 fn the_monitor_compares_frames_itself() {
     let mut rng = Rng::with_seed(7);
-    let (_, built) = &built(&mut rng)[0];
+    let built = &all(&mut rng)[0].built;
     let tree = built.tree::<u16>().expect("valid");
     let nodes = Nodes::of(&tree).expect("valid");
-    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let rest = rest(&nodes);
     let limits = SurfaceLimits::reach_mm(500.0).speed(0.1);
     let mut monitor = NodeMonitor::new(&nodes).limits(limits);
     let mut moved = rest.clone();

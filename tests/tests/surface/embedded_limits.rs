@@ -4,7 +4,7 @@
 
 use dibs_build::{Builder, BuiltTree, Mesh, Motion, MotionStretch, Volume, generate};
 use dibs_nostd::nodes::Nodes;
-use dibs_tests::embedded::{NodeMotion, climb, hull, sections, shrunk, stretch_of};
+use dibs_tests::embedded::{cover, hull, rest, sections, shrunk, stretch_of};
 use dibs_tests::sample;
 use fastrand::Rng;
 use glam::Vec3;
@@ -89,16 +89,12 @@ fn coverage_holds_with_limits_of_each() {
             let built = built(&mesh, volume, limits);
             let tree = built.tree::<u16>().expect("valid");
             let nodes = Nodes::of(&tree).expect("valid");
-            let rest: Vec<Vec3> =
-                (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
             let sections = sections(&tree);
-            for trial in 0..sample(80) {
+            for _ in 0..sample(80) {
                 let section = &sections[rng.usize(..sections.len())];
-                let from = match trial % 2 {
-                    0 => rest.clone(),
-                    _ => NodeMotion::ALL[trial / 2 % 6].apply(&nodes, &mut rng),
-                };
-                *highest = highest.max(climb(&nodes, section, &from, &mut rng));
+                let share = cover(&nodes, section, 300, &mut rng);
+                assert!(share <= 1.0, "{share} {}", section.radius);
+                *highest = highest.max(share);
             }
         }
     }
@@ -117,7 +113,7 @@ fn no_element_goes_beyond_its_own_limit() {
         let built = built(&mesh, volume, limits.clone());
         let tree = built.tree::<u16>().expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
-        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+        let rest = rest(&nodes);
         // The tree's limits are below the builder's by the check's rounding.
         let sorted = |mut limits: Vec<f32>| {
             limits.sort_by(f32::total_cmp);

@@ -9,7 +9,7 @@ use dibs_nostd::{
     Admission, FrameExtent, Gate, IncomingSurface, Millis, MovingSurface, Options, Sphere,
     StretchError, SurfaceLimits, Tracker, Tree, VertexTable,
 };
-use dibs_tests::embedded::{climb, exact, hull, rows, sections, shrunk};
+use dibs_tests::embedded::{cover, exact, hull, rest, rows, sections, shrunk};
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::tree_bytes::{reseal, section};
 use dibs_tests::{sample, surfaces};
@@ -55,7 +55,7 @@ fn weights_carry_vertices_outside() {
     let built = built();
     let tree = built.tree::<u16>().expect("valid");
     let nodes = Nodes::of(&tree).expect("valid");
-    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let rest = rest(&nodes);
     let mut outside = 0;
     for row in 0..nodes.vertex_count() {
         let weights = nodes.weights(row).expect("in the table");
@@ -84,15 +84,16 @@ fn coverage_holds_outside() {
         let built = Builder::new().stretch(2.0).nodes(&volume).build(&mesh).expect("bound");
         let tree = built.tree::<u16>().expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
-        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
         let sections = sections(&tree);
         let is_outside = |row: u32| {
             nodes.weights(row).expect("in the table").iter().any(|(_, weight)| *weight < 0)
         };
         let outside: Vec<_> = sections.iter().filter(|section| is_outside(section.pin)).collect();
         for _ in 0..sample(200) {
-            let best = climb(&nodes, outside[rng.usize(..outside.len())], &rest, &mut rng);
-            highest = highest.max(best);
+            let section = outside[rng.usize(..outside.len())];
+            let share = cover(&nodes, section, 300, &mut rng);
+            assert!(share <= 1.0, "{share} {}", section.radius);
+            highest = highest.max(share);
         }
     }
     assert!(highest > 0.98, "{highest}");
@@ -105,7 +106,7 @@ fn a_tracker_counts_the_lever() {
     let tree = built.tree::<u16>().expect("valid");
     let nodes = Nodes::of(&tree).expect("valid");
     let triangles = surfaces::triangles(&tree);
-    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let rest = rest(&nodes);
     let (vertex, _) = farthest_out(&nodes);
     let mut rng = Rng::with_seed(71);
     for _ in 0..sample(24) {
@@ -143,7 +144,7 @@ fn limits_are_those_of_vertices() {
     let built = built();
     let tree = built.tree::<u16>().expect("valid");
     let nodes = Nodes::of(&tree).expect("valid");
-    let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+    let rest = rest(&nodes);
     let (vertex, _) = farthest_out(&nodes);
     let limits = SurfaceLimits::reach_mm(500.0).speed(0.1);
     let mut monitor = NodeMonitor::new(&nodes).limits(limits);

@@ -8,6 +8,7 @@ mod board_faults;
 pub mod boards;
 mod bound;
 mod bounded;
+mod carried;
 mod corruption;
 pub mod cost;
 mod dearer;
@@ -87,6 +88,7 @@ pub const CHECKS: &[Check] = &[
     modes::CHECK,
     tracked_modes::CHECK,
     nodes::CHECK,
+    carried::CHECK,
     sanitizers::ADDRESS,
     sanitizers::THREAD,
     miri::CHECK,

@@ -7,6 +7,8 @@ pub struct Effort {
     pub cases: usize,
     /// Poses whose side must be right.
     pub sides: usize,
+    /// Queries on surfaces that nodes carry.
+    pub carried: usize,
     /// Walks of 400 ticks against a filter of commands.
     pub walks: u64,
     /// The same on the board, and glides near the heart with their number of ticks.
@@ -51,6 +53,7 @@ impl Effort {
     pub const FULL: Self = Self {
         cases: 1_000_000,
         sides: 1_000_000,
+        carried: 10_000_000,
         walks: 25_000,
         board_walks: 250,
         board_glides: 3,
@@ -76,6 +79,7 @@ impl Effort {
     pub const TEST: Self = Self {
         cases: 100_000,
         sides: 4_000,
+        carried: 50_000,
         walks: 100,
         board_walks: 20,
         board_glides: 1,
@@ -106,6 +110,7 @@ impl Effort {
         Self {
             cases: wide(self.cases, least.cases),
             sides: wide(self.sides, least.sides),
+            carried: wide(self.carried, least.carried),
             walks: (self.walks / u64::from(share)).max(least.walks),
             board_walks: (self.board_walks / u64::from(share)).max(least.board_walks),
             board_glides: (self.board_glides / u64::from(share)).max(least.board_glides),

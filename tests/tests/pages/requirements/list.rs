@@ -168,7 +168,14 @@ pub const REQUIREMENTS: &[Requirement] = &[
     requirement(
         "F-07",
         "A surface that nodes carry has the answers of the moved mesh. Stretched and inverted elements are refused.",
-        &["m7.nodes.bits", "demo.nodes.mismatches", "demo.nodes.wrong"],
+        &[
+            "carried.wrong",
+            "carried.uncovered",
+            "carried.beyond",
+            "m7.nodes.bits",
+            "demo.nodes.mismatches",
+            "demo.nodes.wrong",
+        ],
     ),
     requirement(
         "F-08",
