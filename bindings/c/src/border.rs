@@ -72,35 +72,35 @@ impl<T: AnyBits> Input<T> for *const T {
 /// A pointer to memory for one or several values that are written.
 pub trait Output<T>: Sized {
     /// The memory, if the pointer is valid: checked before any work is done.
-    fn check(self) -> Result<Place<T>, dibs_code>;
+    fn check(self) -> Result<Out<T>, dibs_code>;
 
     /// The same, or `None` for a null pointer.
-    fn check_if_any(self) -> Result<Option<Place<T>>, dibs_code>;
+    fn check_if_any(self) -> Result<Option<Out<T>>, dibs_code>;
 
     /// Contiguous memory for several values.
-    fn places(self, count: usize) -> Result<Places<T>, dibs_code>;
+    fn places(self, count: usize) -> Result<OutSlice<T>, dibs_code>;
 }
 
 impl<T> Output<T> for *mut T {
-    fn check(self) -> Result<Place<T>, dibs_code> {
+    fn check(self) -> Result<Out<T>, dibs_code> {
         check(self)?;
-        Ok(Place(self))
+        Ok(Out(self))
     }
 
-    fn check_if_any(self) -> Result<Option<Place<T>>, dibs_code> {
+    fn check_if_any(self) -> Result<Option<Out<T>>, dibs_code> {
         if self.is_null() { Ok(None) } else { self.check().map(Some) }
     }
 
-    fn places(self, count: usize) -> Result<Places<T>, dibs_code> {
+    fn places(self, count: usize) -> Result<OutSlice<T>, dibs_code> {
         check(self)?;
-        Ok(Places { next: self, left: count })
+        Ok(OutSlice { next: self, left: count })
     }
 }
 
 /// Memory for a value, after its check.
-pub struct Place<T>(*mut T);
+pub struct Out<T>(*mut T);
 
-impl<T> Place<T> {
+impl<T> Out<T> {
     /// Writes the value.
     pub fn set(self, value: T) {
         // SAFETY: the pointer was checked, and the caller promises that only this call uses the memory.
@@ -126,12 +126,12 @@ impl<T> Place<T> {
 }
 
 /// Memory for several values, of which the first are written.
-pub struct Places<T> {
+pub struct OutSlice<T> {
     next: *mut T,
     left: usize,
 }
 
-impl<T> Places<T> {
+impl<T> OutSlice<T> {
     /// Writes the next value.
     pub fn push(&mut self, value: T) -> Result<(), dibs_code> {
         self.left = self.left.checked_sub(1).ok_or(dibs_code::Capacity)?;

@@ -6,7 +6,7 @@ use dibs_nostd::guard::{Bus, Rows};
 use dibs_nostd::wire::{AesCmac, Event, Mac, NoMac};
 use dibs_nostd::{Advance, Millis, Progress, ReceiveError, TreeBytes, VertexTable};
 
-use crate::border::{Handle, Input, Kind, Output, Place, Storage};
+use crate::border::{Handle, Input, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
 use crate::frame::rows;
 use crate::limits::dibs_guard_limits;
@@ -200,7 +200,7 @@ pub extern "C" fn dibs_bus_packet(
     dibs_code::of(|| {
         let (progress, mut bus) = (progress.check_if_any()?, bus.open()?);
         let outcome = bus.0.packet(packet.slice(length)?, Millis(now))?;
-        Place::set_if_any(progress, outcome.into());
+        Out::set_if_any(progress, outcome.into());
         Ok(())
     })
 }
@@ -285,7 +285,7 @@ pub extern "C" fn dibs_bus_work(
     dibs_code::of(|| {
         let (advance, mut bus) = (advance.check_if_any()?, bus.open()?);
         let outcome = bus.0.work(work)?;
-        Place::set_if_any(advance, outcome.into());
+        Out::set_if_any(advance, outcome.into());
         Ok(())
     })
 }

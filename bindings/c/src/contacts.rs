@@ -6,7 +6,7 @@ use bytemuck::AnyBitPattern;
 use dibs_nostd::constraint::VelocityRow;
 use dibs_nostd::{Contact, Contacts, Proximity, TriangleRow};
 
-use crate::border::{Handle, Input, Kind, Output, Place, Storage};
+use crate::border::{Handle, Input, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
 use crate::frame::{Vertices, ask, dibs_frame, rows};
 use crate::query::{dibs_options, dibs_proximity, dibs_query};
@@ -151,7 +151,7 @@ pub extern "C" fn dibs_query_contacts(
             let (mut query, frame) = (query.open()?, frame.open()?);
             ask!(frame, shape, |table, tool| query.0.contacts(table, tool, margin, &options, list))
         })?;
-        Place::set_if_any(proximity, found.into());
+        Out::set_if_any(proximity, found.into());
         Ok(())
     })
 }

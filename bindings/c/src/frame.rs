@@ -6,7 +6,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{MeasuredStretch, VertexTable, measure_stretch};
 
-use crate::border::{Handle, Input, Kind, Output, Place, Storage};
+use crate::border::{Handle, Input, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
 use crate::surface::Held;
 use crate::tree::dibs_tree;
@@ -263,7 +263,7 @@ pub extern "C" fn dibs_frame_measure(
                 measured
             }
         };
-        Place::set_if_any(stretch, measured.sigma());
+        Out::set_if_any(stretch, measured.sigma());
         Ok(())
     })
 }

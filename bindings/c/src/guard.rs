@@ -8,7 +8,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Guard, Rows};
 use dibs_nostd::{Contacts, Interval, Millis, Proximity, TreeBytes, Unavailable};
 
-use crate::border::{Handle, Input, Kind, Output, Place, Storage};
+use crate::border::{Handle, Input, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
 use crate::constraint::{dibs_force, dibs_wall, dibs_wall_force};
 use crate::contacts::dibs_contacts;
@@ -224,7 +224,7 @@ pub extern "C" fn dibs_guard_closest(
 
 /// The answer of a tick, whose tool may have no pose.
 fn conclude<S>(
-    place: Place<dibs_answer>,
+    place: Out<dibs_answer>,
     found: Answer,
     shape: Result<S, dibs_code>,
 ) -> Result<(), dibs_code> {
@@ -330,7 +330,7 @@ pub extern "C" fn dibs_guard_admit(
         if let Err(code) = shape {
             found.outcome = code as u32;
         }
-        Place::set_if_any(answer, found);
+        Out::set_if_any(answer, found);
         shape?;
         place.set(admitted?.into());
         Ok(())

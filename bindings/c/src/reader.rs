@@ -6,7 +6,7 @@ use bytemuck::AnyBitPattern;
 use dibs_nostd::failsafe::Link;
 use dibs_nostd::{FrameAge, Millis};
 
-use crate::border::{Handle, Kind, Output, Place, Storage};
+use crate::border::{Handle, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
 use crate::frame::{Table, dibs_frame};
 use crate::surface::{Held, Reader, dibs_surface};
@@ -154,7 +154,7 @@ pub extern "C" fn dibs_reader_latest(
         let (age, mut reader) = (age.check_if_any()?, reader.open()?);
         let hold = reader.surface.hold()?;
         let latest = reader.reader.latest(Millis(now));
-        Place::set_if_any(age, latest.frame().into());
+        Out::set_if_any(age, latest.frame().into());
         frame.table = Table::Held(Held::new(latest.within(Millis(limit))?, hold));
         Ok(())
     })

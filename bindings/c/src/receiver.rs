@@ -10,7 +10,7 @@ use dibs_nostd::{
     Advance, Assembler, Millis, Progress, StretchMonitor, SurfaceLimits, VertexTable,
 };
 
-use crate::border::{Handle, Input, Kind, Output, Place, Storage};
+use crate::border::{Handle, Input, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
 use crate::outcome::{dibs_advance, dibs_progress};
 use crate::surface::dibs_surface;
@@ -84,10 +84,10 @@ impl dibs_receiver {
     fn end(
         &self,
         outcome: Result<Progress, dibs_code>,
-        progress: Option<Place<dibs_progress>>,
+        progress: Option<Out<dibs_progress>>,
     ) -> Result<(), dibs_code> {
         self.note();
-        Place::set_if_any(progress, outcome?.into());
+        Out::set_if_any(progress, outcome?.into());
         Ok(())
     }
 }
@@ -243,7 +243,7 @@ pub extern "C" fn dibs_receiver_byte(
         let dibs_receiver { assembler, deframer, .. } = &mut *receiver;
         let outcome = match deframer.push(byte) {
             None => {
-                Place::set_if_any(progress, dibs_progress::None);
+                Out::set_if_any(progress, dibs_progress::None);
                 return Ok(());
             }
             Some(Ok(packet)) => assembler.accept(packet, Millis(now)),
@@ -279,7 +279,7 @@ pub extern "C" fn dibs_receiver_advance(
         if let Advance::Published { epoch } = outcome {
             receiver.published = Some(epoch);
         }
-        Place::set_if_any(advance, outcome.into());
+        Out::set_if_any(advance, outcome.into());
         Ok(())
     })
 }

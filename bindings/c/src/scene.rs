@@ -3,7 +3,7 @@
 use dibs_nostd::{Capsule, Closest, Query};
 use heapless::Vec;
 
-use crate::border::{AnyBits, Handle, Handles, Input, Open, Output, Place};
+use crate::border::{AnyBits, Handle, Handles, Input, Open, Out, Output};
 use crate::code::dibs_code;
 use crate::contacts::dibs_contacts;
 use crate::frame::{Table, dibs_frame};
@@ -143,7 +143,7 @@ pub extern "C" fn dibs_scene_contacts(
             let found = Query::contacts_in_scene(&mut surfaces, tools, margin, &options, list)?;
             dibs_closest::of(found)
         })?;
-        Place::set_if_any(closest, found);
+        Out::set_if_any(closest, found);
         Ok(())
     })
 }

@@ -12,7 +12,7 @@ use dibs_nostd::wire::{AesCmac, Content, Event};
 use dibs_stream::transport::{Line, Target};
 use dibs_stream::{SendError, Sender, Sent, Settings, SurfaceOrder};
 
-use crate::border::{Handle, Input, Kind, Output, Place, Storage, text};
+use crate::border::{Handle, Input, Kind, Out, Output, Storage, text};
 use crate::code::dibs_code;
 use crate::frame::rows;
 use crate::pose::dibs_pose;
@@ -280,7 +280,7 @@ fn send(
             .and_then(|pose| with_sender!(own, |own| own.send_at(positions, pose, ago))),
     };
     let outcome = outcome.map_err(|error| sender.keep(&error))?;
-    Place::set_if_any(sent, outcome.into());
+    Out::set_if_any(sent, outcome.into());
     Ok(())
 }
 

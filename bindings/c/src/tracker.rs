@@ -13,7 +13,7 @@ use dibs_nostd::{
 };
 use heapless::Vec;
 
-use crate::border::{DIBS_ALIGNMENT, Handle, Handles, Input, Kind, Output, Place, Storage};
+use crate::border::{DIBS_ALIGNMENT, Handle, Handles, Input, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
 use crate::contacts::dibs_contacts;
 use crate::frame::{Table, dibs_frame};
@@ -394,7 +394,7 @@ pub extern "C" fn dibs_tracker_contacts(
                 }
             })
         })?;
-        Place::set_if_any(tracked, found.into());
+        Out::set_if_any(tracked, found.into());
         Ok(())
     })
 }

@@ -6,7 +6,7 @@ mod series;
 
 pub use pc2::MotionMismatchError;
 
-use crate::read::{Place, ReadError, ReadErrorKind, file};
+use crate::read::{FileCoordinates, ReadError, ReadErrorKind, file};
 use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ impl Motion {
         if let Some(series) = series::Series::named(path) {
             return series.read(unit, origin);
         }
-        let place = Place { unit: unit.unwrap_or_default(), origin };
+        let place = FileCoordinates { unit: unit.unwrap_or_default(), origin };
         let parse = |bytes: Vec<u8>| match &bytes[..] {
             [] => Err(ReadErrorKind::Empty),
             bytes if bytes.starts_with(pc2::MAGIC) => pc2::parse(bytes, &place),
@@ -80,7 +80,8 @@ impl Motion {
         unit: impl Into<Option<Unit>>,
         origin: DVec3,
     ) -> Result<Vec<Vec3>, ReadErrorKind> {
-        Place { unit: unit.into().unwrap_or_default(), origin }.frame_of(positions, number)
+        FileCoordinates { unit: unit.into().unwrap_or_default(), origin }
+            .frame_of(positions, number)
     }
 }
 

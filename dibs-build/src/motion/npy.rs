@@ -4,7 +4,7 @@
 //! one line of three keys.
 
 use crate::Motion;
-use crate::read::{Endian, Place, ReadErrorKind, Scalar, excerpt};
+use crate::read::{Endian, FileCoordinates, ReadErrorKind, Scalar, excerpt};
 
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
@@ -12,7 +12,7 @@ fn wrong(what: String) -> ReadErrorKind {
     ReadErrorKind::NumPy { what }
 }
 
-pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind> {
+pub(super) fn parse(bytes: &[u8], place: &FileCoordinates) -> Result<Motion, ReadErrorKind> {
     let cut_off = || wrong("its header is cut off".to_owned());
     let version = *bytes.get(MAGIC.len()).ok_or_else(cut_off)?;
     // From the second version on the header may be long.

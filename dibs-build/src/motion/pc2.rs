@@ -5,7 +5,7 @@
 //! append them after the last sample, where other readers do not look: `DIBSRATE`, f32 frames a second.
 
 use crate::frames::{check_faces, check_mesh_size};
-use crate::read::{Place, ReadError, ReadErrorKind, file};
+use crate::read::{FileCoordinates, ReadError, ReadErrorKind, file};
 use crate::write::{WriteErrorKind, write_atomically};
 use crate::{FrameError, Mesh, Motion, Unit, WriteError};
 use glam::{DVec3, Vec3};
@@ -65,7 +65,9 @@ impl Motion {
         let path = path.as_ref();
         file::whole(path)
             .map_err(ReadErrorKind::from)
-            .and_then(|bytes| parse(&bytes, &Place { unit: Unit::Millimetre, origin: DVec3::ZERO }))
+            .and_then(|bytes| {
+                parse(&bytes, &FileCoordinates { unit: Unit::Millimetre, origin: DVec3::ZERO })
+            })
             .map_err(|kind| ReadError { path: path.to_path_buf(), kind })
     }
 
@@ -132,7 +134,7 @@ impl Motion {
     }
 }
 
-pub(super) fn parse(bytes: &[u8], place: &Place) -> Result<Motion, ReadErrorKind> {
+pub(super) fn parse(bytes: &[u8], place: &FileCoordinates) -> Result<Motion, ReadErrorKind> {
     if bytes.is_empty() {
         return Err(ReadErrorKind::Empty);
     }

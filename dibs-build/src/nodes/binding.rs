@@ -52,13 +52,13 @@ impl Bound {
 
 /// The tetrahedron that a vertex is bound to, its barycentric coordinates there, and its distance from it.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct Location {
     tetrahedron: u32,
     weights: [f64; 4],
     distance: f64,
 }
 
-impl Place {
+impl Location {
     /// For a vertex that no triangle uses.
     const NONE: Self = Self { tetrahedron: 0, weights: [0.0, 0.0, 0.0, 1.0], distance: 0.0 };
 }
@@ -80,19 +80,19 @@ impl Embedding {
         mesh.triangles.iter().flatten().for_each(|&vertex| is_used[vertex as usize] = true);
         let place = |(position, is_used): (&Vec3, &bool)| match is_used {
             true => grid.place_of(&cells, position.as_dvec3()),
-            false => Place::NONE,
+            false => Location::NONE,
         };
-        let places: Vec<Place> = mesh.positions.par_iter().zip(&is_used).map(place).collect();
+        let places: Vec<Location> = mesh.positions.par_iter().zip(&is_used).map(place).collect();
         // Written so that a distance of NaN counts as beyond.
         let is_beyond =
-            |place: &&Place| place.distance > 0.0 && !(place.distance <= volume.within());
+            |place: &&Location| place.distance > 0.0 && !(place.distance <= volume.within());
         if let Some(first) = places.iter().position(|place| is_beyond(&place)) {
             let count = places.iter().filter(is_beyond).count();
             let distance = places.iter().map(|place| place.distance).fold(0.0, f64::max);
             return Err(VolumeError::Outside { count, first, distance });
         }
         let is_signed = places.iter().any(|place| place.distance > 0.0);
-        let bind = |&Place { tetrahedron, weights, distance }: &Place| Bound {
+        let bind = |&Location { tetrahedron, weights, distance }: &Location| Bound {
             tetrahedron,
             weights: match (is_signed, distance > 0.0) {
                 (false, _) => rounded(weights.map(|weight| weight.clamp(0.0, 1.0)), 1),
@@ -263,30 +263,30 @@ impl Grid {
     }
 
     /// The tetrahedron around a position, or the nearest one; of equally near ones the one that extrapolates least.
-    fn place_of(&self, tetrahedra: &[Cell], position: DVec3) -> Place {
+    fn place_of(&self, tetrahedra: &[Cell], position: DVec3) -> Location {
         let near = &self.cells[self.row(self.place(position))];
         let least = |weights: &[f64; 4]| weights.iter().copied().fold(f64::INFINITY, f64::min);
         let weights = near.iter().map(|&at| (at, tetrahedra[at as usize].weights(position)));
         let inner = weights.max_by(|a, b| least(&a.1).total_cmp(&least(&b.1)).then(b.0.cmp(&a.0)));
         match inner {
             Some((tetrahedron, weights)) if least(&weights) >= -OUTSIDE => {
-                Place { tetrahedron, weights, distance: 0.0 }
+                Location { tetrahedron, weights, distance: 0.0 }
             }
             _ => {
-                let sizes = |place: &Place| place.weights.iter().map(|w| w.abs()).sum::<f64>();
-                let nearer = |nearest: Place, (tetrahedron, cell): (u32, &Cell)| {
+                let sizes = |place: &Location| place.weights.iter().map(|w| w.abs()).sum::<f64>();
+                let nearer = |nearest: Location, (tetrahedron, cell): (u32, &Cell)| {
                     let [low, high] = cell.bounds();
                     let as_near = nearest.distance * (1.0 + 1e-9);
                     if position.clamp(low, high).distance(position) > as_near {
                         return nearest;
                     }
                     let (weights, distance) = (cell.weights(position), cell.distance(position));
-                    let place = Place { tetrahedron, weights, distance };
+                    let place = Location { tetrahedron, weights, distance };
                     let is_nearer = distance * (1.0 + 1e-9) < nearest.distance
                         || distance <= as_near && sizes(&place) < sizes(&nearest);
                     if is_nearer { place } else { nearest }
                 };
-                let none = Place { distance: f64::INFINITY, ..Place::NONE };
+                let none = Location { distance: f64::INFINITY, ..Location::NONE };
                 (0..).zip(tetrahedra).fold(none, nearer)
             }
         }

@@ -2,7 +2,7 @@
 
 // Requirement: M-03
 
-use super::place::{Place, check_nearness, rounding};
+use super::coordinates::{FileCoordinates, check_nearness, rounding};
 use super::polygon::Triangulator;
 use super::raw::Raw;
 use super::weld::first_coincident;
@@ -35,7 +35,7 @@ pub(crate) fn import(
     raw: &Raw,
     format: Format,
     options: &ReadOptions,
-    place: Place,
+    place: FileCoordinates,
 ) -> Result<Import> {
     let positions = positions(raw, format)?;
     let is_stl = matches!(format, Format::StlAscii | Format::StlBinary);

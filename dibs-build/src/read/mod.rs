@@ -5,6 +5,7 @@
 #[cfg(feature = "formats")]
 mod base64;
 mod check;
+mod coordinates;
 mod cursor;
 mod error;
 pub(crate) mod file;
@@ -17,7 +18,6 @@ mod groups;
 mod inflate;
 mod obj;
 mod off;
-mod place;
 mod ply;
 mod polygon;
 mod raw;
@@ -42,9 +42,9 @@ pub use report::{Format, Report};
 
 use crate::mesh::{Mesh, RestSurface};
 use crate::rounding::round_up;
+pub(crate) use coordinates::FileCoordinates;
 use dibs_nostd::format::Unit;
 use glam::{DVec3, Vec3};
-pub(crate) use place::Place;
 use raw::Raw;
 pub(crate) use raw::excerpt;
 pub(crate) use scalar::{Endian, Scalar};
@@ -191,7 +191,7 @@ impl ReadOptions {
             return Err(ReadErrorKind::NoGroups { format });
         }
         let unit = unit_of(format, raw.unit, self.unit)?;
-        let place = Place::of_mesh(&raw, unit, self.origin)?;
+        let place = FileCoordinates::of_mesh(&raw, unit, self.origin)?;
         for position in &mut raw.positions {
             *position = place.of(*position).to_array();
         }
@@ -230,7 +230,7 @@ pub(crate) fn frame(
     if matches!(format, Format::StlAscii | Format::StlBinary) {
         return Err(ReadErrorKind::UnnumberedFrame);
     }
-    let place = Place { unit: unit_of(format, raw.unit, unit)?, origin };
+    let place = FileCoordinates { unit: unit_of(format, raw.unit, unit)?, origin };
     let positions = place.frame_of(&raw.positions, number)?;
     Ok((positions, raw.faces().map(<[u32]>::to_vec).collect()))
 }
@@ -245,7 +245,7 @@ pub(crate) fn volume(
         let (tetrahedra, others) = (raw.tetrahedra.len(), raw.other_cells);
         return Err(ReadErrorKind::NoVolume { format, tetrahedra, others });
     }
-    let place = Place { unit: unit_of(format, raw.unit, unit)?, origin: DVec3::ZERO };
+    let place = FileCoordinates { unit: unit_of(format, raw.unit, unit)?, origin: DVec3::ZERO };
     let nodes = raw.positions.iter().map(|&position| place.of(position)).collect();
     Ok((nodes, raw.tetrahedra))
 }

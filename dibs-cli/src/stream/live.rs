@@ -45,13 +45,13 @@ pub struct Live(Arc<Shared>);
 
 #[derive(Default)]
 struct Shared {
-    place: Mutex<Place>,
+    place: Mutex<Slot>,
     changed: Condvar,
 }
 
 /// Room for one frame. A queue would be wrong: frames that wait behind others only age.
 #[derive(Default)]
-struct Place {
+struct Slot {
     frame: Option<Frame>,
     /// How the source ended.
     end: Option<Result<()>>,
@@ -78,7 +78,7 @@ impl Live {
     /// The source's error, once every earlier frame is taken.
     pub fn next(&self, patience: Duration) -> Result<Next> {
         let place = self.0.place();
-        let is_idle = |place: &mut Place| place.frame.is_none() && place.end.is_none();
+        let is_idle = |place: &mut Slot| place.frame.is_none() && place.end.is_none();
         let waited = self.0.changed.wait_timeout_while(place, patience, is_idle);
         let (mut place, _) = waited.unwrap_or_else(PoisonError::into_inner);
         if let Some(frame) = place.frame.take() {
@@ -98,7 +98,7 @@ impl Live {
 }
 
 impl Shared {
-    fn place(&self) -> MutexGuard<'_, Place> {
+    fn place(&self) -> MutexGuard<'_, Slot> {
         self.place.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -114,7 +114,7 @@ impl Shared {
             let frame = Frame { parsed, gap };
             let mut place = self.place();
             if keeps_all {
-                let is_full = |place: &mut Place| place.frame.is_some();
+                let is_full = |place: &mut Slot| place.frame.is_some();
                 let waited = self.changed.wait_while(place, is_full);
                 place = waited.unwrap_or_else(PoisonError::into_inner);
             }

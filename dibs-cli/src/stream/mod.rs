@@ -1,5 +1,6 @@
 //! `dibs stream`: sends a recorded or live motion to a controller.
 
+mod coordinates;
 mod igtl;
 mod interrupt;
 mod key;
@@ -7,7 +8,6 @@ mod live;
 mod memory;
 mod parse;
 mod part;
-mod place;
 mod player;
 mod report;
 mod timing;
@@ -17,6 +17,7 @@ use crate::motion::{MotionFile, MotionRate};
 use crate::tree_file::{self, AnyTree};
 use crate::{modes, overwrite};
 use anyhow::{Context, Result, anyhow, bail};
+use coordinates::{Axes, SourceCoordinates};
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{Builder, Import, ReadOptions};
 use dibs_nostd::wire::AesCmac;
@@ -27,7 +28,6 @@ use interrupt::Interrupt;
 use live::Live;
 use memory::Memory;
 use parse::{Format, Parser};
-use place::{Axes, Place};
 use player::Player;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -213,7 +213,7 @@ enum Frames {
 /// Starts to read live frames.
 fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> Result<Source> {
     let (unit, axes, keeps_all) = (args.lengths.unit(), args.axes, rate.is_some());
-    let place = Place { unit, axes, origin, order: order.clone() };
+    let place = SourceCoordinates { unit, axes, origin, order: order.clone() };
     let source = args.from.as_ref().unwrap_or(&LiveSource::Input);
     if args.format != Format::Raw && !matches!(source, LiveSource::Input) {
         bail!("--format: frames in shared memory are raw, and those of OpenIGTLink have its own");

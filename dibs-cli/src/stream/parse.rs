@@ -1,8 +1,8 @@
 //! Frames from a stream of bytes: raw numbers, or JSON lines.
 
+use super::coordinates::SourceCoordinates;
 use super::live::Parsed;
 use super::part::Part;
-use super::place::Place;
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::Vec3;
 use serde::Deserialize;
@@ -30,7 +30,7 @@ pub struct Parser<R> {
     name: String,
     input: BufReader<R>,
     format: Format,
-    place: Place,
+    place: SourceCoordinates,
     /// Whether a stated rate gives the frames their times, so that their arrival says nothing of their age.
     is_paced: bool,
     /// The last frame.
@@ -53,7 +53,13 @@ struct Object {
 }
 
 impl<R: Read> Parser<R> {
-    pub fn new(name: String, format: Format, place: Place, is_paced: bool, input: R) -> Self {
+    pub fn new(
+        name: String,
+        format: Format,
+        place: SourceCoordinates,
+        is_paced: bool,
+        input: R,
+    ) -> Self {
         let input = BufReader::with_capacity(1 << 18, input);
         Self { name, input, format, place, is_paced, last: None, number: 0 }
     }

@@ -221,7 +221,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
             &mut Tracker<'t, I, STACK, OPENED, RANGE>,
             &R::Surface<'_>,
             &T,
-            &Flow<'_, '_, 't, R>,
+            &SurfaceFlow<'_, '_, 't, R>,
             &Options,
         ) -> Result<TrackerAnswer, QueryError>,
         then: impl FnOnce(
@@ -255,7 +255,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         let (searched, tracked) = match (frame, surface) {
             (Some(frame), Ok((blend, surface))) => {
                 let notes = &notes.of_all;
-                let flow = Flow { rows, blend, placed, frame, failsafe, notes, now };
+                let flow = SurfaceFlow { rows, blend, placed, frame, failsafe, notes, now };
                 let tracked = search(tracker, surface, own, &flow, options);
                 let searched = Searched {
                     frame,
@@ -270,7 +270,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
                     }),
                 };
                 match placed {
-                    Some(placed) => placed.led_back(tool, tracked, searched),
+                    Some(placed) => placed.to_world(tool, tracked, searched),
                     None => (Some(searched), tracked.map_err(Unavailable::Query)),
                 }
             }
@@ -326,7 +326,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
 }
 
 /// The velocity and lag of the searched surface.
-struct Flow<'a, 'f, 't, R: Rows> {
+struct SurfaceFlow<'a, 'f, 't, R: Rows> {
     rows: &'f R::Of<'t>,
     blend: &'f Blend<'f>,
     placed: Option<&'a Placed>,
@@ -336,7 +336,7 @@ struct Flow<'a, 'f, 't, R: Rows> {
     now: Millis,
 }
 
-impl<R: Rows> Flow<'_, '_, '_, R> {
+impl<R: Rows> SurfaceFlow<'_, '_, '_, R> {
     /// The margin (mm) of this tick's trust.
     fn margin(&self) -> f32 {
         self.failsafe.margin(self.frame, self.blend.lag(), &self.notes.link.read(self.now))

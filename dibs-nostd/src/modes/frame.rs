@@ -45,7 +45,7 @@ impl<const K: usize> Weights<K> {
 
 /// The step from the previous frame to this one, and its extrapolation.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Step<const K: usize> {
+pub(super) struct WeightStep<const K: usize> {
     before: Weights<K>,
     /// The end of the extrapolation, its weights within their ranges.
     end: Weights<K>,
@@ -62,7 +62,7 @@ pub(super) struct Step<const K: usize> {
     ahead: PredictionCheck,
 }
 
-impl<const K: usize> Step<K> {
+impl<const K: usize> WeightStep<K> {
     /// The step from a frame with the reading `from` to the next.
     ///
     /// Cost: O(modes times anchors).
@@ -129,7 +129,7 @@ pub struct ModalFrame<'a, const K: usize> {
     label: FrameLabel,
     weights: Weights<K>,
     motion: Option<MotionReading>,
-    step: Option<Step<K>>,
+    step: Option<WeightStep<K>>,
     /// Age of the frame when it was read.
     age: Millis,
     is_frame: bool,
@@ -146,7 +146,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         label: FrameLabel,
         weights: &Weights<K>,
         motion: Option<MotionReading>,
-        step: Option<Step<K>>,
+        step: Option<WeightStep<K>>,
         age: Millis,
     ) -> Self {
         let surface = weights.surface(modes);

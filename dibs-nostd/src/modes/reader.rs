@@ -1,6 +1,6 @@
 //! The control tick's end of a bus for weights.
 
-use super::frame::{Step, Weights};
+use super::frame::{WeightStep, Weights};
 use super::reach::Reach;
 use super::{ModalFrame, Modes, WeightsError};
 use crate::surface::{
@@ -29,7 +29,7 @@ struct Last<const K: usize> {
     received: Millis,
     /// `None` for weights out of range.
     motion: Option<MotionReading>,
-    step: Option<Step<K>>,
+    step: Option<WeightStep<K>>,
 }
 
 impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
@@ -113,7 +113,7 @@ impl<const K: usize> Last<K> {
         };
         let interval = received.since(before.received);
         let weights = [&before.weights, &weights];
-        let step = Step::new(modes, reach, weights, (from, interval), before.step.as_ref());
+        let step = WeightStep::new(modes, reach, weights, (from, interval), before.step.as_ref());
         now.motion = Some(from.along(step.units));
         now.step = (interval > Millis(0) && interval < Millis(1 << 31)).then_some(step);
         now

@@ -45,7 +45,7 @@ pub(super) const WITHIN: u8 = 1;
 pub(super) const UNTIL: u8 = 2;
 
 /// The outcome of a visit to a subtree.
-enum Step {
+enum Expansion {
     /// Finished; any remaining children are on the stack.
     Done,
     /// Unfinished: the budget ran out.
@@ -206,13 +206,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
                 Link::Children { first, count } => match self.meter.nodes(count) {
                     Some(()) => {
                         self.expand::<CLOSEST>(lower, first, count, 0.0)?;
-                        Step::Done
+                        Expansion::Done
                     }
-                    None => Step::OutOfBudget,
+                    None => Expansion::OutOfBudget,
                 },
                 Link::Leaf { first, count } => self.leaf(first, count)?,
             };
-            if matches!(step, Step::OutOfBudget) {
+            if matches!(step, Expansion::OutOfBudget) {
                 if KIND == UNTIL {
                     return self.finish(0.0);
                 }

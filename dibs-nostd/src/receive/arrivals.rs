@@ -54,7 +54,7 @@ pub(super) enum Misplaced {
 
 /// The position of a packet among the ranges.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct PacketPosition {
     sequence: u16,
     rows: Range32,
     /// Slots of the ranges that end before it and begin after it.
@@ -98,9 +98,9 @@ impl Arrivals {
 
     /// The position of a packet. O(1) in order, O([`GAPS`]) otherwise.
     #[inline]
-    pub fn locate(&self, sequence: u16, rows: Range<u32>) -> Result<Place, Misplaced> {
+    pub fn locate(&self, sequence: u16, rows: Range<u32>) -> Result<PacketPosition, Misplaced> {
         let rows = Range32 { first: rows.start, end: rows.end };
-        let mut place = Place { sequence, rows, before: None, after: None, free: GAPS };
+        let mut place = PacketPosition { sequence, rows, before: None, after: None, free: GAPS };
         self.meet(&self.prefix, PREFIX, &mut place)?;
         if self.used == 0 {
             place.free = 0;
@@ -119,8 +119,8 @@ impl Arrivals {
 
     /// Compares a packet with one range.
     #[inline]
-    fn meet(&self, range: &Contig, at: usize, place: &mut Place) -> Result<(), Misplaced> {
-        let Place { sequence, rows, .. } = *place;
+    fn meet(&self, range: &Contig, at: usize, place: &mut PacketPosition) -> Result<(), Misplaced> {
+        let PacketPosition { sequence, rows, .. } = *place;
         let fits = if range.to <= sequence {
             if range.to == sequence {
                 place.before = Some(at);
@@ -144,8 +144,8 @@ impl Arrivals {
 
     /// Notes a packet at its position.
     #[inline]
-    pub fn insert(&mut self, place: Place) {
-        let Place { sequence, rows, before, after, free } = place;
+    pub fn insert(&mut self, place: PacketPosition) {
+        let PacketPosition { sequence, rows, before, after, free } = place;
         let to = sequence.saturating_add(1);
         match (before, after) {
             (None, None) => {

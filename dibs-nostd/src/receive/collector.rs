@@ -9,7 +9,7 @@
 mod heartbeats;
 
 use super::ReceiveError;
-use super::arrivals::{Arrivals, Misplaced, Place};
+use super::arrivals::{Arrivals, Misplaced, PacketPosition};
 use super::health::{BusHealth, FrameName, Trouble};
 use crate::surface::{AHEAD, Millis, elapsed};
 use crate::tree::SurfaceFacts;
@@ -267,7 +267,7 @@ impl Collector {
     }
 
     /// The position of all rows of the current frame, received at once together with its commit.
-    pub fn place_whole(&mut self, rows: u32) -> Option<Place> {
+    pub fn place_whole(&mut self, rows: u32) -> Option<PacketPosition> {
         let frame = self.frame.as_mut()?;
         frame.commit = Some((2, frame.sum));
         frame.arrivals.locate(1, 0..rows).ok()
@@ -332,7 +332,11 @@ impl Collector {
 
     /// Notes stored rows. `Ok(true)` once the frame is complete.
     #[inline]
-    pub fn take_rows(&mut self, contribution: u32, place: Place) -> Result<bool, ReceiveError> {
+    pub fn take_rows(
+        &mut self,
+        contribution: u32,
+        place: PacketPosition,
+    ) -> Result<bool, ReceiveError> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
         frame.arrivals.insert(place);
         frame.sum = frame.sum.wrapping_add(contribution);
@@ -499,7 +503,7 @@ impl Frame {
         &self,
         sequence: u16,
         rows: core::ops::Range<u32>,
-    ) -> Result<Option<Place>, ReceiveError> {
+    ) -> Result<Option<PacketPosition>, ReceiveError> {
         if self.commit.is_some_and(|(commit, _)| sequence >= commit) {
             return Err(ReceiveError::Order { sequence });
         }

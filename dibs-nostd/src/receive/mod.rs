@@ -29,7 +29,7 @@ pub use collector::LastHeartbeat;
 pub use error::ReceiveError;
 pub use health::BusHealth;
 use health::FrameName;
-use step::{Earlier, Step};
+use step::{Earlier, StepMeter};
 
 /// Assembles frames of vertices from packets, and publishes those that are complete and admitted.
 ///
@@ -90,7 +90,7 @@ pub struct Assembler<'f, G, M = NoMac> {
     /// Leading rows of the back buffer that equal the published ones, except those changed by the current partial
     /// frame.
     copied: u32,
-    step: Step,
+    step: StepMeter,
     /// Rows were stored since copying began. If their frame is not published, copying starts again.
     is_dirty: bool,
     /// A partial frame was received, so each published frame is copied for the next one.
@@ -207,7 +207,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
             max_coordinate,
             collector: Collector::new(mesh_id),
             is_admitted: false,
-            step: Step::new(),
+            step: StepMeter::new(),
             copied: 0,
             is_dirty: false,
             takes_partial: false,

@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use glam::Vec3;
 
-use super::step::Step;
+use super::step::StepMeter;
 use super::{Assembler, Progress, ReceiveError, arrivals};
 use crate::stretch::{FrameExtent, Gate};
 use crate::surface::{PoseError, Position, RigidPose};
@@ -88,7 +88,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
                 corners.into_iter().all(|corner| is_within(corner, self.max_coordinate))
             }
         };
-        self.step = Step::new();
+        self.step = StepMeter::new();
         self.gate.begin(if is_partial { FrameExtent::Partial } else { FrameExtent::Whole });
         Ok(Progress::Begun { epoch: frame.id.epoch })
     }
@@ -199,7 +199,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         &mut self,
         epoch: u32,
         contribution: u32,
-        at: arrivals::Place,
+        at: arrivals::PacketPosition,
         rows: Range<u32>,
     ) -> Result<Progress, ReceiveError> {
         self.is_dirty = true;

@@ -12,7 +12,7 @@ const MOST: u64 = 1 << 30;
 
 /// The rows compared so far, and the squares of the largest step and of the largest distance from the extrapolation.
 #[derive(Debug)]
-pub(super) struct Step {
+pub(super) struct StepMeter {
     rows: u32,
     /// Start and end of the slice with the largest step.
     fastest: [u32; 2],
@@ -31,7 +31,7 @@ pub(super) struct Earlier<'f, V: ?Sized> {
     pub t: f32,
 }
 
-impl Step {
+impl StepMeter {
     pub const fn new() -> Self {
         Self { rows: 0, fastest: [0; 2], largest: 0.0, off: 0.0, units: 0, t: f32::NAN }
     }

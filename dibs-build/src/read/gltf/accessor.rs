@@ -49,7 +49,7 @@ pub fn numbers(
     }
     let mut values = match accessor.buffer_view {
         Some(view) => {
-            let at = Place { view, offset: accessor.byte_offset, strided: true };
+            let at = BufferOffset { view, offset: accessor.byte_offset, strided: true };
             elements(document, buffers, &at, scalar, width, accessor.count)
                 .map_err(|error| error.of(number))?
         }
@@ -92,7 +92,7 @@ fn scalar(component_type: u32) -> Option<Scalar> {
 }
 
 /// Where in the buffers elements are.
-struct Place {
+struct BufferOffset {
     view: usize,
     offset: usize,
     /// Whether the view's stride applies.
@@ -125,7 +125,7 @@ const BEYOND: Defect = Defect::Sentence("reaches beyond its buffer; the file was
 fn elements(
     document: &Document,
     buffers: &mut Buffers<'_>,
-    place: &Place,
+    place: &BufferOffset,
     scalar: Scalar,
     width: usize,
     count: usize,
@@ -158,12 +158,12 @@ fn replace(
     values: &mut [f64],
 ) -> std::result::Result<(), Defect> {
     let at = &sparse.indices;
-    let place = Place { view: at.buffer_view, offset: at.byte_offset, strided: false };
+    let place = BufferOffset { view: at.buffer_view, offset: at.byte_offset, strided: false };
     let index_type = scalar(at.component_type)
         .ok_or(Defect::Sentence("has a sparse part of another type of numbers"))?;
     let rows = elements(document, buffers, &place, index_type, 1, sparse.count)?;
     let at = &sparse.values;
-    let place = Place { view: at.buffer_view, offset: at.byte_offset, strided: false };
+    let place = BufferOffset { view: at.buffer_view, offset: at.byte_offset, strided: false };
     let others = elements(document, buffers, &place, value_type, width, sparse.count)?;
     for (row, other) in rows.into_iter().zip(others.chunks_exact(width)) {
         let start = index(row).and_then(|row| usize::try_from(row).ok()?.checked_mul(width));

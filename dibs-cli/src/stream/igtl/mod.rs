@@ -17,9 +17,9 @@ mod topology;
 pub use exchange::{Exchange, Report};
 pub use peer::Address;
 
+use super::coordinates::SourceCoordinates;
 use super::live::Parsed;
 use super::part::Part;
-use super::place::Place;
 use anyhow::Result;
 use content::{Content, Kind};
 use delay::Delay;
@@ -45,7 +45,7 @@ pub struct Igtl {
     /// The last pose and positions.
     pose: Option<Part<RigidPose>>,
     positions: Option<Part<Vec<Vec3>>>,
-    place: Place,
+    place: SourceCoordinates,
     topology: Topology,
     exchange: Arc<Exchange>,
     delay: Delay,
@@ -71,7 +71,7 @@ impl Igtl {
         address: &Address,
         [device, pose_device]: [Option<String>; 2],
         patience: Duration,
-        place: Place,
+        place: SourceCoordinates,
         exchange: Arc<Exchange>,
     ) -> Result<Self> {
         let topology = Topology::new(place.order.clone());

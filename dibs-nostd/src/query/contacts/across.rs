@@ -65,7 +65,7 @@ impl Across {
 }
 
 #[derive(Clone, Copy)]
-struct Place {
+struct ProfilePoint {
     /// Its distance (mm) from the deepest point, in the direction in which the deepest point's triangle recedes.
     along: f32,
     depth: f32,
@@ -73,7 +73,7 @@ struct Place {
     slope: f32,
 }
 
-impl Place {
+impl ProfilePoint {
     /// The position at which the distances to the triangles of two points are equal, if they grow linearly; and that
     /// distance.
     fn meeting(&self, far: &Self) -> (f32, f32) {
@@ -141,7 +141,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         let (way, mut end) =
             if growth > 0.0 { (direction, length - before) } else { (-direction, before) };
         let depth = -closest.separation - tool.radius();
-        let first = Place { along: 0.0, depth, slope: growth.abs() };
+        let first = ProfilePoint { along: 0.0, depth, slope: growth.abs() };
         let has_way = first.slope * end > accuracy && depth > NO_DIRECTION * accuracy;
         if !has_way {
             return Ok((Across::NONE, look.spent));
@@ -160,7 +160,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
                     (along, f32::INFINITY)
                 }
             };
-            let is_known = |far: &Place| {
+            let is_known = |far: &ProfilePoint| {
                 let deepest = if far.depth > near.depth { far.depth } else { near.depth };
                 expected <= deepest + accuracy
             };
@@ -171,7 +171,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
             let Some(found) = look.at(stack, point)? else { break };
             // From the point inside to the surface.
             let slope = found.direction.dot(way);
-            let place = Place { along, depth: found.axis_distance, slope };
+            let place = ProfilePoint { along, depth: found.axis_distance, slope };
             if far.is_some() && place.depth >= expected - accuracy {
                 break;
             }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::activation::Looking;
-use super::basins::{Basins, Near, Place};
+use super::basins::{Basins, ClosestPoint, Near};
 use super::low::Found;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
@@ -201,7 +201,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
             Some(found) => Ok(near(row, &found, accuracy)),
             None => match rows.into_iter().zip(corners).find(|(_, corner)| !corner.is_finite()) {
                 Some((vertex, _)) => Err(QueryError::Position { vertex }),
-                None => Ok(Near { square: f32::INFINITY, row, place: Place::NONE }),
+                None => Ok(Near { square: f32::INFINITY, row, place: ClosestPoint::NONE }),
             },
         }
     }
@@ -260,7 +260,7 @@ fn may_be_inside(closest: &Proximity) -> bool {
 
 /// A triangle at this pair. Within some accuracies it has no direction.
 pub(super) fn near(row: u32, pair: &AxisPair, accuracy: f32) -> Near {
-    let place = Place::of(pair, NO_DIRECTION * accuracy);
+    let place = ClosestPoint::of(pair, NO_DIRECTION * accuracy);
     Near { square: pair.distance_squared, row, place }
 }
 

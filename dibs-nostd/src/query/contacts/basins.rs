@@ -30,15 +30,15 @@ use crate::{Index, Tool, Tree, VertexTable};
 pub(super) struct Near {
     pub square: f32,
     pub row: u32,
-    pub place: Place,
+    pub place: ClosestPoint,
 }
 
 /// The closest point of a triangle: the direction to the tool, in 9 bits per axis, and the edges that contain it, one
 /// bit each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Place(u32);
+pub(super) struct ClosestPoint(u32);
 
-impl Place {
+impl ClosestPoint {
     /// No direction, and no edge.
     pub const NONE: Self = Self(0);
     const DIRECTION: u32 = (1 << 27) - 1;
@@ -82,11 +82,11 @@ impl Place {
 struct Key {
     square: u32,
     row: u32,
-    place: Place,
+    place: ClosestPoint,
 }
 
 impl Key {
-    const NONE: Self = Self { square: 0, row: 0, place: Place::NONE };
+    const NONE: Self = Self { square: 0, row: 0, place: ClosestPoint::NONE };
 
     fn of(near: Near) -> Self {
         Self { square: near.square.to_bits(), row: near.row, place: near.place }

@@ -20,12 +20,12 @@ const HALVINGS: u32 = 8;
 /// The disjoint intervals in which an axis may meet the surface.
 #[derive(Clone, Debug)]
 pub(super) struct Touches {
-    places: Vec<Place, PLACES>,
+    places: Vec<Touch, PLACES>,
 }
 
 /// An interval of the axis that may meet the surface, in lengths from its start.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct Touch {
     first: f32,
     last: f32,
     /// Whether the axis is outside before and after the interval; `None` if unknown.
@@ -37,7 +37,7 @@ pub(super) struct Place {
     pub triangle: TriangleRow,
 }
 
-impl Place {
+impl Touch {
     const fn unknown(last: f32) -> Self {
         let (before, after, triangle) = (None, None, TriangleRow(0));
         Self { first: 0.0, last, before, after, parameter: 0.0, triangle }
@@ -59,7 +59,7 @@ impl Touches {
     /// The whole axis.
     pub fn anywhere() -> Self {
         let mut touches = Self::NONE;
-        touches.push(Place::unknown(f32::INFINITY));
+        touches.push(Touch::unknown(f32::INFINITY));
         touches
     }
 
@@ -92,7 +92,7 @@ impl Touches {
             let is_outward = (pair.distance_squared <= 0.0).then_some(slope > 0.0);
             let (first, last) = (middle - within, middle + within);
             let (before, after) = (is_outward.map(|is_outward| !is_outward), is_outward);
-            self.insert(Place { first, last, before, after, parameter, triangle });
+            self.insert(Touch { first, last, before, after, parameter, triangle });
             return 0;
         }
         let is_touched = |at: f32| {
@@ -113,12 +113,12 @@ impl Touches {
         let first = smaller(a, smaller(b, smaller(c, middle))) - 2.0 * accuracy;
         let last = larger(a, larger(b, larger(c, middle))) + 2.0 * accuracy;
         let (first, last) = (end(first), end(last));
-        self.insert(Place { first, last, parameter, triangle, ..Place::unknown(0.0) });
+        self.insert(Touch { first, last, parameter, triangle, ..Touch::unknown(0.0) });
         2 * HALVINGS
     }
 
     /// Adds an interval, joined with all that it overlaps.
-    fn insert(&mut self, mut place: Place) {
+    fn insert(&mut self, mut place: Touch) {
         self.places.retain(|other| {
             let is_apart = other.last < place.first || other.first > place.last;
             if !is_apart {
@@ -135,22 +135,22 @@ impl Touches {
     }
 
     /// Appends an interval; if there is no room, joins it to the last one.
-    fn push(&mut self, place: Place) {
+    fn push(&mut self, place: Touch) {
         if let Err(place) = self.places.push(place)
             && let Some(last) = self.places.last_mut()
         {
-            *last = Place { before: None, after: None, ..last.joined(&place) };
+            *last = Touch { before: None, after: None, ..last.joined(&place) };
         }
     }
 
     /// The intervals, unless they are unknown.
-    pub fn places(&self) -> impl Iterator<Item = &Place> {
+    pub fn places(&self) -> impl Iterator<Item = &Touch> {
         self.places.iter().filter(|place| place.last < f32::INFINITY)
     }
 
     /// Notes that the axis is outside at this length.
     pub fn add_outside(&mut self, along: f32) {
-        let mut previous: Option<&mut Place> = None;
+        let mut previous: Option<&mut Touch> = None;
         for place in &mut self.places {
             if place.first > along {
                 place.before.get_or_insert(true);
@@ -238,7 +238,7 @@ mod tests {
             for _ in 0..rng.usize(1..20) {
                 let first = rng.f32() * 100.0;
                 let last = first + rng.f32() * 8.0;
-                touches.insert(Place { first, last, ..Place::unknown(0.0) });
+                touches.insert(Touch { first, last, ..Touch::unknown(0.0) });
                 let (apart, over): (Vec<_>, Vec<_>) =
                     expected.into_iter().partition(|&(a, b)| b < first || a > last);
                 joined += usize::from(over.len() > 1);

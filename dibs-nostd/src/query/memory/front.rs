@@ -57,12 +57,12 @@ impl Opened {
 
 /// A child of an opened node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::query) struct Place {
+pub(in crate::query) struct ChildSlot {
     pub node: u16,
     pub slot: u8,
 }
 
-impl Place {
+impl ChildSlot {
     /// The child's place as a word on the search's stack.
     #[inline(always)]
     pub fn to_word(self) -> u32 {
@@ -86,7 +86,7 @@ pub(in crate::query) struct Front<const OPENED: usize> {
     /// The first free slot, counted from 1; [`NO_FREE`] if there is none.
     free: u16,
     /// The closest triangle's place.
-    pub best: Option<Place>,
+    pub best: Option<ChildSlot>,
     /// The clock hand: the slot last examined for closing.
     hand: usize,
 }
@@ -113,7 +113,7 @@ pub(in crate::query) struct FrontMut<'f> {
     nodes: &'f mut [Opened],
     end: &'f mut usize,
     free: &'f mut u16,
-    pub best: &'f mut Option<Place>,
+    pub best: &'f mut Option<ChildSlot>,
     hand: &'f mut usize,
 }
 
@@ -198,7 +198,7 @@ impl FrontMut<'_> {
 
     /// Opens a node in a free slot, with one bound for everything below; `None` if there is no free slot.
     #[inline(always)]
-    pub fn open(&mut self, link: u32, parent: Place, deadline: Deadline) -> Option<u16> {
+    pub fn open(&mut self, link: u32, parent: ChildSlot, deadline: Deadline) -> Option<u16> {
         let at = self.free.checked_sub(1).map_or(*self.end, usize::from);
         let node = self.nodes.get_mut(at)?;
         if at == *self.end {
@@ -216,7 +216,7 @@ impl FrontMut<'_> {
     pub fn close(&mut self, at: u16, deadline: Deadline, clock: &MotionClock) -> Option<()> {
         let free = *self.free;
         let node = self.node(at)?;
-        let place = Place { node: node.parent, slot: node.slot };
+        let place = ChildSlot { node: node.parent, slot: node.slot };
         *node = Opened { parent: free, ..Opened::FREE };
         *self.free = at.wrapping_add(1);
         *self.due.get_mut(usize::from(at))? = clock.never();
@@ -226,7 +226,7 @@ impl FrontMut<'_> {
 
     /// Gives a child a bound of its node again.
     #[inline(always)]
-    pub fn put_back(&mut self, Place { node, slot }: Place) -> Option<()> {
+    pub fn put_back(&mut self, ChildSlot { node, slot }: ChildSlot) -> Option<()> {
         let due = self.due.get_mut(usize::from(node))?;
         let node = self.nodes.get_mut(usize::from(node))?;
         node.apart &= !(1 << slot);

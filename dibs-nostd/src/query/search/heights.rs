@@ -11,14 +11,14 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 
 /// Slots of the cache. Neighbouring vertices have rows close together; the last bits of a row select the slot.
-const PLACES: usize = 128;
+const SLOTS: usize = 128;
 
 /// No vertex has this row.
-const NOBODY: u32 = u32::MAX;
+const NO_VERTEX: u32 = u32::MAX;
 /// No triangle represents the vertex yet.
-const NONE: u32 = u32::MAX;
+const NO_TRIANGLE: u32 = u32::MAX;
 /// The vertex needs no representative triangle: a lower vertex is next to it.
-const SETTLED: u32 = u32::MAX - 1;
+const NOT_LOWEST: u32 = u32::MAX - 1;
 
 /// A vertex as seen from the axis.
 #[derive(Clone, Copy)]
@@ -29,38 +29,38 @@ pub(super) struct Vertex {
     pub position: Vec3,
     /// The shortest vector from the axis.
     pub towards: Vec3,
-    /// The representative: a triangle whose lowest corner it is, or [`NONE`], or [`SETTLED`].
+    /// The representative: a triangle whose lowest corner it is, or [`NO_TRIANGLE`], or [`NOT_LOWEST`].
     standing: u32,
 }
 
 impl Vertex {
     const UNSEEN: Self = Self {
-        row: NOBODY,
+        row: NO_VERTEX,
         square: f32::INFINITY,
         position: Vec3::ZERO,
         towards: Vec3::ZERO,
-        standing: NONE,
+        standing: NO_TRIANGLE,
     };
 
     /// The triangle that represents the vertex, until a lower vertex is seen next to it.
     #[inline(always)]
     pub const fn standing(&self) -> Option<u32> {
-        if self.standing < SETTLED { Some(self.standing) } else { None }
+        if self.standing < NOT_LOWEST { Some(self.standing) } else { None }
     }
 }
 
 /// A vertex's slot in the cache.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct Place(usize);
+pub(super) struct CacheSlot(usize);
 
-impl Place {
+impl CacheSlot {
     /// The slot of a vertex, unless another corner of its triangle occupies it.
     const fn of(row: u32) -> Self {
-        Self(row as usize % PLACES)
+        Self(row as usize % SLOTS)
     }
 
     const fn next(self) -> Self {
-        Self((self.0 + 1) % PLACES)
+        Self((self.0 + 1) % SLOTS)
     }
 
     /// Three different slots for a triangle's corners.
@@ -81,7 +81,7 @@ impl Place {
     }
 
     pub fn all() -> impl Iterator<Item = Self> {
-        (0..PLACES).map(Self)
+        (0..SLOTS).map(Self)
     }
 }
 
@@ -89,14 +89,14 @@ impl Place {
 pub(super) struct Heights {
     /// Only triangles with this label are considered.
     part: Option<u8>,
-    places: [Vertex; PLACES],
+    places: [Vertex; SLOTS],
     /// Vertices evicted while a triangle represented them: at most one for each corner of a triangle.
     lost: Vec<Vertex, 3>,
 }
 
 impl Heights {
     pub const fn new(part: Option<u8>) -> Self {
-        Self { part, places: [Vertex::UNSEEN; PLACES], lost: Vec::new() }
+        Self { part, places: [Vertex::UNSEEN; SLOTS], lost: Vec::new() }
     }
 
     /// Whether triangles are left out.
@@ -112,21 +112,21 @@ impl Heights {
     }
 
     #[inline(always)]
-    pub const fn at(&self, Place(at): Place) -> &Vertex {
-        &self.places[at % PLACES]
+    pub const fn at(&self, CacheSlot(at): CacheSlot) -> &Vertex {
+        &self.places[at % SLOTS]
     }
 
     /// Notes that a lower vertex is next to this one.
     #[inline(always)]
-    pub fn settle(&mut self, Place(at): Place) {
-        self.places[at % PLACES].standing = SETTLED;
+    pub fn settle(&mut self, CacheSlot(at): CacheSlot) {
+        self.places[at % SLOTS].standing = NOT_LOWEST;
     }
 
     /// Makes a triangle represent this vertex, its lowest corner, if none does.
     #[inline(always)]
-    pub fn stand(&mut self, Place(at): Place, triangle: u32) {
-        let vertex = &mut self.places[at % PLACES];
-        if vertex.standing == NONE {
+    pub fn stand(&mut self, CacheSlot(at): CacheSlot, triangle: u32) {
+        let vertex = &mut self.places[at % SLOTS];
+        if vertex.standing == NO_TRIANGLE {
             vertex.standing = triangle;
         }
     }
@@ -162,8 +162,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         &self,
         heights: &mut Heights,
         [a, b, c]: [u32; 3],
-    ) -> Result<[Place; 3], QueryError> {
-        let [first, second, third] = Place::of_corners([a, b, c]);
+    ) -> Result<[CacheSlot; 3], QueryError> {
+        let [first, second, third] = CacheSlot::of_corners([a, b, c]);
         self.look(heights, first, a)?;
         self.look(heights, second, b)?;
         self.look(heights, third, c)?;
@@ -172,8 +172,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     /// Loads a vertex, unless it is in its slot.
     #[inline(always)]
-    fn look(&self, heights: &mut Heights, Place(at): Place, row: u32) -> Result<(), QueryError> {
-        let vertex = &mut heights.places[at % PLACES];
+    fn look(
+        &self,
+        heights: &mut Heights,
+        CacheSlot(at): CacheSlot,
+        row: u32,
+    ) -> Result<(), QueryError> {
+        let vertex = &mut heights.places[at % SLOTS];
         if vertex.row == row {
             return Ok(());
         }
@@ -183,14 +188,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let position = self.position(row)?;
         let towards = self.tool.axis_to(position);
         let square = finite(row, towards.dot(towards))?;
-        *vertex = Vertex { row, square, position, towards, standing: NONE };
+        *vertex = Vertex { row, square, position, towards, standing: NO_TRIANGLE };
         Ok(())
     }
 
     /// The distance of a vertex from the axis.
     #[inline(always)]
     pub(super) fn height(&self, heights: &Heights, row: u32) -> Result<f32, QueryError> {
-        let vertex = heights.at(Place::of(row));
+        let vertex = heights.at(CacheSlot::of(row));
         if vertex.row == row {
             return Ok(vertex.square);
         }
@@ -210,10 +215,10 @@ mod tests {
 
     #[test]
     fn no_two_corners_of_a_triangle_have_one_place() {
-        let near = || (0..6).chain(PLACES as u32 - 3..PLACES as u32 + 3);
+        let near = || (0..6).chain(SLOTS as u32 - 3..SLOTS as u32 + 3);
         for (a, b) in near().flat_map(|a| near().map(move |b| (a, b))) {
             for c in near() {
-                let [first, second, third] = Place::of_corners([a, b, c]);
+                let [first, second, third] = CacheSlot::of_corners([a, b, c]);
                 assert!(first != second && second != third && third != first, "{a} {b} {c}");
             }
         }

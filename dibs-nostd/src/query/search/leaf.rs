@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Search, Step, ties};
+use super::{Expansion, Search, ties};
 use crate::math::sqrt::sqrt;
 use crate::query::corners::positions;
 use crate::query::plane::{Plane, least};
@@ -17,16 +17,16 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Tests a leaf that is nearer than all waiting subtrees: its vertices against one plane; then each triangle, from
     /// the first that the plane does not reject, against the same plane and its own.
     #[inline(always)]
-    pub(super) fn leaf(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+    pub(super) fn leaf(&mut self, first: u32, count: u32) -> Result<Expansion, QueryError> {
         if self.meter.node().is_none() {
-            return Ok(Step::OutOfBudget);
+            return Ok(Expansion::OutOfBudget);
         }
         let corrupt = QueryError::Corrupt { row: first };
         let [corner, ..] = self.tree.triangle(first).ok_or(corrupt)?;
         let patch_plane = self.plane_towards(self.position(corner)?);
         let beyond = patch_plane.beyond(self.tree, self.vertices, first, count).ok_or(corrupt)?;
         if beyond == count {
-            return Ok(Step::Done);
+            return Ok(Expansion::Done);
         }
         let tree = self.tree;
         let (first, count) = (first + beyond, count - beyond);
@@ -36,7 +36,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 continue;
             }
             if self.meter.triangle_plane().is_none() {
-                return Ok(Step::OutOfBudget);
+                return Ok(Expansion::OutOfBudget);
             }
             let [a, b, c] = corners;
             let [a, b, c] = [self.position(a)?, self.position(b)?, self.position(c)?];
@@ -54,7 +54,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             self.meter.spare_triangle();
             self.test_triangle(triangle, &[a, b, c]);
         }
-        Ok(Step::Done)
+        Ok(Expansion::Done)
     }
 
     #[inline(always)]

@@ -13,7 +13,7 @@
 use glam::Vec3;
 
 use super::Search;
-use super::heights::{Heights, Place, Vertex};
+use super::heights::{CacheSlot, Heights, Vertex};
 use crate::tool::{AxisPair, SLIVER, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
@@ -26,7 +26,7 @@ const FLAT: f32 = 1.0 / 256.0;
 
 /// A triangle as seen from the axis.
 struct Seen {
-    lowest: Place,
+    lowest: CacheSlot,
     /// Lower bound on the square of its distance.
     low: f32,
     /// Whether and where it may be lower than its lowest corner.
@@ -134,7 +134,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     #[inline(always)]
     fn see(&self, rows: [u32; 3], ridge: f32, heights: &mut Heights) -> Result<Seen, QueryError> {
         let [a, b, c] = self.places(heights, rows)?;
-        let is_below = |one: Place, other: Place| {
+        let is_below = |one: CacheSlot, other: CacheSlot| {
             let (one, other) = (heights.at(one), heights.at(other));
             one.square < other.square || one.square == other.square && one.row < other.row
         };
@@ -148,7 +148,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         heights.settle(next);
         heights.settle(last);
         let &Vertex { square, position, towards, .. } = heights.at(lowest);
-        let rise = |to: Place| towards.dot(heights.at(to).position - position);
+        let rise = |to: CacheSlot| towards.dot(heights.at(to).position - position);
         let (along, across) = (rise(next), rise(last));
         let least = if along < across { along } else { across };
         if least >= self.tilt_slack {

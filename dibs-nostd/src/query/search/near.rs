@@ -1,6 +1,6 @@
 //! All locally lowest triangles within a distance, instead of the closest.
 
-use super::heights::{Heights, Place};
+use super::heights::{CacheSlot, Heights};
 use super::low::MAX_RING;
 use super::meter::Meter;
 use super::node::RANGE;
@@ -124,7 +124,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         heights: &Heights,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
-        for place in Place::all() {
+        for place in CacheSlot::all() {
             let vertex = heights.at(place);
             if vertex.standing().is_some() && !self.visit_standing(vertex, heights, visit)? {
                 return Ok(false);

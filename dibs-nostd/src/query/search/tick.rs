@@ -13,12 +13,12 @@ use glam::Vec3;
 
 use facing::Facing;
 
-use super::{Search, Step, Waiting};
+use super::{Expansion, Search, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
 use crate::query::made::Tests;
 use crate::query::memory::clock::{Deadline, MotionClock};
-use crate::query::memory::front::{FrontMut, NOWHERE, Place, UNUSED};
+use crate::query::memory::front::{ChildSlot, FrontMut, NOWHERE, UNUSED};
 use crate::surface::motion::FAR;
 use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
@@ -87,7 +87,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let now = self.clock.deadline(0.0);
             for row in 0..=self.search.tree.header().other_roots {
                 let root = self.search.tree.record(row).ok_or(corrupt)?;
-                let nowhere = Place { node: NOWHERE, slot: 0 };
+                let nowhere = ChildSlot { node: NOWHERE, slot: 0 };
                 if self.front.open(root.link, nowhere, now).is_none() {
                     self.front.clear();
                     return Ok(Outcome::Full { tests: Tests::NONE });
@@ -149,19 +149,19 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     }
 
     #[inline(always)]
-    fn deadline_of(&mut self, place: Place) -> Option<&mut Deadline> {
+    fn deadline_of(&mut self, place: ChildSlot) -> Option<&mut Deadline> {
         self.front.node(place.node)?.deadlines.get_mut(usize::from(place.slot))
     }
 
     /// Tests the due bounds below an opened node, and opens the children within the cutoff.
     fn visit(&mut self, at: u16) -> Result<Visit, QueryError> {
-        if let Step::OutOfBudget = self.test_due(at)? {
+        if let Expansion::OutOfBudget = self.test_due(at)? {
             return Ok(Visit::OutOfBudget);
         }
         while let Some(top) = self.search.waiting.checked_sub(1) {
             let corrupt = QueryError::Corrupt { row: top as u32 };
             let &Waiting { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;
-            let place = Place::from_word(word);
+            let place = ChildSlot::from_word(word);
             if lower > self.search.cutoff {
                 self.search.waiting = top;
                 self.front.put_back(place).ok_or(corrupt)?;
@@ -173,7 +173,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 return Ok(Visit::Full);
             };
             self.search.waiting = top;
-            if let Step::OutOfBudget = self.test_due(opened)? {
+            if let Expansion::OutOfBudget = self.test_due(opened)? {
                 return Ok(Visit::OutOfBudget);
             }
         }
@@ -181,7 +181,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     }
 
     #[inline(always)]
-    fn record(&mut self, place: Place) -> Option<Node> {
+    fn record(&mut self, place: ChildSlot) -> Option<Node> {
         match Link::decode(self.front.node(place.node)?.link) {
             Link::Children { first, count } if u32::from(place.slot) < count => {
                 self.search.tree.whole_record(first + u32::from(place.slot))
@@ -193,19 +193,19 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     fn put_back_waiting(&mut self) -> Option<()> {
         while let Some(top) = self.search.waiting.checked_sub(1) {
             self.search.waiting = top;
-            self.front.put_back(Place::from_word(self.search.stack.get(top)?.link))?;
+            self.front.put_back(ChildSlot::from_word(self.search.stack.get(top)?.link))?;
         }
         Some(())
     }
 
     /// Tests the due children of an opened node.
-    fn test_due(&mut self, at: u16) -> Result<Step, QueryError> {
+    fn test_due(&mut self, at: u16) -> Result<Expansion, QueryError> {
         let corrupt = QueryError::Corrupt { row: u32::from(at) };
         let threshold = self.threshold();
         let opened = self.front.node(at).ok_or(corrupt)?;
         let (step, count) = match Link::decode(opened.link) {
             // A free slot becomes due after `FAR` units of motion; it is rescheduled.
-            _ if opened.link == UNUSED => (Step::Done, 0),
+            _ if opened.link == UNUSED => (Expansion::Done, 0),
             Link::Children { first, count } => {
                 let due = opened.due(count, threshold);
                 (self.test_children(at, first, due)?, count)
@@ -220,7 +220,12 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     }
 
     #[inline(always)]
-    fn test_children(&mut self, at: u16, first: u32, mut due: u32) -> Result<Step, QueryError> {
+    fn test_children(
+        &mut self,
+        at: u16,
+        first: u32,
+        mut due: u32,
+    ) -> Result<Expansion, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         let base = self.search.waiting;
         let (clock, margin) = (self.clock, self.margin);
@@ -232,7 +237,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let node = tree.whole_record(first + u32::from(slot)).ok_or(corrupt)?;
             let due = opened.deadlines.get_mut(usize::from(slot)).ok_or(corrupt)?;
             if search.meter.node().is_none() {
-                return Ok(Step::OutOfBudget);
+                return Ok(Expansion::OutOfBudget);
             }
             let position = search.position(node.pin)?;
             let normal = search.tool.axis_to(position);
@@ -254,17 +259,22 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 }
             }
             opened.apart |= 1 << slot;
-            let link = Place { node: at, slot }.to_word();
+            let link = ChildSlot { node: at, slot }.to_word();
             search.push(base, Waiting { lower: own, link }).ok_or(corrupt)?;
         }
-        Ok(Step::Done)
+        Ok(Expansion::Done)
     }
 
     #[inline(always)]
-    fn test_triangles(&mut self, at: u16, first: u32, mut due: u32) -> Result<Step, QueryError> {
+    fn test_triangles(
+        &mut self,
+        at: u16,
+        first: u32,
+        mut due: u32,
+    ) -> Result<Expansion, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         while let Some(slot) = next(&mut due) {
-            let (triangle, place) = (first + u32::from(slot), Place { node: at, slot });
+            let (triangle, place) = (first + u32::from(slot), ChildSlot { node: at, slot });
             if triangle == self.search.best_triangle {
                 self.front.node(at).ok_or(corrupt)?.apart |= 1 << slot;
                 *self.front.best = Some(place);
@@ -272,7 +282,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             }
             let search = &mut self.search;
             if search.meter.triangle_plane().is_none() {
-                return Ok(Step::OutOfBudget);
+                return Ok(Expansion::OutOfBudget);
             }
             let corners = search.corners(triangle)?;
             let facing = self.facing.lowest(&corners);
@@ -291,7 +301,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             let deadline = self.deadline(bound);
             *self.deadline_of(place).ok_or(corrupt)? = deadline;
         }
-        Ok(Step::Done)
+        Ok(Expansion::Done)
     }
 
     /// Tests a triangle against its own plane, then exactly. Returns a bound; none if it is the closest so far.
@@ -299,7 +309,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         &mut self,
         triangle: u32,
         corners: &[Vec3; 3],
-        place: Place,
+        place: ChildSlot,
     ) -> Result<Option<f32>, QueryError> {
         let (bound, is_closest) = self.search.bound_triangle(triangle, corners)?;
         if !is_closest {
@@ -328,7 +338,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 return Ok(());
             }
             let opened = self.front.node(at).ok_or(corrupt)?;
-            let place = Place { node: opened.parent, slot: opened.slot };
+            let place = ChildSlot { node: opened.parent, slot: opened.slot };
             let node = self.record(place).ok_or(corrupt)?;
             let distance =
                 sqrt(self.search.tool.axis_distance_squared(self.search.position(node.pin)?));

@@ -13,7 +13,7 @@ mod order;
 
 use glam::Vec4;
 
-use super::{Search, Step, Waiting};
+use super::{Expansion, Search, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::math::vec3x4::{Vec3x4, roots};
 use crate::tree::format::several::four_nodes;
@@ -78,7 +78,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
                     self.search.leaf_at_once(first, count)
                 }
             };
-            if matches!(step?, Step::OutOfBudget) {
+            if matches!(step?, Expansion::OutOfBudget) {
                 self.search.leave_unfinished();
                 return self.search.finish(self.search.least_waiting(lower));
             }
@@ -88,19 +88,19 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
 
     /// Tests the children of the subtrees on top of the stack.
     #[inline(never)]
-    fn expand_batch(&mut self) -> Result<Step, QueryError> {
+    fn expand_batch(&mut self) -> Result<Expansion, QueryError> {
         let corrupt = QueryError::Corrupt { row: self.search.waiting as u32 };
         let (subtrees, children) = self.take().ok_or(corrupt)?;
         // A batch is never split, so that a query with more budget takes the same steps, then more.
         if self.search.meter.nodes(children as u32).is_none() {
-            return Ok(Step::OutOfBudget);
+            return Ok(Expansion::OutOfBudget);
         }
         self.search.waiting -= subtrees;
         self.measure(children).ok_or(corrupt)?;
         let (near, leaves) = self.judge(children).ok_or(corrupt)?;
         let near = self.reject_leaves(near, leaves).ok_or(corrupt)?;
         self.push(near).ok_or(corrupt)?;
-        Ok(Step::Done)
+        Ok(Expansion::Done)
     }
 
     /// Copies the children of the nearest subtrees, as many as the stack has room for. Returns the numbers of subtrees

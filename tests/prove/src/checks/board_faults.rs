@@ -6,7 +6,7 @@ use anyhow::Result;
 use xtask::steps::Outcome;
 
 use super::host_faults::tell;
-use crate::faults::{Place, Record};
+use crate::faults::{Machine, Record};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::FAULTS, note};
 use crate::harness::{Check, Effort};
@@ -43,7 +43,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "bus")?;
     let record = Record::measure(
         effort.board_faults,
-        Place::Board(&program),
+        Machine::Board(&program),
         effort.is_record,
         effort.size(),
     )?;

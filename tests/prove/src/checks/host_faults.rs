@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use xtask::steps::Outcome;
 use xtask::workspace;
 
-use crate::faults::{self, Place, Record};
+use crate::faults::{self, Machine, Record};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::FAULTS, note};
 use crate::harness::{Check, Effort};
@@ -39,7 +39,7 @@ pub const CHECK: Check = Check {
 };
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let record = Record::measure(effort.faults, Place::Here, effort.is_record, effort.size())?;
+    let record = Record::measure(effort.faults, Machine::Here, effort.is_record, effort.size())?;
     tell(&record, "faults", "faults.json", effort, figures)
 }
 

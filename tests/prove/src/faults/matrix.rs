@@ -29,14 +29,14 @@ const PATIENCE: u32 = 20;
 
 /// Where the receivers run.
 #[derive(Clone, Copy)]
-pub enum Place<'p> {
+pub enum Machine<'p> {
     /// In this process.
     Here,
     /// On the emulated board, in this program.
     Board(&'p Path),
 }
 
-impl Place<'_> {
+impl Machine<'_> {
     /// Starts a receiver, and calls `work` with it.
     fn with<M: Mac>(self, mac: M, work: impl FnOnce(&mut dyn Receiver)) {
         match self {
@@ -51,11 +51,11 @@ impl Place<'_> {
 }
 
 /// Runs all kinds of faults.
-pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
+pub fn run(per_fault: u64, seed: u64, place: Machine<'_>) -> Result<Vec<Row>> {
     // Covers every way to send, even with few faults.
     let of_one = match place {
-        Place::Here => CHUNK.min(per_fault.div_ceil(WAYS)),
-        Place::Board(_) => per_fault.div_ceil(WAYS),
+        Machine::Here => CHUNK.min(per_fault.div_ceil(WAYS)),
+        Machine::Board(_) => per_fault.div_ceil(WAYS),
     };
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} faults  {msg}")?;
     let bar = ProgressBar::new(per_fault * Fault::ALL.len() as u64).with_style(style);
@@ -82,7 +82,7 @@ pub fn run(per_fault: u64, seed: u64, place: Place<'_>) -> Result<Vec<Row>> {
 }
 
 /// Some faults of one kind, with each way of sending in turn.
-fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Row {
+fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Machine<'_>) -> Row {
     let case = Case {
         quantised: chunk & 1 == 0,
         partial: chunk & 2 == 0,
@@ -110,7 +110,7 @@ fn life(fault: Fault, count: u64, chunk: u64, seed: u64, place: Place<'_>) -> Ro
 
 /// One sender, and its receivers.
 struct Life<'p, M> {
-    place: Place<'p>,
+    place: Machine<'p>,
     source: Source<M>,
     keyed_mac: fn(u64) -> M,
     log: Log,
@@ -130,7 +130,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
         case: Case,
         seed: u64,
         keyed_mac: fn(u64) -> M,
-        place: Place<'p>,
+        place: Machine<'p>,
     ) -> Row {
         let mut rng = Rng::with_seed(seed);
         // Sessions wrap.
@@ -141,7 +141,7 @@ impl<'p, M: Mac + 'static> Life<'p, M> {
             keyed_mac,
             log: Log::default(),
             injector: Injector::new(seed),
-            is_stream: rng.bool() || matches!(place, Place::Board(_)),
+            is_stream: rng.bool() || matches!(place, Machine::Board(_)),
             rng,
             case,
             session,

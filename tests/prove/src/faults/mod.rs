@@ -8,6 +8,6 @@ mod row;
 mod sizes;
 mod subject;
 
-pub use matrix::Place;
+pub use matrix::Machine;
 pub use record::Record;
 pub use row::Row;

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use dibs_stream::faults::Fault;
 use serde::Serialize;
 
-use super::{Place, Row, corruption, matrix, sizes};
+use super::{Machine, Row, corruption, matrix, sizes};
 use crate::harness::run::Run;
 
 /// First of the seeds.
@@ -40,16 +40,16 @@ impl Record {
     /// the sizes of frames.
     pub fn measure(
         per_fault: u64,
-        place: Place<'_>,
+        place: Machine<'_>,
         everything: bool,
         size: String,
     ) -> Result<Self> {
         let matrix = matrix::run(per_fault, SEED, place)?;
         matrix.iter().for_each(|row| println!("{row}"));
         let (corruption, sizes) = match (place, everything) {
-            (Place::Board(_), _) => (Vec::new(), Vec::new()),
-            (Place::Here, true) => (corruption::run(SEED)?, sizes::run()?),
-            (Place::Here, false) => (corruption::smoke(SEED)?, Vec::new()),
+            (Machine::Board(_), _) => (Vec::new(), Vec::new()),
+            (Machine::Here, true) => (corruption::run(SEED)?, sizes::run()?),
+            (Machine::Here, false) => (corruption::smoke(SEED)?, Vec::new()),
         };
         corruption.iter().for_each(|row| println!("{row}"));
         sizes.iter().for_each(|row| println!("{row}"));

@@ -6,7 +6,7 @@ use super::{WideSearch, next};
 use crate::math::vec3x4::{Vec3x4, roots};
 use crate::query::plane::Plane;
 use crate::query::search::leaf::THIRD;
-use crate::query::search::{Search, Step};
+use crate::query::search::{Expansion, Search};
 use crate::tree::format::{Link, Node, whole_node};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
@@ -35,9 +35,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// As [`Search::leaf`], but tests four triangles at a time, from the first that the plane does not reject, each
     /// against its own plane only.
     #[inline(always)]
-    pub(super) fn leaf_at_once(&mut self, first: u32, count: u32) -> Result<Step, QueryError> {
+    pub(super) fn leaf_at_once(&mut self, first: u32, count: u32) -> Result<Expansion, QueryError> {
         if self.meter.node().is_none() {
-            return Ok(Step::OutOfBudget);
+            return Ok(Expansion::OutOfBudget);
         }
         let corrupt = QueryError::Corrupt { row: first };
         let (tree, vertices) = (self.tree, self.vertices);
@@ -45,14 +45,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let plane = self.plane_towards(self.position(corner)?);
         let within = plane.vertices_within(tree, vertices, first, count).ok_or(corrupt)?;
         if within == 0 {
-            return Ok(Step::Done);
+            return Ok(Expansion::Done);
         }
         // From the third vertex on, each is the last corner of a triangle, and the triangles before it are beyond the
         // plane.
         let beyond = within.trailing_zeros().saturating_sub(2);
         let (mut first, mut count) = (first + beyond, count.saturating_sub(beyond));
         if self.meter.nodes(count).is_none() {
-            return Ok(Step::OutOfBudget);
+            return Ok(Expansion::OutOfBudget);
         }
         while count > 0 {
             let [a, b, c] = tree.four_triangles(first, count).ok_or(corrupt)?;
@@ -60,24 +60,24 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let within = self.within_own_planes(corners(a)?, corners(b)?, corners(c)?);
             let mut within = u64::from(within) & !(u64::MAX << count);
             while let Some(at) = next(&mut within) {
-                if let Step::OutOfBudget = self.triangle(first + at as u32)? {
-                    return Ok(Step::OutOfBudget);
+                if let Expansion::OutOfBudget = self.triangle(first + at as u32)? {
+                    return Ok(Expansion::OutOfBudget);
                 }
             }
             first += 4;
             count = count.saturating_sub(4);
         }
-        Ok(Step::Done)
+        Ok(Expansion::Done)
     }
 
     /// Tests a triangle if the budget suffices.
     #[inline(always)]
-    fn triangle(&mut self, triangle: u32) -> Result<Step, QueryError> {
+    fn triangle(&mut self, triangle: u32) -> Result<Expansion, QueryError> {
         if triangle == self.best_triangle {
-            return Ok(Step::Done);
+            return Ok(Expansion::Done);
         }
         if self.meter.triangle().is_none() {
-            return Ok(Step::OutOfBudget);
+            return Ok(Expansion::OutOfBudget);
         }
         let corners = self.corners(triangle)?;
         let [a, b, c] = corners;
@@ -86,7 +86,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             return Err(QueryError::Position { vertex: self.not_finite(triangle) });
         }
         self.test_triangle(triangle, &corners);
-        Ok(Step::Done)
+        Ok(Expansion::Done)
     }
 
     /// The set of those of four triangles that are not beyond their plane towards the corners' mean.

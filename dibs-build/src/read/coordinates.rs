@@ -20,14 +20,14 @@ type Result<T> = std::result::Result<T, ReadErrorKind>;
 
 /// The conversion of a file's coordinates to a mesh's.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct FileCoordinates {
     /// The unit of the file's lengths.
     pub unit: Unit,
     /// The mesh's origin, in millimetres in the file's coordinates.
     pub origin: DVec3,
 }
 
-impl Place {
+impl FileCoordinates {
     /// Converts a position of the file, without rounding it.
     pub fn of(&self, position: [f64; 3]) -> DVec3 {
         DVec3::from(position) * self.unit.millimetres() - self.origin

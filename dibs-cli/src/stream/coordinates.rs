@@ -12,7 +12,7 @@ const AXES: [[char; 2]; 3] = [['R', 'L'], ['A', 'P'], ['S', 'I']];
 
 /// The conversion of a source's positions to the tree's.
 #[derive(Clone)]
-pub struct Place {
+pub struct SourceCoordinates {
     pub unit: Option<Unit>,
     pub axes: Option<Axes>,
     pub origin: DVec3,
@@ -23,7 +23,7 @@ pub struct Place {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes([(usize, f64); 3]);
 
-impl Place {
+impl SourceCoordinates {
     /// Converts a frame in the mesh's order, and in the source's unit and axes, to the tree's.
     ///
     /// # Errors
@@ -107,7 +107,7 @@ impl FromStr for Axes {
 
 #[cfg(test)]
 mod tests {
-    use super::{Axes, Place};
+    use super::{Axes, SourceCoordinates};
     use dibs_build::generate::heart;
     use dibs_build::glam::{DQuat, DVec3};
     use dibs_build::{Builder, Unit};
@@ -124,7 +124,8 @@ mod tests {
         for axes in [None, Some("RAS:LPS"), Some("ALS:PIR"), Some("RAS:RAI")] {
             let axes = axes.map(|axes| axes.parse().expect("axes"));
             let origin = DVec3::new(300.0, -20.0, 1000.0);
-            let place = Place { unit: Some(Unit::Metre), axes, origin, order: order.clone() };
+            let place =
+                SourceCoordinates { unit: Some(Unit::Metre), axes, origin, order: order.clone() };
             let placed = |point: DVec3| {
                 let turned =
                     axes.map_or(point.to_array(), |axes: Axes| axes.turn(point.to_array()));
@@ -137,7 +138,7 @@ mod tests {
                 assert!(moved.abs_diff_eq(truth, 1e-2), "{moved} {truth} {axes:?}");
             }
         }
-        let place = Place { unit: None, axes: None, origin: DVec3::ZERO, order };
+        let place = SourceCoordinates { unit: None, axes: None, origin: DVec3::ZERO, order };
         assert!(place.pose(&rotation, DVec3::splat(1e30)).is_err());
     }
 
