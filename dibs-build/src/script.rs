@@ -345,6 +345,7 @@ mod tests {
         for folder in ["src", "../dibs-nostd/src"] {
             read_all(&crates.join(folder), &mut sentences);
         }
+        assert!(sentences.contains("--unit {"));
         for unit in Unit::ALL {
             sentences += &format!(" --unit {unit} ");
             let call = of_script(format!("--unit {unit}"));

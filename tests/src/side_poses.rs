@@ -202,7 +202,7 @@ impl Tally {
             Side::Crossing if pair.axis_distance <= accuracy => return,
             // The answer's own distance is within its accuracy, so the true one may be a little above: then the whole
             // axis is inside, as deep as the answer says.
-            Side::Crossing if pair.axis_distance <= accuracy + own.min(accuracy) => true,
+            Side::Crossing if own <= accuracy && pair.axis_distance <= own + accuracy => true,
             Side::Crossing => {
                 self.wrong += 1;
                 println!("{name}: {tool:?} does not cross, {pair:?}, {found:?}");

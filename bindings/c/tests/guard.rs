@@ -410,7 +410,10 @@ pub fn cause(cause: Unavailable) -> u32 {
     match cause {
         Unavailable::NoSurface => 300,
         Unavailable::Unacknowledged => 318,
+        Unavailable::CorruptTree => 106,
         Unavailable::Stale { .. } => 301,
+        Unavailable::LinkLost { .. } => 302,
+        Unavailable::Rejections { .. } => 304,
         Unavailable::Delayed { .. } => 305,
         Unavailable::NoDirection => 308,
         Unavailable::CutShort => 309,

@@ -32,9 +32,11 @@ fn misuse_is_a_code_under_the_sanitizers() {
 /// A code and the cause without a parameter that it stands for have one sentence.
 fn causes_read_as_in_rust(said: &str) {
     use dibs_nostd::Unavailable::{
-        CutShort, NoDirection, NoPose, NoSide, NoSurface, NotFinite, Unacknowledged,
+        CorruptTree, CutShort, NoDirection, NoPose, NoSide, NoSurface, NotFinite, Unacknowledged,
     };
-    for cause in [NoSurface, Unacknowledged, NoDirection, CutShort, NotFinite, NoSide, NoPose] {
+    let causes =
+        [NoSurface, Unacknowledged, CorruptTree, NoDirection, CutShort, NotFinite, NoSide, NoPose];
+    for cause in causes {
         let row = format!("{} {cause}", crate::guard::cause(cause));
         assert!(said.lines().any(|line| line == row), "{row}");
     }

@@ -52,7 +52,7 @@ fn the_receiver_in_cpp_answers_once_it_is_acknowledged() {
     receiver.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut receiver = receiver.spawn().expect("it starts");
     let mut keys = receiver.stdin.take().expect("piped");
-    let lines = BufReader::new(receiver.stdout.take().expect("piped")).lines();
+    let mut lines = BufReader::new(receiver.stdout.take().expect("piped")).lines();
     let (start, is_over) = (Instant::now(), AtomicBool::new(false));
     let said: Vec<String> = thread::scope(|scope| {
         scope.spawn(|| {
@@ -67,7 +67,8 @@ fn the_receiver_in_cpp_answers_once_it_is_acknowledged() {
             }
         });
         let mut said: Vec<String> = Vec::new();
-        for line in lines.map_while(Result::ok) {
+        // Its output stays open until it ends.
+        for line in lines.by_ref().map_while(Result::ok) {
             if line.contains("not acknowledged") {
                 keys.write_all(b"\n").expect("it listens");
             }
@@ -76,10 +77,10 @@ fn the_receiver_in_cpp_answers_once_it_is_acknowledged() {
                 break;
             }
         }
+        drop(keys);
         is_over.store(true, Ordering::Relaxed);
         said
     });
-    drop(keys);
     assert!(receiver.wait().expect("it ends").success());
     let [first, .., last] = &said[..] else { panic!("{said:?}") };
     assert!(first.starts_with("held: "), "{said:?}");

@@ -237,7 +237,7 @@ impl Placed {
     }
 
     /// The searched surface and the answer for the moved tool, in world coordinates.
-    pub(super) fn to_world(
+    pub(super) fn in_world(
         &self,
         tool: &impl Tool,
         tracked: Result<TrackerAnswer, QueryError>,

@@ -270,7 +270,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
                     }),
                 };
                 match placed {
-                    Some(placed) => placed.to_world(tool, tracked, searched),
+                    Some(placed) => placed.in_world(tool, tracked, searched),
                     None => (Some(searched), tracked.map_err(Unavailable::Query)),
                 }
             }

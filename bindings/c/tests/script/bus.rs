@@ -138,8 +138,8 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
             let admitted = found.and_then(|found| verdict.admit(found));
             let force = wall.force(&admitted, Vec3::new(10.0, -20.0, 5.0));
 
-            let cause = verdict.cause.map_or(0, |cause| cause_code(&cause));
-            let outcome = admitted.as_ref().err().map_or(0, cause_code);
+            let cause = verdict.cause.map_or(0, crate::guard::cause);
+            let outcome = admitted.err().map_or(0, crate::guard::cause);
             let state = match verdict.state {
                 State::Nominal => 0,
                 State::Degraded => 1,
@@ -180,17 +180,6 @@ fn code(error: &ReceiveError) -> u32 {
         ReceiveError::Digest { .. } => 415,
         ReceiveError::Stretch(StretchError::Exceeded { .. })
         | ReceiveError::Refused { cause: wire::Event::Stretch, .. } => 311,
-        other => panic!("{other:?}"),
-    }
-}
-
-fn cause_code(cause: &Unavailable) -> u32 {
-    match cause {
-        Unavailable::NoSurface => 300,
-        Unavailable::Unacknowledged => 318,
-        Unavailable::Stale { .. } => 301,
-        Unavailable::LinkLost { .. } => 302,
-        Unavailable::Rejections { .. } => 304,
         other => panic!("{other:?}"),
     }
 }

@@ -93,6 +93,7 @@ impl Igtl {
             number: 0,
             heard,
             has_message: false,
+            was_heard: false,
         })
     }
 
@@ -105,7 +106,7 @@ impl Igtl {
             let mut peer = match self.peer.take() {
                 Some(peer) => peer,
                 None => {
-                    let peer = self.door.next(self.heard, self.number > 0)?;
+                    let peer = self.door.next(self.heard, self.was_heard)?;
                     self.exchange.connected();
                     self.delay = Delay::new();
                     self.topology.forget();
@@ -116,7 +117,7 @@ impl Igtl {
             match self.message(&mut peer) {
                 Ok(parsed) => {
                     self.peer = Some(peer);
-                    (self.heard, self.has_message) = (Instant::now(), true);
+                    (self.heard, self.has_message, self.was_heard) = (Instant::now(), true, true);
                     if parsed.is_some() {
                         return Ok(parsed);
                     }
@@ -130,7 +131,10 @@ impl Igtl {
                     continue;
                 }
             }
-            if !self.has_message {
+            if self.has_message {
+                // A server that was silent before it ended has the whole time to come back.
+                self.heard = Instant::now();
+            } else {
                 self.door.pause(self.heard)?;
             }
         }

@@ -101,7 +101,7 @@ impl Door {
     }
 
     /// The next connection: to a server within the user's time limit from `since` on; from a client at any time.
-    /// `has_ended` is for the error: whether the server sent frames before.
+    /// `has_ended` is for the error: whether the server sent messages before.
     pub fn next(&mut self, since: Instant, has_ended: bool) -> Result<Peer> {
         loop {
             let made = match self {

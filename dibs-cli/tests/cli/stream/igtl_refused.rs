@@ -197,6 +197,30 @@ fn a_server_that_ends_for_good_ends_the_bridge() {
     assert_eq!(totals["frames"], 3);
 }
 
+/// The time to come back begins when a connection ends, also where the server was silent before.
+#[test]
+fn a_server_that_was_silent_has_the_whole_time_to_come_back() {
+    let folder = heart();
+    let folder = folder.path();
+    let (frames, _) = organ(folder);
+    let server = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = server.local_addr().unwrap();
+    let line = format!("--from igtl:{address} --motion-rate 200 --retry 1");
+    let (seen, output, _) = bridged_to(folder, &line, Duration::MAX, move || {
+        let mut peer = accepted(&server);
+        peer.write_all(&message(1, "NDARRAY", "", &array(&frames[0]))).unwrap();
+        thread::sleep(Duration::from_millis(1_500));
+        drop((peer, server));
+        // Long enough for several refused connections.
+        thread::sleep(Duration::from_millis(300));
+        let mut peer = accepted(&TcpListener::bind(address).unwrap());
+        peer.write_all(&message(1, "NDARRAY", "", &array(&frames[1]))).unwrap();
+    });
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("ended, and cannot be reached again within 1 s"), "{error}");
+    assert_eq!(seen.published, 2, "{error}");
+}
+
 #[test]
 fn what_no_source_is_is_one_sentence() {
     let folder = heart();

@@ -208,7 +208,8 @@ pub(super) const SIDE_OF_POINT: &[Fact] = &[
 const ROUGH: &str = "let above = rough.of(rows)?;";
 const FINE: &str = "let above = fine.of(again)?;";
 
-/// Of the exact comparison in a precision: the end of its functions' names, of its facts' names, and the line that starts it.
+/// Facts of the side's exact comparison, in f32 or f64: how the names of its functions end, how those of the facts end, and
+/// the line that starts it.
 macro_rules! exact {
     ($of:literal, $in:literal, $start:ident) => {
         &[

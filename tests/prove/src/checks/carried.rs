@@ -25,7 +25,7 @@ pub const CHECK: Check = Check {
             says: "No answer on a surface that nodes carry is off by more than its accuracy",
             criterion: EDGES,
             bound: Bound::Is(0.0),
-            unit: "of {carried.queries} queries, {carried.signed} of them with the side; the largest error was {carried.off} of \
+            unit: "of {carried.queries} queries, {carried.signed} of them with the side; the largest error without it was {carried.off} of \
                    the accuracy",
             limits: "Spheres and capsules, with the built and the measured stretch, wide, with the side, and tracked. Truth in f64, \
                      from the mesh's own vertices, without the rounding of weights, by exhaustive search and winding numbers. \
