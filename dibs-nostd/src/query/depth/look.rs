@@ -36,7 +36,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             }
         }
         if let Some(row) = row {
-            let sample = self.look(*parts.sample(row), EXACT)?;
+            let sample = self.look(parts.sample(row), EXACT)?;
             parts.set_sample(row, sample);
         }
         Ok(())
@@ -49,7 +49,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let Some(searched) = self.searched() else { return Ok(()) };
         match parts.row_of(searched) {
             Some(row) => {
-                let sample = self.look(*parts.sample(row), EXACT)?;
+                let sample = self.look(parts.sample(row), EXACT)?;
                 parts.set_sample(row, sample);
             }
             None => self.end_search(),

@@ -155,8 +155,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     fn keep(&mut self, parts: &mut Parts, deepest: f32) {
         let Some(searched) = self.searched() else { return };
         while parts.count() > Points::MOST && parts.join([deepest, searched], f32::INFINITY) {}
-        let point = |&Part { ref from, bound, .. }: &Part| {
-            let &Sample { parameter, depth, triangle, .. } = from;
+        let point = |Part { from, bound, .. }: Part| {
+            let Sample { parameter, depth, triangle, .. } = from;
             Some(Point { parameter, depth, bound, triangle: triangle? })
         };
         if let Some(Remembered { points, .. }) = &mut self.remembered {
@@ -215,18 +215,18 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             };
             let is_open = |sample: &Sample| sample.fit == Fit::Closest && sample.depth > enough;
             if self.remembered.is_some()
-                && let Some(end) = ends.into_iter().find(|&row| is_open(parts.sample(row)))
+                && let Some(end) = ends.into_iter().find(|&row| is_open(&parts.sample(row)))
             {
                 if self.looks >= LOOKS || self.is_spent() {
                     return Ok(bound);
                 }
-                let sample = self.look(*parts.sample(end), enough)?;
+                let sample = self.look(parts.sample(end), enough)?;
                 parts.set_sample(end, sample);
                 self.renew(parts, row, enough);
                 continue;
             }
             let Some(place) = self.room(parts, enough) else { return Ok(bound) };
-            let (from, to) = (*parts.sample(row), *parts.sample(next));
+            let (from, to) = (parts.sample(row), parts.sample(next));
             let is_nearer = split - from.along < to.along - split;
             let ends = if is_nearer { [&from, &to] } else { [&to, &from] };
             let mut middle = self.between(split, ends, enough)?;

@@ -1,7 +1,6 @@
 //! Parts of the axis, and the bounds on the depth in them.
 
 use glam::Vec3;
-use heapless::Vec;
 
 use super::touches::{Free, Touches};
 use crate::TriangleRow;
@@ -193,8 +192,10 @@ impl Bound {
 
 /// The parts of the axis in a list from its start, in row 0, to its end.
 pub(super) struct Parts {
-    /// Parts refer to each other by row.
-    rows: Vec<Part, POINTS>,
+    /// No vector: parts refer to each other by row.
+    rows: [Part; POINTS],
+    /// Rows from here on are unused.
+    end: usize,
     /// Row of a part that was joined to the one before it.
     free: Option<usize>,
     count: usize,
@@ -202,7 +203,7 @@ pub(super) struct Parts {
 
 impl Parts {
     pub fn new() -> Self {
-        Self { rows: Vec::new(), free: None, count: 0 }
+        Self { rows: [Part::NONE; POINTS], end: 0, free: None, count: 0 }
     }
 
     /// Number of parts, the empty one at the end included.
@@ -212,21 +213,21 @@ impl Parts {
 
     /// The row of the next part to be pushed, if there is room.
     pub fn free(&self) -> Option<usize> {
-        self.free.or((!self.rows.is_full()).then_some(self.rows.len()))
+        self.free.or((self.end < POINTS).then_some(self.end))
     }
 
     pub fn push(&mut self, part: Part) {
-        match self.free.take() {
-            Some(row) => self.set(row, part),
-            None if self.rows.is_full() => return,
-            None => drop(self.rows.push(part)),
+        let Some(row) = self.free() else { return };
+        if self.free.take().is_none() {
+            self.end += 1;
         }
         self.count += 1;
+        self.set(row, part);
     }
 
     /// Makes the last row the empty part at the axis' end.
     pub fn end(&mut self) {
-        if let Some(last) = self.rows.last_mut() {
+        if let Some(last) = self.end.checked_sub(1).and_then(|last| self.rows.get_mut(last)) {
             (last.next, last.bound) = (0, 0.0);
         }
     }
@@ -245,22 +246,21 @@ impl Parts {
             let length = self.sample(right.next).along - left.from.along;
             let bound = larger(left.bound, right.bound);
             if length < least && bound <= enough && !kept.contains(&right.from.parameter) {
-                (least, joined) = (length, Some((row, right.next, bound)));
+                (least, joined) = (length, Some((row, Part { next: right.next, bound, ..left })));
             }
             row = left.next;
         }
-        let Some((row, next, bound)) = joined else { return false };
-        let Some(left) = self.rows.get_mut(row) else { return false };
-        let free = left.next;
-        (left.next, left.bound) = (next, bound);
+        let Some((row, part)) = joined else { return false };
+        let free = self.part(row).next;
         self.set(free, Part { bound: f32::NEG_INFINITY, ..Part::NONE });
+        self.set(row, part);
         self.free = Some(free);
         self.count -= 1;
         true
     }
 
-    fn part(&self, row: usize) -> &Part {
-        self.rows.get(row).unwrap_or(&Part::NONE)
+    fn part(&self, row: usize) -> Part {
+        self.rows.get(row).copied().unwrap_or(Part::NONE)
     }
 
     pub fn set(&mut self, row: usize, part: Part) {
@@ -272,7 +272,7 @@ impl Parts {
     /// The row of the part with the highest bound.
     pub fn highest(&self) -> usize {
         let (mut highest, mut bound) = (0, f32::NEG_INFINITY);
-        for (row, part) in self.rows.iter().enumerate() {
+        for (row, part) in self.rows.iter().enumerate().take(self.end) {
             if part.bound > bound {
                 (highest, bound) = (row, part.bound);
             }
@@ -287,22 +287,17 @@ impl Parts {
 
     /// The row of the sample with a parameter.
     pub fn row_of(&self, parameter: f32) -> Option<usize> {
-        self.rows.iter().position(|part| part.from.parameter == parameter)
+        self.rows.iter().take(self.end).position(|part| part.from.parameter == parameter)
     }
 
     /// The sample at a part's start.
-    pub fn sample(&self, row: usize) -> &Sample {
-        &self.part(row).from
-    }
-
-    /// The same, to be changed.
-    pub fn sample_mut(&mut self, row: usize) -> Option<&mut Sample> {
-        self.rows.get_mut(row).map(|part| &mut part.from)
+    pub fn sample(&self, row: usize) -> Sample {
+        self.part(row).from
     }
 
     pub fn set_sample(&mut self, row: usize, sample: Sample) {
-        if let Some(place) = self.sample_mut(row) {
-            *place = sample;
+        if let Some(part) = self.rows.get_mut(row) {
+            part.from = sample;
         }
     }
 
@@ -322,7 +317,7 @@ impl Parts {
     }
 
     /// The parts from the axis' start to its end.
-    pub fn in_order(&self) -> impl Iterator<Item = &Part> {
+    pub fn in_order(&self) -> impl Iterator<Item = Part> {
         let mut row = 0;
         (0..self.count).map(move |_| {
             let part = self.part(row);

@@ -13,21 +13,23 @@ const STEPS: u32 = 4;
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Reads the corners of a remembered sample's triangle.
     pub(super) fn place(&self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
-        if let Some(sample) = parts.sample_mut(row)
-            && let (Fit::Remembered, Some(TriangleRow(row))) = (sample.fit, sample.triangle)
-        {
+        let mut sample = parts.sample(row);
+        if let (Fit::Remembered, Some(TriangleRow(row))) = (sample.fit, sample.triangle) {
             let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
             (sample.corners, sample.fit) = (self.corners(corners)?, Fit::Near);
         }
+        parts.set_sample(row, sample);
         Ok(())
     }
 
     /// Moves a remembered sample's triangle to neighbours that are closer now.
     pub(super) fn walk(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
-        match parts.sample_mut(row) {
-            Some(sample) if sample.fit < Fit::Closest => self.descend(sample, 0.0),
-            _ => Ok(()),
+        let mut sample = parts.sample(row);
+        if sample.fit < Fit::Closest {
+            self.descend(&mut sample, 0.0)?;
+            parts.set_sample(row, sample);
         }
+        Ok(())
     }
 
     /// Moves a sample's triangle to closer neighbours, until none is closer or the distance is within `enough`.
