@@ -9,7 +9,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
     Advance, Assembler, Capsule, Frames, Millis, Options, Progress, Query, ReceiveError,
-    StretchError, SurfaceLimits, Tree, Unavailable, wire,
+    StretchError, SurfaceLimits, Tree, wire,
 };
 
 use super::print::Line;

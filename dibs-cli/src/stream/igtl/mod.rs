@@ -52,10 +52,12 @@ pub struct Igtl {
     body: Vec<u8>,
     /// Number of the next message with positions, from 0.
     number: usize,
-    /// Time of the last complete message, or of the start.
+    /// Time of the last complete message, of the end of a connection that brought one, or of the start.
     heard: Instant,
     /// Whether a message has arrived on this connection.
     has_message: bool,
+    /// Whether any connection brought a message.
+    was_heard: bool,
 }
 
 /// Largest size of a message with poses: of more than a thousand instruments.
