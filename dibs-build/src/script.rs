@@ -333,7 +333,7 @@ mod tests {
             compiled!(.unit(Unit::Inch)),
             compiled!(.unit(Unit::Micrometre)),
         ];
-        // A sentence may leave out what a call or a field is given.
+        // A sentence may name a call or a field without its argument or value.
         for end in ["(", ": "] {
             let short = |text: &String| text.split_once(end).map(|(name, _)| name.to_owned());
             let shorts: Vec<String> = compiled.iter().filter_map(short).collect();

@@ -341,7 +341,9 @@ fn is_cut(closest: &Proximity, tool: &LocalTool) -> bool {
     match closest.side {
         Side::Undefined(NoSide::CutShort) => true,
         // The default accuracy of a depth.
-        Side::Inside | Side::Crossing => width > (length / 512.0).max(33.0 * closest.accuracy),
+        Side::Inside | Side::Crossing | Side::Either => {
+            width > (length / 512.0).max(33.0 * closest.accuracy)
+        }
         _ => !(width <= 0.0),
     }
 }

@@ -166,13 +166,14 @@ pub fn judge(surface: &Closed, seed: u64) -> Tally {
         };
         let found = found.expect("an answer");
         let pair = exhaustive(&rows, &triangles, &tool).expect("has triangles");
-        tally.judge(surface.name, &rows, &triangles, &tool, &pair, &found);
+        let _ = tally.judge(surface.name, &rows, &triangles, &tool, &pair, &found);
     }
     tally
 }
 
 impl Tally {
-    /// Judges an answer about a tool whose closest pair is known; prints it if it is wrong.
+    /// Judges an answer about a tool whose closest pair is known; prints it if it is wrong. Returns the error of an answer
+    /// that has an interval, relative to its accuracy; infinity if the side is wrong.
     ///
     /// # Panics
     /// If a side is undefined for another reason than the accuracy.
@@ -184,55 +185,59 @@ impl Tally {
         tool: &Instrument,
         pair: &OraclePair,
         found: &Proximity,
-    ) {
+    ) -> Option<f64> {
         self.poses += 1;
         if pair.axis_distance == 0.0 {
             assert!(
                 matches!(found.side, Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)),
                 "{name}: {tool:?} {found:?}"
             );
-            return;
+            return None;
         }
         self.away += usize::from(pair.axis_distance > 0.01);
         let (accuracy, own) = (f64::from(found.accuracy), f64::from(found.axis_distance));
         let says = match found.side {
-            Side::Outside => false,
-            Side::Inside => true,
+            Side::Outside => Some(false),
+            Side::Inside => Some(true),
+            Side::Either => None,
             // Depths of an axis that crosses are the subject of another test.
-            Side::Crossing if pair.axis_distance <= accuracy => return,
+            Side::Crossing if pair.axis_distance <= accuracy => return None,
             // The answer's own distance is within its accuracy, so the true one may be a little above: then the whole
             // axis is inside, as deep as the answer says.
-            Side::Crossing if own <= accuracy && pair.axis_distance <= own + accuracy => true,
+            Side::Crossing if own <= accuracy && pair.axis_distance <= own + accuracy => Some(true),
             Side::Crossing => {
                 self.wrong += 1;
                 println!("{name}: {tool:?} does not cross, {pair:?}, {found:?}");
-                return;
+                return Some(f64::INFINITY);
             }
             Side::Undefined(reason) => {
                 assert_eq!(reason, NoSide::BelowAccuracy, "{name}: {tool:?}");
                 self.undefined += 1;
                 self.undefined_away += usize::from(pair.axis_distance > 0.01);
-                return;
+                return None;
             }
             other => panic!("{other:?}"),
         };
         let winds_around = sides::is_inside(rows, triangles, pair.on_axis);
         let mut inside = winds_around.unwrap_or_default();
-        if winds_around != Some(says) && sides::is_cut(rows, triangles, pair) {
+        let agrees = |inside: bool| says.is_none_or(|says| says == inside);
+        let is_doubtful = winds_around.is_none_or(|inside| !agrees(inside));
+        if is_doubtful && sides::is_cut(rows, triangles, pair) {
             inside = sides::is_below(rows, triangles, pair);
             self.self_cut += 1;
         }
         self.inside += usize::from(inside);
         let off = off(rows, triangles, tool, pair, inside, found);
         let is_off = off > accuracy;
-        if inside == says && inside && is_off && sides::is_cut_along(rows, triangles, tool, CUTS) {
+        if agrees(inside) && inside && is_off && sides::is_cut_along(rows, triangles, tool, CUTS) {
             self.self_cut += 1;
-            return;
+            return None;
         }
-        if inside != says || is_off {
+        if !agrees(inside) || is_off {
             self.wrong += 1;
             println!("{name}: {tool:?} inside: {inside}, off {off}, {found:?}");
         }
+        Some(if agrees(inside) { off / accuracy } else { f64::INFINITY })
     }
 }
 

@@ -3,7 +3,7 @@
 const element = (id) => document.getElementById(id);
 
 // What is called touching is outside still: the axis is, the instrument's body overlaps.
-const WORDS = { outside: "outside", inside: "inside", crossing: "crossing", undefined: "side undefined" };
+const WORDS = { outside: "outside", inside: "inside", crossing: "crossing", undefined: "side undefined", either: "in or out" };
 
 export class Numbers {
   constructor(facts, session) {

@@ -2,7 +2,7 @@
 
 const COVERAGES = ["measured", "proven"];
 
-export const SIDES = ["outside", "inside", "crossing", "undefined"];
+export const SIDES = ["outside", "inside", "crossing", "undefined", "either"];
 
 export function record(session, facts) {
   const numbers = session.answer();

@@ -64,7 +64,7 @@ impl Page {
     }
 
     /// The last answer, in this order: separation, lower, accuracy, the interval's ends, coverage (1 proven, 0
-    /// measured: every frame was), side (0 outside, 1 inside, 2 crossing, 3 undefined),
+    /// measured: every frame was), side (0 outside, 1 inside, 2 crossing, 3 undefined, 4 either),
     /// axis distance, point on surface, point on tool, direction, axis parameter, triangle, barycentric, stretch, node
     /// tests, triangle tests.
     #[must_use]
@@ -79,6 +79,7 @@ impl Page {
             Side::Outside => 0.0,
             Side::Inside => 1.0,
             Side::Crossing => 2.0,
+            Side::Either => 4.0,
             _ => 3.0,
         });
         numbers.push(found.axis_distance.into());

@@ -120,10 +120,12 @@ pub enum dibs_side {
     CutShort = 8,
     /// No side: the closest point is on an edge of more than two triangles that do not form pairs.
     NonManifold = 9,
+    /// Of a tracker's kept answer: outside or not, its interval holds the separation.
+    Either = 10,
 }
 
 /// Each side with its number.
-const SIDES: [(dibs_side, Side); 10] = [
+const SIDES: [(dibs_side, Side); 11] = [
     (dibs_side::Outside, Side::Outside),
     (dibs_side::Inside, Side::Inside),
     (dibs_side::Crossing, Side::Crossing),
@@ -134,6 +136,7 @@ const SIDES: [(dibs_side, Side); 10] = [
     (dibs_side::Degenerate, Side::Undefined(NoSide::Degenerate)),
     (dibs_side::CutShort, Side::Undefined(NoSide::CutShort)),
     (dibs_side::NonManifold, Side::Undefined(NoSide::NonManifold)),
+    (dibs_side::Either, Side::Either),
 ];
 
 /// How it is known that the tree's spheres cover the surface, so that no part of it is nearer than the answer.

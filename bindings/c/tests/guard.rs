@@ -430,6 +430,7 @@ fn side(side: Side) -> u32 {
         Side::Outside => 0,
         Side::Inside => 1,
         Side::Crossing => 2,
+        Side::Either => 10,
         Side::Undefined(NoSide::NotAsked) => 3,
         Side::Undefined(NoSide::BelowAccuracy) => 6,
         other => panic!("{other:?}"),

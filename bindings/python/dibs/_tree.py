@@ -42,6 +42,8 @@ class Side(IntEnum):
     INSIDE = 1
     CROSSING = 2
     UNDEFINED = 3
+    EITHER = 4
+    """Of a tracker's kept answer: outside or not, its interval holds the separation."""
 
 
 class Coverage(IntEnum):

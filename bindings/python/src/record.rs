@@ -73,6 +73,7 @@ pub fn push_answer(out: &mut Vec<u8>, found: &Proximity, tree: &Owned, pair: [us
         Side::Outside => (0, 0),
         Side::Inside => (1, 0),
         Side::Crossing => (2, 0),
+        Side::Either => (4, 0),
         Side::Undefined(reason) => {
             let number = REASONS.iter().position(|&other| other == reason);
             (3, number.map_or(0, |number| number as u8 + 1))

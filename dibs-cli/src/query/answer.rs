@@ -40,6 +40,7 @@ pub fn side_name(side: Side) -> (&'static str, Option<String>) {
         Side::Outside => ("outside", None),
         Side::Inside => ("inside", None),
         Side::Crossing => ("crossing", None),
+        Side::Either => ("either", None),
         // The text includes the remedy.
         Side::Undefined(NoSide::NoAdjacency) => {
             ("undefined", Some(QueryError::NoAdjacency.to_string()))

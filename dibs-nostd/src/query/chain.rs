@@ -356,8 +356,10 @@ impl Scene {
     fn add(&mut self, surface: usize, tool: usize, found: Proximity, own: &mut Option<Proximity>) {
         self.is_entered = true;
         self.options = self.options.after(found.tests());
-        let side = found.side;
-        if matches!(side, Side::Inside | Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)) {
+        if matches!(
+            found.side,
+            Side::Inside | Side::Crossing | Side::Either | Side::Undefined(NoSide::BelowAccuracy)
+        ) {
             self.is_outside = false;
         }
         if own.is_none_or(|own| found.separation < own.separation) {

@@ -26,8 +26,12 @@ pub enum Side {
     Outside,
     /// The whole axis is inside, of the solid with the least separation.
     Inside,
-    /// The axis crosses the surface of that solid.
+    /// The axis crosses the surface of that solid, or is inside and within twice the accuracy of it. A tracker's
+    /// [kept answer](crate::TrackerAnswer::is_kept) may also mean that the whole axis is inside.
     Crossing,
+    /// Only of a tracker's [kept answer](crate::TrackerAnswer::is_kept): outside or not, its interval holds the
+    /// separation.
+    Either,
     /// Not known. Separations are computed as for a tool outside.
     Undefined(NoSide),
 }

@@ -391,6 +391,7 @@ fn side(side: Side) -> u32 {
         Side::Outside => 0,
         Side::Inside => 1,
         Side::Crossing => 2,
+        Side::Either => 10,
         Side::Undefined(reason) => match reason {
             NoSide::NotAsked => 3,
             NoSide::NoAdjacency => 4,

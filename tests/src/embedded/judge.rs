@@ -3,25 +3,16 @@
 
 use std::ops::AddAssign;
 
-use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::Nodes;
-use dibs_nostd::{
-    Capsule, MovingSurface, Odometer, Options, Proximity, Query, QueryError, Sphere, Tool, Tracker,
-    Tree,
-};
 use fastrand::Rng;
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
+use super::answers::answer;
 use super::receiver::{Memory, Receiver};
-use super::shapes::barycentric;
-use super::{
-    Carried, NodeMotion, Section, exact, nudged, pulled, rest, rows, sections, stretch_of,
-};
+use super::{Carried, NodeMotion, Section, exact, nudged, pulled, rest, sections, stretch_of};
 use crate::climb::climb;
 use crate::deform::unit;
-use crate::oracle::{Instrument, exhaustive};
-use crate::poses::pose;
-use crate::{ask, side_poses, surfaces};
+use crate::side_poses;
 
 /// Counts of what was searched, and of failures.
 #[derive(Clone, Copy, Default, Debug)]
@@ -94,7 +85,7 @@ pub fn judge(shape: &Carried, seed: u64) -> Tally {
 }
 
 /// A frame to climb from: at rest, moved, or pulled along a direction nearly up to the limit.
-fn start(nodes: &Nodes<'_>, along: Vec3, rng: &mut Rng) -> Vec<Vec3> {
+pub(super) fn start(nodes: &Nodes<'_>, along: Vec3, rng: &mut Rng) -> Vec<Vec3> {
     match rng.u32(..4) {
         0 => rest(nodes),
         1 => NodeMotion::ALL[rng.usize(..NodeMotion::ALL.len())].apply(nodes, rng),
@@ -112,7 +103,7 @@ fn start(nodes: &Nodes<'_>, along: Vec3, rng: &mut Rng) -> Vec<Vec3> {
 }
 
 /// The size of a change of a node that changes an element as much as its limit allows, or more.
-fn reach(nodes: &Nodes<'_>) -> f32 {
+pub(super) fn reach(nodes: &Nodes<'_>) -> f32 {
     let [a, b, ..] = nodes.element(0).expect("has elements");
     let at = |node| nodes.rest_position(node).expect("in the table");
     at(a).distance(at(b))
@@ -179,187 +170,4 @@ fn admit(shape: &Carried, nodes: &Nodes<'_>, seed: u64, tally: &mut Tally, rng: 
     };
     let change = |frame: &Vec<Vec3>| nudged(nodes, frame, &all, reach(nodes), rng);
     let _ = climb(from, 40, change, score);
-}
-
-/// A tool beside a frame.
-#[derive(Clone)]
-struct Asked {
-    frame: Vec<Vec3>,
-    tool: Instrument,
-}
-
-/// Climbs towards an answer that is off by more than its accuracy, of every kind of query, one after another.
-fn answer(
-    shape: &Carried,
-    tree: &Tree<'_, u16>,
-    nodes: &Nodes<'_>,
-    seed: u64,
-    tally: &mut Tally,
-    rng: &mut Rng,
-) {
-    let truth = Truth::new(shape, tree, nodes);
-    let all: Vec<u32> = (0..nodes.count()).collect();
-    let frame = start(nodes, unit(rng), rng);
-    let positions = rows(&nodes.surface(frame.as_slice()));
-    let mut tool = pose(&positions, &truth.triangles, rng);
-    if rng.bool() {
-        let from = side_poses::point(&positions, &truth.triangles, rng);
-        tool = Instrument { start: from, end: from + (tool.end - tool.start), ..tool };
-    }
-    let is_signed = rng.bool() && is_closed(&truth.triangles);
-    let mut machine = Machine::new(tree, nodes, &frame, is_signed);
-    let score = |asked: &Asked| machine.ask(shape, &truth, asked, seed, tally);
-    let change = |asked: &Asked| {
-        let mut next = asked.clone();
-        let by = unit(rng) * 30.0 * 10.0_f32.powf(-6.0 * rng.f32());
-        let is_sphere = asked.tool.start == asked.tool.end;
-        match rng.u32(..4) {
-            0 => next.frame = nudged(nodes, &asked.frame, &all, reach(nodes), rng),
-            1 => next.tool.end += by,
-            2 if is_sphere => next.tool = Instrument::sphere(asked.tool.start + by, rng.f32()),
-            2 => next.tool.start += by,
-            _ => {
-                next.tool.start += by;
-                next.tool.end += by;
-            }
-        }
-        next
-    };
-    let _ = climb(Asked { frame, tool }, 300, change, score);
-}
-
-/// The vertices as the nodes move them, in f64: by the barycentric coordinates of the mesh's own vertices, without the
-/// rounding of the stored weights.
-struct Truth {
-    triangles: Vec<[u32; 3]>,
-    places: Vec<([u32; 4], [f64; 4])>,
-}
-
-impl Truth {
-    fn new(shape: &Carried, tree: &Tree<'_, u16>, nodes: &Nodes<'_>) -> Self {
-        let place = |row| {
-            let number = tree.vertex_number(row).expect("has an order").0;
-            let corners = nodes.weights(row).expect("in the table").map(|(node, _)| node);
-            let at_rest = corners.map(|node| nodes.rest_position(node).expect("in the table"));
-            let at = shape.mesh.positions[number as usize].as_dvec3();
-            (corners, barycentric(at_rest.map(Vec3::as_dvec3), at))
-        };
-        let places = (0..nodes.vertex_count()).map(place).collect();
-        Self { triangles: surfaces::triangles(tree), places }
-    }
-
-    fn at(&self, frame: &[Vec3]) -> Vec<DVec3> {
-        let blend = |(corners, weights): &([u32; 4], [f64; 4])| {
-            let terms = corners.iter().zip(weights);
-            terms.map(|(&node, weight)| frame[node as usize].as_dvec3() * weight).sum()
-        };
-        self.places.iter().map(blend).collect()
-    }
-}
-
-/// Everything that answers: a query, and a tracker with its odometer.
-struct Machine<'n, 't> {
-    nodes: &'n Nodes<'t>,
-    /// Whether the query and the tracker are asked for the side.
-    is_signed: bool,
-    query: Query<'t, u16, MAX_STACK>,
-    tracker: Tracker<'t, u16, MAX_STACK, 96>,
-    odometer: Odometer,
-    before: Vec<Vec3>,
-}
-
-impl<'n, 't> Machine<'n, 't> {
-    fn new(tree: &Tree<'t, u16>, nodes: &'n Nodes<'t>, frame: &[Vec3], is_signed: bool) -> Self {
-        let mut odometer = nodes.odometer();
-        let _ = odometer.start(frame);
-        Self {
-            nodes,
-            is_signed,
-            query: Query::new(tree).expect("deep enough"),
-            tracker: Tracker::new(tree).expect("deep enough"),
-            odometer,
-            before: frame.to_vec(),
-        }
-    }
-
-    /// Asks every kind of query. Returns the largest error relative to its accuracy; `None` for a refused frame.
-    fn ask(
-        &mut self,
-        shape: &Carried,
-        truth: &Truth,
-        Asked { frame, tool }: &Asked,
-        seed: u64,
-        tally: &mut Tally,
-    ) -> Option<f64> {
-        let measured = self.nodes.measure(frame.as_slice()).ok()?;
-        let step = self.odometer.step(self.before.as_slice(), frame.as_slice());
-        let moved = step.after();
-        let surface = self.nodes.surface(&moved);
-        let positions = truth.at(frame);
-        let pair = exhaustive(&positions, &truth.triangles, tool).expect("has triangles");
-        let warm = Options::new().stretch(measured);
-        let last = if self.is_signed { warm } else { warm.unsigned() };
-        let [asked, tracked] = if tool.start == tool.end {
-            let sphere = Sphere::new(tool.start, tool.radius).expect("valid");
-            follow(&mut self.query, &mut self.tracker, &surface, &sphere, &last)
-        } else {
-            let capsule = Capsule::new(tool.start, tool.end, tool.radius).expect("valid");
-            follow(&mut self.query, &mut self.tracker, &surface, &capsule, &last)
-        };
-        let query = &mut self.query;
-        let answers = [
-            ("with the limit", false, ask::closest(query, &surface, tool, &Options::cold())),
-            ("measured", false, ask::closest(query, &surface, tool, &warm)),
-            ("wide", false, ask::closest_wide(query, &surface, tool, &warm)),
-            ("asked", self.is_signed, asked),
-            ("tracked", self.is_signed, tracked),
-        ];
-        let mut worst = 0.0_f64;
-        for (kind, is_signed, answer) in answers {
-            tally.queries += 1;
-            match answer {
-                Ok(found) if is_signed => {
-                    let sides = &mut tally.sides;
-                    sides.judge(shape.name, &positions, &truth.triangles, tool, &pair, &found);
-                }
-                Ok(found) => {
-                    let error = (pair.separation - f64::from(found.separation)).abs();
-                    let part = error / f64::from(found.accuracy);
-                    worst = worst.max(part);
-                    // Written so that NaN is wrong.
-                    if !(part <= 1.0) {
-                        tally.wrong += 1;
-                        println!("{} {seed}: {kind}: {part} of {found:?} {tool:?}", shape.name);
-                    }
-                }
-                Err(error) => {
-                    tally.wrong += 1;
-                    println!("{} {seed}: {kind}: {error} {tool:?}", shape.name);
-                }
-            }
-        }
-        tally.off = tally.off.max(worst);
-        self.before.clone_from(frame);
-        Some(worst)
-    }
-}
-
-/// The answers of a query and of a tracker.
-fn follow<'t, S: MovingSurface, T: Tool>(
-    query: &mut Query<'t, u16, MAX_STACK>,
-    tracker: &mut Tracker<'t, u16, MAX_STACK, 96>,
-    surface: &S,
-    tool: &T,
-    options: &Options,
-) -> [Result<Proximity, QueryError>; 2] {
-    let asked = query.closest(surface, tool, options);
-    [asked, tracker.closest(surface, tool, options).map(|answer| answer.closest)]
-}
-
-/// Whether each edge has a triangle on either side.
-fn is_closed(triangles: &[[u32; 3]]) -> bool {
-    let edges = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
-    let mut all: Vec<[u32; 2]> = triangles.iter().flat_map(edges).collect();
-    all.sort_unstable();
-    all.iter().all(|&[from, to]| all.binary_search(&[to, from]).is_ok())
 }

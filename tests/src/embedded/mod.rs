@@ -1,5 +1,6 @@
 //! Surfaces that a volume moves: volumes, motions of their nodes, their stretch in f64, and climbing towards failures.
 
+mod answers;
 mod judge;
 mod motions;
 mod receiver;

@@ -12,7 +12,7 @@ use dibs_nostd::{Capsule, Odometer, Options, Proximity, Query, Side, Sphere, Tra
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::sides;
-use dibs_tests::surfaces::{ball, cuboid, sheet};
+use dibs_tests::surfaces::{ball, cuboid, joined, sheet};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -31,16 +31,6 @@ fn block(low: [f32; 3], high: [f32; 3]) -> Mesh {
 fn turned(mut mesh: Mesh) -> Mesh {
     mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
     mesh
-}
-
-fn joined(parts: &[Mesh]) -> Mesh {
-    let mut all = Mesh::default();
-    for part in parts {
-        let first = all.positions.len() as u32;
-        all.positions.extend(&part.positions);
-        all.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| v + first)));
-    }
-    all
 }
 
 /// Parts, and the number of cavities at their end, all in the first part.

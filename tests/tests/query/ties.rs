@@ -9,12 +9,13 @@
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, WindingError, check_winding, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Capsule, NoSide, Odometer, Options, Proximity, Query, Side, Sphere, Tool, Tracker, Tree,
+    Budget, Capsule, ConstraintState, ForbiddenRegion, NoSide, Odometer, Options, Proximity, Query,
+    Side, Sphere, SpringDamper, Tool, Tracker, Tree,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::sides::{is_inside, winding_number};
-use dibs_tests::surfaces::{ball, cuboid, triangles};
+use dibs_tests::surfaces::{ball, cuboid, joined, triangles};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
@@ -93,16 +94,6 @@ fn star() -> Mesh {
         *position *= [0.4, 1.5, 0.9, 1.0, 0.7][number % 5];
     }
     star
-}
-
-fn joined(parts: &[Mesh]) -> Mesh {
-    let mut all = Mesh::default();
-    for part in parts {
-        let first = all.positions.len() as u32;
-        all.positions.extend(&part.positions);
-        all.triangles.extend(part.triangles.iter().map(|corners| corners.map(|v| v + first)));
-    }
-    all
 }
 
 /// Two cubes that share the vertices of an edge.
@@ -431,6 +422,38 @@ fn a_collapsed_vessel_has_no_inside() {
         assert!((found.separation - 19.0).abs() < 1e-3, "{found:?}");
         assert!(found.direction.dot(Vec3::Z * at.z.signum()) > 0.999);
         assert_eq!(ask(1e-5, at).side, Side::Outside);
+    }
+}
+
+/// A tracker that comes there from beside the rim moved far enough to be on either side: it says so, and its interval
+/// holds both, on which a wall acts.
+#[test]
+fn a_kept_answer_above_a_collapsed_vessel_may_be_on_either_side() {
+    let built = build(&block(Vec3::ZERO, Vec3::new(100.0, 100.0, 2.0)));
+    let tree = built.tree::<u16>().expect("valid");
+    let flat = block(Vec3::ZERO, Vec3::new(100.0, 100.0, 0.0));
+    let rows = built.to_rows(&flat.positions);
+    let surface = Odometer::new(&tree).start(rows.as_slice());
+    let spring = SpringDamper::stiffness(1.0).max_force(50.0);
+    let wall = ForbiddenRegion::new(spring, 5.0).expect("a valid margin");
+    // A step too short to reach the inside keeps the side.
+    for (x, height, side) in [(0.5, 0.5, Side::Outside), (49.0, 20.0, Side::Either)] {
+        let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("deep enough");
+        let mut ask = |at: Vec3| {
+            let tool = Sphere::new(at, 1.0).expect("valid");
+            tracker.closest(&surface, &tool, &Options::new()).expect("an answer")
+        };
+        let beside = ask(Vec3::new(-5.0, 30.0, 1.0)).closest;
+        assert_eq!(beside.side, Side::Outside, "{beside:?}");
+        let found = ask(Vec3::new(x, 30.0, height));
+        let at = found.closest;
+        assert!(found.is_kept && at.side == side, "{x}: {at:?}");
+        let lowest = if side == Side::Outside { height } else { -height };
+        let [low, high] = [lowest, height].map(|on_axis| on_axis - 1.0);
+        assert!((at.lower - low).abs() < 1e-3 && (at.separation - high).abs() < 1e-3, "{at:?}");
+        let force = wall.force(&Ok(at), Vec3::ZERO);
+        assert_eq!(force.state, ConstraintState::Active, "{at:?}");
+        assert!((force.force.length() - (5.0 - low)).abs() < 0.01, "{force:?}");
     }
 }
 

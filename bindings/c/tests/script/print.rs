@@ -89,6 +89,7 @@ fn side(side: Side) -> u32 {
         Side::Outside => 0,
         Side::Inside => 1,
         Side::Crossing => 2,
+        Side::Either => 10,
         Side::Undefined(NoSide::OpenBoundary) => 5,
         Side::Undefined(NoSide::BelowAccuracy) => 6,
         Side::Undefined(NoSide::Degenerate) => 7,

@@ -194,7 +194,8 @@ impl<const LABELS: usize> Filter<LABELS> {
 
     /// The same with a budget: the instructions of all queries of a tick, by a [`Cost`]; 200,000 of a Cortex-M7 by
     /// default. If it runs out, motions that are not verified are not admitted. The next tick's searches continue where
-    /// they stopped.
+    /// they stopped. It must have the cost's base (some 2,000) for each pair: a pair that is never searched has no answer,
+    /// and then no motion is admitted.
     #[must_use]
     pub const fn budget(self, instructions: u32, cost: Cost) -> Self {
         Self { instructions, cost, ..self }

@@ -93,7 +93,7 @@ impl Found {
 /// `is_outside` at the start of its path needs no side later: it would have to touch the surface first.
 fn distance(found: &Proximity, radius: f32, is_outside: bool) -> f32 {
     let lower = match found.side {
-        Side::Outside | Side::Inside | Side::Crossing => found.lower,
+        Side::Outside | Side::Inside | Side::Crossing | Side::Either => found.lower,
         // Without a solid there is no inside.
         Side::Undefined(
             NoSide::OpenBoundary | NoSide::NonManifold | NoSide::NoAdjacency | NoSide::NotAsked,

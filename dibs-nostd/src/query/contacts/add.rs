@@ -101,7 +101,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let mut own =
             pair.contact(closest).filter(|at| at.separation <= margin && is_of(at.triangle));
         let mut spent = Tests::NONE;
-        if matches!(closest.side, Side::Inside | Side::Crossing)
+        if matches!(closest.side, Side::Inside | Side::Crossing | Side::Either)
             && let Some(contact) = &mut own
         {
             (contact.across, spent) = pair.across(contact, stack, options)?;
@@ -117,7 +117,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let limit = tool.radius() + margin + ridge;
         let Found { complete, beyond, tests: mut made } =
             find(basins, stack, options, limit, ridge)?;
-        let is_crossing = closest.side == Side::Crossing;
+        let is_crossing = matches!(closest.side, Side::Crossing | Side::Either);
         let has_crossing = is_crossing && own.is_some();
         if let Some(contact) = own.filter(|_| is_crossing) {
             found.insert(contact);

@@ -156,7 +156,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
                 }
                 found.side = if nearest > 0.0 { Side::Inside } else { Side::Crossing };
             } else {
-                found.side = Side::Crossing;
+                found.side = Side::Either;
             }
             self.take_pair(vertices, tool, options, found, &last)?;
         }

@@ -100,7 +100,7 @@ fn untried(rows: &[Row]) -> String {
     if all.is_empty() {
         return "Every fact has queries that execute what it limits.".to_owned();
     }
-    format!("No traced query executes what these facts limit: {}.", all.join("; "))
+    format!("No traced query executes the code that these facts limit: {}.", all.join("; "))
 }
 
 /// The prices of facts in some rows, and the calls that are never made.
