@@ -7,10 +7,10 @@
 // Requirement: S-01
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, WindingError, check_winding, generate};
+use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Capsule, ConstraintState, ForbiddenRegion, NoSide, Odometer, Options, Proximity, Query,
-    Side, Sphere, SpringDamper, Tool, Tracker, Tree,
+    Budget, Capsule, NoSide, Odometer, Options, Proximity, Query, Side, Sphere, Tool, Tracker, Tree,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
@@ -425,27 +425,31 @@ fn a_collapsed_vessel_has_no_inside() {
     }
 }
 
-/// A tracker that comes there from beside the rim moved far enough to be on either side: it says so, and its interval
-/// holds both, on which a wall acts.
+/// A tracker that comes from a known side to a collapsed part may have moved far enough to be on either side: it says so,
+/// and its interval holds both, on which a wall acts.
 #[test]
-fn a_kept_answer_above_a_collapsed_vessel_may_be_on_either_side() {
-    let built = build(&block(Vec3::ZERO, Vec3::new(100.0, 100.0, 2.0)));
+fn a_kept_answer_above_a_collapsed_part_may_be_on_either_side() {
+    const THICKNESS: f32 = 2.0;
+    let mesh = plate(THICKNESS);
+    let built = build(&mesh);
     let tree = built.tree::<u16>().expect("valid");
-    let flat = block(Vec3::ZERO, Vec3::new(100.0, 100.0, 0.0));
-    let rows = built.to_rows(&flat.positions);
+    let is_rim = |at: f32| at.abs() > 29.0;
+    let collapsed = |at: &Vec3| if is_rim(at.x) || is_rim(at.y) { *at } else { at.with_z(0.0) };
+    let positions: Vec<Vec3> = mesh.positions.iter().map(collapsed).collect();
+    let rows = built.to_rows(&positions);
     let surface = Odometer::new(&tree).start(rows.as_slice());
     let spring = SpringDamper::stiffness(1.0).max_force(50.0);
     let wall = ForbiddenRegion::new(spring, 5.0).expect("a valid margin");
     // A step too short to reach the inside keeps the side.
-    for (x, height, side) in [(0.5, 0.5, Side::Outside), (49.0, 20.0, Side::Either)] {
+    for (x, height, side) in [(-20.0, 1.0, Side::Outside), (1.0, 20.0, Side::Either)] {
         let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("deep enough");
         let mut ask = |at: Vec3| {
             let tool = Sphere::new(at, 1.0).expect("valid");
             tracker.closest(&surface, &tool, &Options::new()).expect("an answer")
         };
-        let beside = ask(Vec3::new(-5.0, 30.0, 1.0)).closest;
-        assert_eq!(beside.side, Side::Outside, "{beside:?}");
-        let found = ask(Vec3::new(x, 30.0, height));
+        let above_rim = ask(Vec3::new(-23.0, 3.1, 3.0)).closest;
+        assert_eq!(above_rim.side, Side::Outside, "{above_rim:?}");
+        let found = ask(Vec3::new(x, 3.1, height));
         let at = found.closest;
         assert!(found.is_kept && at.side == side, "{x}: {at:?}");
         let lowest = if side == Side::Outside { height } else { -height };
