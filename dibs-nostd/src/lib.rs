@@ -55,6 +55,7 @@
 //!   which are checked when used. Other limits are made by calls that check them.
 //! - `mint`: points of other mathematics crates convert to `glam`'s, so that `Bus::frame` takes them.
 //! - `embedded-io`: `guard`'s `Bus` on any byte stream.
+//! - `embedded-can`: packets as frames of a driver for CAN-FD ([`wire::canfd`]).
 //! - `portable-atomic`: for processors without compare-and-swap; interrupts are masked for the few instructions of each
 //!   publication and read of a frame, by the program's `critical-section` implementation.
 //! - `authenticity`: [`wire`]'s `AesCmac`, with which a receiver accepts only packets with a genuine tag.

@@ -14,10 +14,13 @@
 #include <unistd.h>
 
 #include <array>
+#include <charconv>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <vector>
@@ -29,6 +32,16 @@ void must(dibs::Code code) {
         std::fprintf(stderr, "%s\n", dibs_code_text(code));
         std::exit(EXIT_FAILURE);
     }
+}
+
+/** An argument that is a whole number. */
+std::uint32_t number(const char *text, std::uint32_t most) {
+    std::uint32_t value = 0;
+    const char *end = text + std::strlen(text);
+    const std::from_chars_result read = std::from_chars(text, end, value);
+    if (read.ec == std::errc() && read.ptr == end && value <= most) return value;
+    std::fprintf(stderr, "%s: give a whole number of at most %u\n", text, unsigned(most));
+    std::exit(EXIT_FAILURE);
 }
 
 std::uint32_t milliseconds() {
@@ -53,11 +66,14 @@ void receive(dibs::Loop &loop, int socket, std::uint32_t now) {
 
 void print(const dibs_answer &answer, const dibs_force &force) {
     if (answer.outcome == DIBS_CODE_OK) {
-        const dibs_vec3 f = force.force;
-        const double size = std::sqrt(f.x * f.x + f.y * f.y + f.z * f.z);
-        std::printf("%.3f mm, in truth at least %.3f: %.2f N\n", answer.closest.separation, answer.interval.lower, size);
+        std::printf("%.3f mm, in truth at least %.3f: ", answer.closest.separation, answer.interval.lower);
+    }
+    if (force.state == DIBS_FORCE_STATE_SAFE) {
+        // The cause of the missing answer, or why the wall cannot act on this one: its side may be unknown.
+        std::printf("held: %s\n", dibs_code_text(force.cause));
     } else {
-        std::printf("held: %s\n", dibs_code_text(answer.outcome));
+        const dibs_vec3 f = force.force;
+        std::printf("%.2f N\n", std::sqrt(f.x * f.x + f.y * f.y + f.z * f.z));
     }
     std::fflush(stdout);
 }
@@ -72,7 +88,7 @@ int main(int argc, char **argv) {
     std::ifstream file(argv[1], std::ios::binary);
     const std::vector<char> tree{std::istreambuf_iterator<char>(file), {}};
     // Tissue of at most 300 mm/s, surfaces of two periods at 30 Hz and the time on the way, ticks within 1,000,000 instructions.
-    dibs_guard_limits limits = dibs_guard_limits_of(300.0f, argc == 4 ? std::uint32_t(std::atoi(argv[3])) : 80);
+    dibs_guard_limits limits = dibs_guard_limits_of(300.0f, argc == 4 ? number(argv[3], UINT32_MAX) : 80);
     must(dibs_budget_for_instructions(1000000, DIBS_COST_X86_CAPSULE, &limits.options.budget));
     dibs_wall wall{};
     wall.stiffness = 1.0f;  // N/mm
@@ -85,7 +101,7 @@ int main(int argc, char **argv) {
     const int socket = ::socket(AF_INET, SOCK_DGRAM, 0);
     sockaddr_in here{};
     here.sin_family = AF_INET;
-    here.sin_port = htons(std::uint16_t(std::atoi(argv[2])));
+    here.sin_port = htons(std::uint16_t(number(argv[2], UINT16_MAX)));
     here.sin_addr.s_addr = htonl(INADDR_ANY);
     if (bind(socket, reinterpret_cast<const sockaddr *>(&here), sizeof here) != 0) {
         std::perror(argv[2]);
@@ -108,7 +124,7 @@ int main(int argc, char **argv) {
         dibs_answer answer;
         dibs_force force{};
         must(loop.guard.closest(tool, now, answer));
-        dibs_answer_force(&answer, &wall, &force);
+        must(dibs_answer_force(&answer, &wall, &force));
         if (now - printed < 250) continue;
         printed = now;
         print(answer, force);

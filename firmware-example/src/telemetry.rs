@@ -110,6 +110,9 @@ pub const fn fallback_code(fallback: Option<Fallback>) -> u32 {
     }
 }
 
+/// Of a cause that has no number yet.
+const OTHER_CAUSE: u32 = u32::MAX;
+
 /// A cause as a number.
 #[must_use]
 pub const fn cause_code(cause: &Unavailable) -> u32 {
@@ -126,7 +129,12 @@ pub const fn cause_code(cause: &Unavailable) -> u32 {
         Unavailable::Forgeries { .. } => 11,
         Unavailable::CutShort => 12,
         Unavailable::Unacknowledged => 13,
-        _ => 8,
+        Unavailable::NotFinite => 8,
+        Unavailable::NoPose => 14,
+        Unavailable::NoDirection => 15,
+        Unavailable::NoSide => 16,
+        // A cause of a later version of the library.
+        _ => OTHER_CAUSE,
     }
 }
 
@@ -146,8 +154,12 @@ pub const fn cause_name(code: u32) -> &'static str {
         10 => "source stands still",
         11 => "forgeries",
         12 => "budget too small",
+        8 => "number not finite",
         13 => "not acknowledged",
-        _ => "number not finite",
+        14 => "no pose",
+        15 => "no direction",
+        16 => "side unknown",
+        _ => "a cause without a name",
     }
 }
 

@@ -2,9 +2,12 @@
 
 // Requirement: P-05
 
+use std::collections::BTreeSet;
+
 use bytemuck::Zeroable;
-use controller::telemetry::{MAX_FRAMED, Record, Summary, Tick, frame};
+use controller::telemetry::{MAX_FRAMED, Record, Summary, Tick, cause_code, cause_name, frame};
 use dibs_nostd::wire::Deframer;
+use dibs_nostd::{Millis, QueryError, Unavailable};
 
 fn over_the_line(bytes: &[u8]) -> Option<Record> {
     let mut deframer = Deframer::<256>::new();
@@ -31,4 +34,32 @@ fn records_survive_the_line_and_damage_is_seen() {
         damaged[at] ^= 0x10;
         assert_eq!(over_the_line(&damaged), None, "byte {at}");
     }
+}
+
+#[test]
+fn every_cause_has_a_number_and_a_name_of_its_own() {
+    let (age, silence, transit) = (Millis(1), Millis(1), Millis(1));
+    let causes = [
+        Unavailable::NoSurface,
+        Unavailable::Unacknowledged,
+        Unavailable::Stale { age },
+        Unavailable::Query(QueryError::NoAdjacency),
+        Unavailable::CorruptTree,
+        Unavailable::LinkLost { silence },
+        Unavailable::HeartbeatLost { silence },
+        Unavailable::Rejections { streak: 1 },
+        Unavailable::Delayed { transit },
+        Unavailable::SourceStale { age },
+        Unavailable::Forgeries { count: 1 },
+        Unavailable::NoPose,
+        Unavailable::NoDirection,
+        Unavailable::NoSide,
+        Unavailable::CutShort,
+        Unavailable::NotFinite,
+    ];
+    let numbers: BTreeSet<u32> = causes.iter().map(cause_code).collect();
+    let names: BTreeSet<&str> = numbers.iter().map(|&number| cause_name(number)).collect();
+    assert_eq!([numbers.len(), names.len()], [causes.len(); 2], "{names:?}");
+    let of_none = [0, u32::MAX].map(cause_name);
+    assert!(!of_none.iter().any(|name| names.contains(name)), "{names:?}");
 }

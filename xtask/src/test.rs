@@ -238,7 +238,7 @@ fn core_crate(cross: &Cross) -> Result<Outcome> {
         check.args(["--quiet", "--profile", "firmware", "--package", "dibs-nostd"]);
         check
     };
-    run(check().args(["--features", "defmt,embedded-io,mint,serde"]))?;
+    run(check().args(["--features", "defmt,embedded-can,embedded-io,mint,serde"]))?;
     for layer in
         ["", "wide", "bus", "control", "modes", "control,bus", "control,modes", "bus,modes"]
     {

@@ -6,52 +6,33 @@ use std::path::Path;
 use std::process::Command;
 use std::{env, fs};
 
-use dibs_build::{Builder, Mesh, generate};
+use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Index, Interval, Options, Query, Sphere, Tree, measure_stretch};
 
 use crate::programs::{include, library, library_with, run, tool};
 
-/// Reads a tree and positions in the file's order, and asks the README's function about a sphere.
-const MAIN: &str = r#"
-#include "expect.h"
-int main(int argc, char **argv) {
-    size_t length, size;
-    const unsigned char *tree = read_file(argv[argc - 2], &length);
-    float *positions = (float *)(void *)read_file(argv[argc - 1], &size);
-    const dibs_tool sphere = {{90, 10, 20}, {90, 10, 20}, 5};
-    EXPECT(OK, distance(tree, length, positions, size / 12, &sphere));
-    EXPECT(VERTEX_COUNT, distance(tree, length, positions, size / 12 - 1, &sphere));
-    /* Positions in an order that is not the rows'. */
-    float *other = malloc(size);
-    for (size_t at = 0; at < size / 4; at++) other[at] = positions[(at + 3) % (size / 4)];
-    EXPECT(STRETCH_EXCEEDED, distance(tree, length, other, size / 12, &sphere));
-    free(other);
-    free(positions);
-    return summary();
-}
+/// In place of the loop over the rest shape: moved vertices of a file, in its order.
+const MOVED: &str = r#"
+    static float positions[3 * 65536];
+    FILE *moved = fopen("moved", "rb");
+    const uint32_t vertices = (uint32_t)fread(positions, 12, 65536, moved);
+    dibs_tree_facts facts;
+    TRY(dibs_tree_to_rows(tree, positions, vertices, &rows->x, 65536));
+    TRY(dibs_tree_get_facts(tree, &facts));
+    count = facts.vertices;
 "#;
 
-/// The same for the function in C++.
-const MAIN_CPP: &str = r#"
-#include <fstream>
-#include <iterator>
-static std::vector<char> read_file(const char *name) {
-    std::ifstream file(name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
-int main(int argc, char **argv) {
-    const auto tree = read_file(argv[argc - 2]), positions = read_file(argv[argc - 1]);
-    const dibs::Span<const uint8_t> bytes(reinterpret_cast<const uint8_t *>(tree.data()), tree.size());
-    const auto floats = reinterpret_cast<const float *>(positions.data());
-    const size_t size = positions.size() / 4;
-    std::vector<float> all(floats, floats + size), other(all);
-    const dibs_tool sphere = {{90, 10, 20}, {90, 10, 20}, 5};
-    std::printf("%d ", distance(bytes, all, sphere) == DIBS_CODE_OK);
-    std::printf("%d ", distance(bytes, {all.data(), size - 3}, sphere) == DIBS_CODE_VERTEX_COUNT);
-    for (size_t at = 0; at < size; at++) other[at] = all[(at + 3) % size];
-    std::printf("%d\n", distance(bytes, other, sphere) == DIBS_CODE_STRETCH_EXCEEDED);
-}
+/// The same in C++.
+const MOVED_CPP: &str = r#"
+    (void)at;
+    std::ifstream other("moved", std::ios::binary);
+    const std::vector<char> moved{std::istreambuf_iterator<char>(other), {}};
+    std::vector<float> room(moved.size() / 4);
+    dibs::Span<float> span;
+    const dibs::Span<const float> positions(reinterpret_cast<const float *>(moved.data()), room.size());
+    if (code == DIBS_CODE_OK) code = tree.to_rows(positions, room, span);
+    rows.assign(span.data(), span.data() + span.size());
 "#;
 
 /// The README's programs in a language.
@@ -63,14 +44,67 @@ fn programs(language: &str) -> Vec<String> {
     blocks.map(str::to_owned).collect()
 }
 
-/// What the README's first program says of a sphere near a mesh that grew by a tenth, and what the library in Rust does.
-fn first_answer<I: Index>(mesh: &Mesh, library: &Path, language: &str) -> [String; 2] {
+/// The README's first program, at rest and with moved vertices, says of a sphere what the library in Rust does.
+fn first_answers<I: Index>(mesh: &Mesh, library: &Path, language: &str) {
     let folder = tempfile::tempdir().expect("a folder");
     let built = Builder::new().stretch(1.5).build(mesh).expect("a tree");
-    let moved: Vec<Vec3> = mesh.positions.iter().map(|&at| at * 1.1).collect();
+    fs::write(folder.path().join("heart.dibs"), built.blob()).expect("writable");
+    let first = programs(language)[0].replace("65536", "99999");
+    let start = first.find("    while (dibs_tree_rest_position").expect("the loop");
+    let end = start + first[start..].find('\n').expect("a line");
+    let moved = if language == "c" { MOVED } else { MOVED_CPP }.replace("65536", "99999");
+    let moved = format!("{}{moved}{}", &first[..start], &first[end..]);
+    let [at_rest, moved] = [("rest", first), ("moving", moved)]
+        .map(|(name, source)| compiled(folder.path(), name, &source, library, language));
+    assert_eq!(at_rest(), expected::<I>(&built, &mesh.positions), "{language}");
 
+    let write = |positions: &[Vec3]| {
+        let floats = positions.iter().flat_map(Vec3::to_array);
+        let bytes = floats.flat_map(f32::to_le_bytes).collect::<Vec<u8>>();
+        fs::write(folder.path().join("moved"), bytes).expect("writable");
+    };
+    let mut positions: Vec<Vec3> = mesh.positions.iter().map(|&at| at * 1.1).collect();
+    write(&positions);
+    assert_eq!(moved(), expected::<I>(&built, &positions), "{language}");
+    write(&positions[1..]);
+    assert_eq!(moved(), "the surface has another number of vertices than the tree\n", "{language}");
+    // An order that is not the file's.
+    positions.rotate_left(1);
+    write(&positions);
+    assert_eq!(moved(), "a triangle or tetrahedron is stretched beyond its limit\n", "{language}");
+}
+
+/// A program, which says something about the files in its folder.
+fn compiled(
+    folder: &Path,
+    name: &str,
+    source: &str,
+    library: &Path,
+    language: &str,
+) -> impl Fn() -> String + use<> {
+    let (compiler, standard) =
+        if language == "c" { ("gcc", "-std=c11") } else { ("g++", "-std=c++17") };
+    let program = folder.join(name);
+    let file = program.with_extension(language);
+    fs::write(&file, source).expect("writable");
+    let mut gcc = tool(compiler, compiler);
+    gcc.args([standard, "-g", "-Wall", "-Wextra", "-Werror"]);
+    gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
+    run(gcc.arg(&file).arg(library).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
+    let folder = folder.to_owned();
+    move || {
+        let mut command = Command::new(&program);
+        let output = command.current_dir(&folder).output().expect("it starts");
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(error, "");
+        String::from_utf8(output.stdout).expect("text")
+    }
+}
+
+/// What the library in Rust answers about the program's sphere.
+fn expected<I: Index>(built: &BuiltTree, positions: &[Vec3]) -> String {
     let tree = Tree::<I>::from_bytes(built.blob()).expect("a tree");
-    let rows = built.to_rows(&moved);
+    let rows = built.to_rows(positions);
     let stretch = measure_stretch(&tree, rows.as_slice()).expect("within the limit");
     let mut query = Query::<I, 512>::new(&tree).expect("a stack");
     let sphere = Sphere::new(Vec3::new(90.0, 10.0, 20.0), 5.0).expect("a tool");
@@ -78,29 +112,7 @@ fn first_answer<I: Index>(mesh: &Mesh, library: &Path, language: &str) -> [Strin
     let found = query.closest(rows.as_slice(), &sphere, &options).expect("an answer");
     let Interval { lower, upper, .. } = found.interval();
     let separation = found.separation;
-    let expected =
-        format!("{separation:.4} mm from the tool's surface, in truth {lower:.4} to {upper:.4}");
-
-    let [tree, positions, program] =
-        ["tree", "positions", "first"].map(|name| folder.path().join(name));
-    let source = program.with_extension(language);
-    fs::write(&tree, built.blob()).expect("writable");
-    let floats = moved.iter().flat_map(Vec3::to_array);
-    fs::write(&positions, floats.flat_map(f32::to_le_bytes).collect::<Vec<u8>>())
-        .expect("writable");
-    let (main, compiler, standard, after) = match language {
-        "c" => (MAIN, "gcc", "-std=c11", "3 checks, 0 failures\n"),
-        _ => (MAIN_CPP, "g++", "-std=c++17", "1 1 1\n"),
-    };
-    let first = programs(language)[0].replace("65536", "99999");
-    fs::write(&source, first + main).expect("writable");
-    let mut gcc = tool(compiler, compiler);
-    gcc.args([standard, "-g", "-Wall", "-Wextra", "-Werror"]);
-    gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
-    gcc.arg("-I").arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs")).arg(&source);
-    run(gcc.arg(library).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
-    let said = run(Command::new(program).arg(tree).arg(positions));
-    [said, format!("{expected}\n{after}")]
+    format!("{separation:.4} mm from the tool's surface, in truth {lower:.4} to {upper:.4}\n")
 }
 
 /// A generated heart whose vertices are in another order, with one of no triangle.
@@ -121,8 +133,7 @@ fn shuffled(triangles: u32) -> Mesh {
 #[test]
 fn the_first_program_gives_the_right_answer() {
     for language in ["c", "cpp"] {
-        let [said, expected] = first_answer::<u16>(&shuffled(1_000), &library(), language);
-        assert_eq!(said, expected, "{language}");
+        first_answers::<u16>(&shuffled(1_000), &library(), language);
     }
 }
 
@@ -133,9 +144,7 @@ fn a_large_tree_is_answered_by_the_library_for_large_trees() {
         println!("skipped: on request, `cargo xtask test --whole`");
         return;
     }
-    let library = library_with("large");
-    let [said, expected] = first_answer::<u32>(&shuffled(140_000), &library, "c");
-    assert_eq!(said, expected);
+    first_answers::<u32>(&shuffled(140_000), &library_with("large"), "c");
 }
 
 /// One after the other, without a warning.

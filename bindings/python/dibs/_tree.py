@@ -98,10 +98,12 @@ class Scene:
                 raise TypeError(f"surfaces: number {number} is no Surface and no Tree")
         self._natives = [surface._native for surface in self.surfaces]
 
-    def query(self, tools: npt.ArrayLike, *, budget: Optional[int] = None) -> npt.NDArray[Any]:
+    def query(
+        self, tools: npt.ArrayLike, *, budget: Optional[int] = None, signed: bool = True
+    ) -> npt.NDArray[Any]:
         """The closest pair of each pose and the scene: as `Tree.query`."""
         poses = _tools.poses(tools)
-        answers = np.frombuffer(_dibs.query(self._natives, poses.native, _tests(budget)), ANSWER)
+        answers = np.frombuffer(_dibs.query(self._natives, poses.native, _tests(budget), signed), ANSWER)
         return answers[0] if poses.is_single else answers
 
     def contacts(
@@ -140,9 +142,11 @@ class Surface:
         """The largest stretch of any triangle relative to the rest shape; `None` if the tree cannot measure it."""
         return self._native.stretch()
 
-    def query(self, tools: npt.ArrayLike, *, budget: Optional[int] = None) -> npt.NDArray[Any]:
+    def query(
+        self, tools: npt.ArrayLike, *, budget: Optional[int] = None, signed: bool = True
+    ) -> npt.NDArray[Any]:
         """The closest pair of each pose and the surface: as `Tree.query`."""
-        return Scene([self]).query(tools, budget=budget)
+        return Scene([self]).query(tools, budget=budget, signed=signed)
 
     def contacts(
         self, tools: npt.ArrayLike, margin: float, *, budget: Optional[int] = None, label: Optional[int] = None
@@ -244,6 +248,7 @@ class Tree:
         surface: Union[Surface, npt.ArrayLike, None] = None,
         *,
         budget: Optional[int] = None,
+        signed: bool = True,
     ) -> npt.NDArray[Any]:
         """The closest pair of each pose and a surface: an array of `ANSWER`.
 
@@ -251,8 +256,9 @@ class Tree:
         With three dimensions, (poses, tools, 4 or 7), each pose is a chain of tools, and field `tool` is an index in
         it: the answer is the closest pair of any tool, and its interval covers all tools. `surface` is an array of
         positions, or a `Surface`, which is measured once for several calls; by default the rest shape. `budget` limits
-        the node tests of each tool, where an exact triangle test counts as 8. Poses are answered on all cores, without
-        Python's lock.
+        the node tests of each tool, where an exact triangle test counts as 8. With `signed=False` the side is left out,
+        and the separation is that of a tool outside, at the cost of the distance alone. Poses are answered on all cores,
+        without Python's lock.
 
         The fields of an answer; act on the first of `interval`. Lengths are in mm, coordinates those of the mesh's file.
 
@@ -268,7 +274,8 @@ class Tree:
         `axis_parameter`: the pair's position along the axis, 0 at its start and 1 at its end; 0 for a sphere.
         `point_on_surface`, `point_on_tool`: the closest pair; if the axis crosses or is inside, that of its deepest
             point.
-        `direction`: the unit vector that points out of the tissue; zero if undefined.
+        `direction`: the unit vector that points out of the tissue, the gradient of the separation over the tool's
+            position; zero if undefined.
         `triangle`: the vertices of the surface's triangle, numbered as in the mesh. Three equal ones where the budget
             ended first.
         `barycentric`: their weights at `point_on_surface`, of sum 1.
@@ -278,7 +285,7 @@ class Tree:
         `coverage`: a `Coverage`, how the stretch is known.
         `node_tests`, `triangle_tests`: the cost of the search.
         """
-        return self._surface(surface).query(tools, budget=budget)
+        return self._surface(surface).query(tools, budget=budget, signed=signed)
 
     def contacts(
         self,

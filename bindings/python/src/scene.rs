@@ -28,9 +28,10 @@ pub fn query<'py>(
     surfaces: Vec<Py<Surface>>,
     tools: Tools<'_>,
     budget: u32,
+    is_signed: bool,
 ) -> PyResult<Bound<'py, PyByteArray>> {
     let scene = Scene::new(surfaces, budget);
-    let found = in_blocks(py, tools, |chunk| scene.answer(chunk))?;
+    let found = in_blocks(py, tools, |chunk| scene.answer(chunk, is_signed))?;
     Ok(PyByteArray::new(py, &found.concat()))
 }
 
@@ -94,10 +95,10 @@ impl Scene {
     }
 
     /// The record of each pose's closest pair.
-    fn answer(&self, chunk: Chunk<'_>) -> Result<Vec<u8>, String> {
+    fn answer(&self, chunk: Chunk<'_>, is_signed: bool) -> Result<Vec<u8>, String> {
         let mut closest: Vec<Option<Closest>> = vec![None; chunk.len()];
         for (number, surface) in self.surfaces() {
-            surface.closest(chunk, self.budget, |pose, tool, found| {
+            surface.closest(chunk, (self.budget, is_signed), |pose, tool, found| {
                 let other = Closest { surface: number, tool, found };
                 closest[pose] = Some(closest[pose].map_or(other, |best| best.or_closer(other)));
             })?;

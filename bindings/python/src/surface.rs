@@ -50,14 +50,17 @@ impl Surface {
         }
     }
 
-    /// Finds the closest pair of each tool. `found` receives it with the pose and the tool's index.
+    /// Finds the closest pair of each tool, with its side if it is signed. `found` receives it with the pose and the tool's index.
     pub fn closest(
         &self,
         chunk: Chunk<'_>,
-        budget: Budget,
+        (budget, is_signed): (Budget, bool),
         mut found: impl FnMut(usize, usize, Proximity),
     ) -> Result<(), String> {
-        let (rows, options) = (&self.rows, self.options(budget));
+        let (rows, mut options) = (&self.rows, self.options(budget));
+        if !is_signed {
+            options = options.unsigned();
+        }
         of_any_width!(self.tree.view(), tree => {
             let mut query = query_of(tree)?;
             for (pose, number, numbers) in chunk.tools() {

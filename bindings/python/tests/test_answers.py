@@ -117,6 +117,26 @@ class Answers(unittest.TestCase):
             self.assertAlmostEqual(least, answers[pose]["separation"], delta=1e-3)
             self.assertTrue((np.diff(of_pose["separation"]) >= 0).all())
 
+    def test_without_a_side_the_distance_is_that_of_the_nearest_triangle(self):
+        outside = [100.0, 10.0, 30.0, 5.0]
+        near = TREE.query(outside)
+        within = [*(near["point_on_surface"] - 3.0 * near["direction"]), 5.0]
+        for surface in [TREE, TREE.rest, dibs.Scene([TREE])]:
+            inside, plain = (surface.query(within, signed=signed) for signed in [True, False])
+            self.assertEqual((inside["side"], plain["side"]), (dibs.Side.INSIDE, dibs.Side.UNDEFINED))
+            self.assertLess(inside["separation"], -5.0)
+            self.assertAlmostEqual(plain["separation"], -inside["separation"] - 10.0, places=3)
+            one, other = (surface.query(outside, signed=signed)["separation"] for signed in [True, False])
+            self.assertEqual(one, other)
+
+    def test_the_direction_is_the_gradient(self):
+        at, step = np.array([100.0, 10.0, 30.0]), 1e-2
+        gradient = [
+            (TREE.query([*(at + way), 2.0])["separation"] - TREE.query([*(at - way), 2.0])["separation"]) / (2 * step)
+            for way in step * np.eye(3)
+        ]
+        np.testing.assert_allclose(TREE.query([*at, 2.0])["direction"], gradient, atol=2e-2)
+
     def test_labels_follow_their_triangles(self):
         labels = np.arange(len(HEART.triangles)) % 250
         tree = dibs.build(HEART, labels=labels)

@@ -1,10 +1,14 @@
 """The loop of a controller: packets in, answers and forces out."""
 
+import contextlib
+import itertools
 import pathlib
 import re
 import socket
 import subprocess
 import sys
+import tempfile
+import threading
 import unittest
 
 import numpy as np
@@ -370,6 +374,35 @@ class Guards(unittest.TestCase):
             self.assertNotRegex(sentence, "--|`dibs")
         self.assertIn("SAFE", repr(answer))
         self.assertFalse(any("--" in reason for reason in dibs.SIDE_REASONS))
+
+    def test_the_example_answers_by_udp(self):
+        example = pathlib.Path(__file__).parents[3] / "examples/python/udp_guard.py"
+        with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+            TREE.save(tree := f"{folder}/heart.dibs")
+            free.bind(("127.0.0.1", 0))
+            port = str(free.getsockname()[1])
+            free.close()
+            command = [sys.executable, str(example), tree, port]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as loop:
+                sender, is_over = dibs.Sender(TREE, f"udp:127.0.0.1:{port}"), threading.Event()
+
+                def send():
+                    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as noise:
+                        while not is_over.wait(0.02):
+                            with contextlib.suppress(ValueError, OSError):
+                                noise.sendto(b"no packet", ("127.0.0.1", int(port)))
+                                sender.send(BEAT.frames[0], age=0)
+                                sender.poll()
+
+                threading.Thread(target=send).start()
+                try:
+                    said = next(line for line in itertools.islice(loop.stdout, 300) if line.startswith("["))
+                finally:
+                    is_over.set()
+                    loop.kill()
+        lower, upper = map(float, said.strip("[]\n").split())
+        truth = TREE.query([0, 0, 90, 0, 0, 150, 2.5], surface=BEAT.frames[0])["separation"]
+        self.assertTrue(lower < truth < upper < lower + 150, said)
 
     def test_the_readme_has_the_loop(self):
         readme = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")

@@ -175,6 +175,11 @@ impl FromStr for LiveSource {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        if text.starts_with("ros2:") {
+            return Err(
+                "a topic of ROS 2 is sent by the node examples/ros2/surface_node.py".to_owned()
+            );
+        }
         match text.strip_prefix("shm:") {
             Some(name) if !name.is_empty() && !name.contains('/') => {
                 Ok(Self::Memory(name.to_owned()))

@@ -82,12 +82,13 @@ impl<R: Read> Parser<R> {
         self.number += 1;
         let positions = self.place.frame(positions, number);
         let positions = positions.map_err(|error| anyhow!("{name}: {error}"))?;
-        if age.is_some() || self.is_paced {
+        let age = if age.is_some() || self.is_paced {
             self.last = None;
-        }
-        let delay = age.unwrap_or_default();
-        let part = Part { value: positions.clone(), time: 0.0, came, delay };
-        let age = Part::replace(&mut self.last, part).age(came);
+            age.unwrap_or_default()
+        } else {
+            let part = Part { value: positions.clone(), time: 0.0, came, delay: Duration::ZERO };
+            Part::replace(&mut self.last, part).age(came)
+        };
         Ok(Some(Parsed { positions, pose: None, came, age }))
     }
 

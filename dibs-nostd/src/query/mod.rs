@@ -36,7 +36,7 @@ pub use side::{NoSide, Side};
 pub use swept::{Sweep, SweepAnswer};
 pub use tracker::{Fallback, Tracker, TrackerAnswer};
 
-use crate::tree::RootSet;
+use crate::tree::{RootSet, ValidTree};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 #[cfg(feature = "wide")]
@@ -57,11 +57,12 @@ pub struct Query<'t, I, const STACK: usize> {
 }
 
 impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
-    /// A query on `tree`.
+    /// A query on `tree`, a [`Tree`].
     ///
     /// # Errors
     /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
-    pub const fn new(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
+    pub fn new(tree: &impl ValidTree<'t, I>) -> Result<Self, QueryError> {
+        let tree = tree.valid();
         if tree.stack() as usize > STACK {
             return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }

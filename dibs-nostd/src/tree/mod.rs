@@ -26,6 +26,7 @@ pub(crate) mod sections;
 mod shells;
 mod stored;
 mod unit;
+mod valid;
 mod validate;
 
 pub use error::FormatError;
@@ -40,6 +41,7 @@ pub use scrub::{CorruptTreeError, Scrub};
 pub(crate) use shells::RootSet;
 pub use stored::TreeBytes;
 pub(crate) use unit::Unit;
+pub use valid::ValidTree;
 
 use core::iter;
 use core::marker::PhantomData;

@@ -10,8 +10,7 @@ use crate::QueryError;
 impl<I: Index> Tree<'_, I> {
     /// Copies the vertices' positions, or velocities, from the order of the mesh's file into the order of the rows, which
     /// a vertex table has, and returns these rows. In the file's order a table gives wrong distances without an error.
-    /// Values are not changed otherwise: positions are in mm, less the tree's [origin](Self::origin). If the tree was
-    /// emitted without its vertex order, `values` must have the order of the rows.
+    /// Values are not changed otherwise: positions are in mm, less the tree's [origin](Self::origin).
     ///
     /// ```
     /// use dibs_build::{Builder, generate};
@@ -31,14 +30,18 @@ impl<I: Index> Tree<'_, I> {
     /// Cost: linear in the vertices.
     ///
     /// # Errors
-    /// [`QueryError::VertexCount`] for another number of values than [`Tree::file_vertex_count`], or if fewer rows than
-    /// [`Tree::vertex_count`] fit into `rows`; then nothing is copied.
+    /// [`QueryError::NoVertexOrder`] if the tree was built without its vertex order; [`QueryError::VertexCount`] for another
+    /// number of values than [`Tree::file_vertex_count`], or if fewer rows than [`Tree::vertex_count`] fit into `rows`.
+    /// Then nothing is copied.
     pub fn to_rows<'r, P: Copy + Into<Vec3>>(
         &self,
         values: &[P],
         rows: &'r mut [Vec3],
     ) -> Result<&'r [Vec3], QueryError> {
         let order = VertexOrder::of(self);
+        if order.numbers.is_empty() {
+            return Err(QueryError::NoVertexOrder);
+        }
         let wrong =
             |expected, found: usize| QueryError::VertexCount { expected, found: found as u32 };
         let in_order = order.rows(values).ok_or(wrong(order.positions, values.len()))?;
@@ -130,6 +133,6 @@ mod tests {
         let bare = Builder::new().with_vertex_order(false).build(&mesh).expect("builds");
         let bare = Tree::<u16>::from_bytes(bare.blob()).expect("a tree");
         let found = bare.to_rows(&mesh.positions, &mut rows).map(<[Vec3]>::to_vec);
-        assert_eq!(found, Ok(mesh.positions));
+        assert_eq!(found, Err(QueryError::NoVertexOrder));
     }
 }

@@ -51,6 +51,8 @@ pub enum QueryError {
     },
     /// The tree has no adjacency, so a triangle's neighbours are unknown.
     NoAdjacency,
+    /// The tree was built without its vertex order, so the row of a vertex of the mesh's file is unknown.
+    NoVertexOrder,
     /// A list of contacts with capacity zero, or too large.
     Contacts {
         /// Contacts that the list holds.
@@ -102,6 +104,9 @@ impl fmt::Display for QueryError {
             Self::NoAdjacency => f.write_str(
                 "the tree has no sides: its triangles are wound against each other (`dibs build --orient` turns them), or \
                  it was built without adjacency",
+            ),
+            Self::NoVertexOrder => f.write_str(
+                "the tree was built without its vertex order (`with_vertex_order`): give rows, or build it with its order",
             ),
             Self::Contacts { capacity, near } => {
                 write!(f, "a list cannot hold {capacity} contacts and compare {near} triangles")

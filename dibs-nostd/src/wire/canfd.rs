@@ -1,7 +1,7 @@
 //! Packets as CAN-FD messages: data length codes and identifiers, for any driver.
 //!
 //! A packet of at most 64 bytes has one of CAN-FD's lengths, so a message's data is the packet. This maps onto plain
-//! numbers and slices, because `embedded-can`'s frames hold only 8 bytes.
+//! numbers and slices, and with the feature `embedded-can` onto the frames of drivers that have that crate's trait.
 //!
 //! ```
 //! use dibs_nostd::wire::canfd::{Identifiers, dlc_of};
@@ -11,6 +11,9 @@
 //! assert_eq!(identifier, 0x122);
 //! assert_eq!(dlc_of(packet.len()), Some(12));
 //! ```
+
+#[cfg(feature = "embedded-can")]
+use embedded_can::{Frame, Id, StandardId};
 
 use super::kind;
 
@@ -84,5 +87,38 @@ impl Identifiers {
     #[must_use]
     pub const fn is_to_sender(self, identifier: u16) -> bool {
         identifier.wrapping_sub(self.base) == 1
+    }
+}
+
+/// Frames of drivers: the trait's documentation is of CAN with 8 bytes, and drivers implement it for frames of CAN-FD, too.
+#[cfg(feature = "embedded-can")]
+impl Identifiers {
+    /// The message that carries a packet; `None` if it does not fit into the driver's frame.
+    #[must_use]
+    pub fn frame_of<F: Frame>(self, packet: &[u8]) -> Option<F> {
+        F::new(StandardId::new(self.of(packet))?, packet)
+    }
+
+    /// The packet in a message for the receiver of the surface; `None` if it is another message.
+    #[must_use]
+    pub fn packet_to_receiver<F: Frame>(self, frame: &F) -> Option<&[u8]> {
+        let is_ours = standard(frame).is_some_and(|identifier| self.is_to_receiver(identifier));
+        is_ours.then(|| frame.data())
+    }
+
+    /// The packet in a message for the sender of the surface; `None` if it is another message.
+    #[must_use]
+    pub fn packet_to_sender<F: Frame>(self, frame: &F) -> Option<&[u8]> {
+        let is_ours = standard(frame).is_some_and(|identifier| self.is_to_sender(identifier));
+        is_ours.then(|| frame.data())
+    }
+}
+
+/// The identifier of a data frame, if it has 11 bits.
+#[cfg(feature = "embedded-can")]
+fn standard<F: Frame>(frame: &F) -> Option<u16> {
+    match frame.id() {
+        Id::Standard(identifier) if frame.is_data_frame() => Some(identifier.as_raw()),
+        _ => None,
     }
 }

@@ -36,6 +36,12 @@ uint32_t telemetry_cause(dibs_code cause) {
         return 13;
     case DIBS_CODE_NOT_FINITE:
         return 8;
+    case DIBS_CODE_NO_POSE:
+        return 14;
+    case DIBS_CODE_NO_DIRECTION:
+        return 15;
+    case DIBS_CODE_NO_SIDE:
+        return 16;
     default:
         /* Any other cause: the query failed. */
         return 3;

@@ -1,16 +1,19 @@
-//! Types and traits of other crates: byte streams of `embedded-io`, points of `mint`, values through `serde`.
+//! Types and traits of other crates: byte streams of `embedded-io`, messages of `embedded-can`, points of `mint`, values
+//! through `serde`.
 
 // Requirements: B-09, P-11
 
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
+use dibs_nostd::wire::canfd::Identifiers;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, enframe};
 use dibs_nostd::{
     Advance, Budget, Capsule, Contacts, Cost, Millis, Options, Query, Side, SurfaceLimits, Ticks,
     Tree, TreeBytes,
 };
 use dibs_tests::bus::collect;
+use embedded_can::{ExtendedId, Frame, Id};
 use embedded_io::{ErrorKind, ErrorType, Read, Write};
 use serde_json::{Value, from_str, json, to_string, to_value};
 
@@ -141,6 +144,72 @@ fn a_stream_gives_and_takes_what_slices_do() {
     assert_eq!(bus.send_status_to(&mut full, later), Ok(12));
     let mut broken = Line { bytes: &[], taken: Vec::new(), each: usize::MAX, room: 0 };
     assert_eq!(bus.send_status_to(&mut broken, Millis(3_000)), Err(ErrorKind::TimedOut));
+}
+
+/// A driver's message of at most this many bytes: 64 with CAN-FD, 8 without.
+struct Message<const ROOM: usize> {
+    id: Id,
+    data: Vec<u8>,
+    is_remote: bool,
+}
+
+impl<const ROOM: usize> Frame for Message<ROOM> {
+    fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
+        let id = id.into();
+        (data.len() <= ROOM).then(|| Self { id, data: data.to_vec(), is_remote: false })
+    }
+
+    fn new_remote(id: impl Into<Id>, _: usize) -> Option<Self> {
+        Some(Self { id: id.into(), data: Vec::new(), is_remote: true })
+    }
+
+    fn is_extended(&self) -> bool {
+        matches!(self.id, Id::Extended(_))
+    }
+
+    fn is_remote_frame(&self) -> bool {
+        self.is_remote
+    }
+
+    fn id(&self) -> Id {
+        self.id
+    }
+
+    fn dlc(&self) -> usize {
+        self.data.len()
+    }
+
+    fn data(&self) -> &[u8] {
+        &self.data
+    }
+}
+
+#[test]
+fn messages_of_can_carry_a_frame_and_its_status() {
+    let (positions, built) = heart();
+    let (now, identifiers) = (Millis(1_000), Identifiers::new(0x120).expect("11 bits"));
+    let id = FrameId { mesh_id: built.summary().mesh_id, session: 1, epoch: 1 };
+    let rows = built.to_rows(&positions);
+    let encoder = FrameEncoder::<_, 64>::new(id, Encoding::Float, &rows[..]).expect("valid");
+    let (mut bus, _) = start(&built);
+    for packet in collect(encoder.with_freshness(Freshness { age_ms: 0, echo: Some(1_000) })) {
+        let message: Message<64> = identifiers.frame_of(&packet).expect("CAN-FD has the room");
+        assert!(identifiers.frame_of::<Message<8>>(&packet).is_none(), "CAN has not");
+        assert_eq!(identifiers.packet_to_sender(&message), None);
+        // The same number with 29 bits is another identifier, and a request has no packet.
+        let id = ExtendedId::new(0x122).expect("29 bits");
+        assert_eq!(identifiers.packet_to_receiver(&Message::<64>::new(id, &packet).unwrap()), None);
+        let request = Message::<64>::new_remote(message.id, 8).expect("a request");
+        assert_eq!(identifiers.packet_to_receiver(&request), None);
+        let received = identifiers.packet_to_receiver(&message).expect("for the receiver");
+        bus.packet(received, now).expect("a good packet");
+    }
+    assert!(work(&mut bus), "published");
+    let mut status = [0; 64];
+    let status = bus.status(now, &mut status).expect("news");
+    let message: Message<64> = identifiers.frame_of(status).expect("room");
+    assert_eq!(identifiers.packet_to_sender(&message), Some(status));
+    assert_eq!(identifiers.packet_to_receiver(&message), None);
 }
 
 #[test]

@@ -35,6 +35,11 @@ fn the_guide_leads_to_an_answer_on_a_host_and_on_the_board() {
     // An edit of a source does not run the build script again; a change of the mesh does, and its error names the file.
     let source = block(section(1), "`src/main.rs`");
     guard.write("src/main.rs", &format!("{source}// An edit.\n"));
+    // The bytes in flash, without their validation.
+    guard.write("src/main.rs", &source.replace("::new(&tree)", "::new(&heart::TREE)"));
+    let log = guard.cargo("build --release", false);
+    assert!(log.contains("call `.validate()` first"), "{log}");
+    guard.write("src/main.rs", &source);
     let ran = |log: &str| log.contains("build-script-build`");
     assert!(!ran(&guard.cargo("build --release -vv", true)));
     guard.write("heart.ply", "no mesh");

@@ -1,4 +1,5 @@
-//! No message assigns a position to the wrong vertex. `DIBS_FRAMES` sets the number of messages.
+//! No message assigns a position to the wrong vertex. `DIBS_FRAMES` sets the number of messages, and `DIBS_WRITE` writes
+//! their record into the repository's `docs/evidence/bridge.md`.
 
 // Requirement: B-10
 
@@ -11,6 +12,7 @@ use dibs_build::glam::Vec3;
 use dibs_build::{Builder, Mesh};
 use dibs_stream::SurfaceOrder;
 use fastrand::Rng;
+use std::path::Path;
 
 /// Messages between two changes of the topology.
 const RUN: u64 = 50;
@@ -138,20 +140,40 @@ fn wrong_correspondences(mesh: &Mesh, messages: u64, seed: u64) -> (u64, u64) {
     (wrong, refused)
 }
 
+/// The record's beginning.
+const HEAD: &str = "
+## Correspondences
+
+Messages POLYDATA whose positions say which vertex they are of. After 50 messages each time, other points, faces or another
+mesh with as many points. Written by
+`DIBS_FRAMES=1000000 DIBS_WRITE=1 cargo test --release -p dibs-cli no_vertex_is_taken_for_another`.
+
+| triangles | messages | changes | of the mesh, every vertex in its place | of another mesh, refused | wrong |
+|---|---|---|---|---|---|
+";
+
 #[test]
 fn no_vertex_is_taken_for_another() {
     let messages =
         std::env::var("DIBS_FRAMES").map_or(4000, |count| count.parse().expect("a number"));
     let organs = [heart(1000).expect("a size").mesh, brain(2000).expect("a size")];
+    let mut table = String::new();
     for (seed, mesh) in (1..).zip(&organs) {
         let (wrong, refused) = wrong_correspondences(mesh, messages / 2, seed);
-        let triangles = mesh.triangles.len();
-        println!(
-            "{triangles} triangles: {} messages, {refused} of another mesh, {wrong} wrong",
-            messages / 2
-        );
+        let (triangles, each) = (mesh.triangles.len(), messages / 2);
+        let ours = each - refused - wrong;
+        table +=
+            &format!("| {triangles} | {each} | {} | {ours} | {refused} | {wrong} |\n", each / RUN);
         assert_eq!(wrong, 0);
         assert!((messages / 10..messages / 4).contains(&refused), "{refused}");
+    }
+    println!("{HEAD}{table}");
+    if std::env::var_os("DIBS_WRITE").is_some() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository");
+        let page = root.join("docs").join("evidence/bridge.md");
+        let old = std::fs::read_to_string(&page).expect("the page");
+        let before = old.split("\n## Correspondences").next().unwrap_or_default();
+        std::fs::write(page, format!("{before}{HEAD}{table}")).expect("writable");
     }
 }
 

@@ -237,6 +237,7 @@ fn what_no_source_is_is_one_sentence() {
         (format!("--from igtl:{mute_address} --retry 1"), 1, "has sent no message within 1 s"),
         (format!("--from igtl-listen:{taken}"), 1, "cannot listen there"),
         ("--from igtl:18944".to_owned(), 2, "igtl:HOST:PORT"),
+        ("--from ros2:/heart".to_owned(), 2, "examples/ros2/surface_node.py"),
         ("--from - --device heart".to_owned(), 1, "only OpenIGTLink has devices"),
         (format!("--from igtl:{closed} --format json"), 1, "OpenIGTLink have its own"),
         ("--from - --axes RAS".to_owned(), 2, "FROM:TO"),

@@ -20,7 +20,7 @@ use super::{Budget, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
 #[cfg(feature = "control")]
 use crate::tree::LabelSet;
-use crate::tree::RootSet;
+use crate::tree::{RootSet, ValidTree};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool, Tree, TriangleRow};
 
@@ -154,12 +154,12 @@ pub enum Fallback {
 }
 
 impl<'t, I: Index, const STACK: usize, const OPENED: usize> Tracker<'t, I, STACK, OPENED> {
-    /// A new tracker on `tree`, which remembers nothing between searches for contacts.
+    /// A new tracker on `tree`, a [`Tree`], which remembers nothing between searches for contacts.
     ///
     /// # Errors
     /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
     #[inline(always)]
-    pub const fn new(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
+    pub fn new(tree: &impl ValidTree<'t, I>) -> Result<Self, QueryError> {
         Self::with_range(tree)
     }
 }
@@ -173,7 +173,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     /// # Errors
     /// [`QueryError::Stack`] if `STACK` is less than the tree needs.
     #[inline(always)]
-    pub const fn with_range(tree: &Tree<'t, I>) -> Result<Self, QueryError> {
+    pub fn with_range(tree: &impl ValidTree<'t, I>) -> Result<Self, QueryError> {
+        let tree = tree.valid();
         if tree.stack() as usize > STACK {
             return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }

@@ -63,8 +63,9 @@ const TICK: &[Gives] = &[
     ("Unavailable", TRUST),
     ("QueryError", Only(&["Position", "Uncovered", "Corrupt", "OtherTree", "OtherFrame"])),
 ];
-const CONTACTS: &[Gives] =
-    &[("Unavailable", TRUST), ("QueryError", But(&["Stack", "VertexCount", "BlendTime"]))];
+/// Where a tick or its answer is made.
+const NO_TICK: &[&str] = &["Stack", "VertexCount", "BlendTime", "NoVertexOrder"];
+const CONTACTS: &[Gives] = &[("Unavailable", TRUST), ("QueryError", But(NO_TICK))];
 const ADMIT: &[Gives] = &[
     ("Unavailable", TRUST),
     ("QueryError", Only(&["Position", "Uncovered", "Corrupt", "OtherTree", "OtherFrame"])),
@@ -212,7 +213,7 @@ pub const CALLS: &[Call] = &[
          margin is larger than the list's.",
         &[
             ("Unavailable", But(&["NoDirection", "NotFinite", "NoPose"])),
-            ("QueryError", But(&["Stack", "VertexCount", "BlendTime"])),
+            ("QueryError", But(NO_TICK)),
         ],
         "It has no state.",
     ),
@@ -286,6 +287,7 @@ pub const NEVER: &[(&str, &[&str], &str)] = &[
         "it collects the errors of all calls, for `?`; the calls of `guard` give the inner error",
     ),
     ("QueryError", &["BlendTime"], "a guard makes the time between frames itself"),
+    ("QueryError", &["NoVertexOrder"], "a bus without the order takes rows"),
     (
         "LimitError",
         &["Order", "Untrippable", "Recovery"],
