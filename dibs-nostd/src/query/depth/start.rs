@@ -92,8 +92,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             return Ok(*near);
         }
         let along = parameter * self.tool.axis_length();
-        let (ahead, behind) = (self.touches.ahead(along), self.touches.behind(along));
-        let way = if parameter > 0.0 { behind } else { ahead };
+        let touches = &self.touches;
+        let way = if parameter > 0.0 { touches.behind(along) } else { touches.ahead(along) };
         if way.is_outside && way.from == along {
             return Ok(self.at(parameter, 0.0, near));
         }
