@@ -45,7 +45,9 @@ fn main() -> Result<()> {
     let page = page(&rows, &scripts);
     print!("{page}");
     if env::args().any(|argument| argument == "--write") {
-        fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/evidence/compile-time.md"), page)?;
+        let evidence = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/evidence").into();
+        let evidence = env::var_os("DIBS_EVIDENCE").unwrap_or(evidence);
+        fs::write(Path::new(&evidence).join("compile-time.md"), page)?;
     }
     Ok(())
 }

@@ -36,6 +36,9 @@ enum Task {
     /// Measures every promise, and writes docs/evidence/guarantees.json and docs/evidence/guarantees.md.
     #[command(disable_help_flag = true)]
     Guarantees(Passed),
+    /// Measures everything that docs/evidence shows in one run, and writes its pages.
+    #[command(disable_help_flag = true)]
+    Evidence(Passed),
     /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     #[command(disable_help_flag = true)]
     Profile(Passed),
@@ -63,6 +66,7 @@ fn main() -> ExitCode {
         Task::Bench(passed) => prove::bench(&passed),
         Task::Peers(passed) => peers::peers(&passed.arguments),
         Task::Guarantees(passed) => prove::run("guarantees", &passed),
+        Task::Evidence(passed) => prove::evidence(&passed),
         Task::Profile(passed) => prove::run("profile", &passed),
         Task::Bound(passed) => prove::run("bound", &passed),
         Task::Viewer(options) => viewer::viewer(&options),

@@ -36,6 +36,15 @@ pub fn run(task: &str, passed: &Passed) -> Result<()> {
     end(command("dibs-prove").arg(task).args(&passed.arguments))
 }
 
+/// Measures all evidence. Everything is built first, so that no part is slow, or timed, for a compilation beside it.
+pub fn evidence(passed: &Passed) -> Result<()> {
+    let mut prove = with_workspace()?;
+    let mut build = Command::new("cargo");
+    build.args(["build", "--quiet", "--release", "--package", BENCH]);
+    xtask::process::run(build.current_dir(workspace::root()))?;
+    end(prove.arg("evidence").args(&passed.arguments))
+}
+
 /// Runs the paper's experiments.
 pub fn bench(passed: &Passed) -> Result<()> {
     end(command(BENCH).args(&passed.arguments))

@@ -14,7 +14,8 @@ use crate::workspace;
 const REASON_LINES: usize = 4;
 
 const PASSED: &str = "passed";
-const FAILED: &str = "FAILED";
+/// How the line of a step that failed begins.
+pub const FAILED: &str = "FAILED";
 
 /// The result of a step.
 pub enum Outcome {

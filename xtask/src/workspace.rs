@@ -47,6 +47,15 @@ pub fn build() -> Result<()> {
     run(cargo.current_dir(root()))
 }
 
+/// The variable that names another folder for the evidence.
+pub const EVIDENCE: &str = "DIBS_EVIDENCE";
+
+/// The folder of pages and records that programs write: `docs/evidence`, or in a run of `cargo xtask evidence` one of
+/// its own.
+pub fn evidence() -> PathBuf {
+    env::var_os(EVIDENCE).map_or_else(|| root().join("docs/evidence"), PathBuf::from)
+}
+
 /// Cargo's target folder.
 pub fn target() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |dir| root().join(dir))

@@ -131,7 +131,7 @@ fn follow<I: Index>(
             // Where the axis crosses, another part of it may be inside, less deep.
             let is_bounded = closest.side == Side::Crossing && list.bound() == closest.lower;
             let is_whole = list.bound() >= MARGIN || is_bounded;
-            ensure!(is_whole, "tick {tick}: contacts only within {}", list.bound());
+            ensure!(is_whole, "tick {tick}: contacts only within {} of {closest:?}", list.bound());
             contacts.push(list.len() as f64);
             near.push(f64::from(closest.triangle_tests));
             crossing += u32::from(closest.side == Side::Crossing);

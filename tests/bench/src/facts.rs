@@ -23,10 +23,14 @@ pub fn of(experiment: &str, plan: &Plan, options: &Options, records: &mut Record
     if options.quick {
         command += " --quick";
     }
+    if options.release {
+        command += " --release";
+    }
     if let Some(queries) = options.queries {
         command += &format!(" --queries {queries}");
     }
     match options.only {
+        Some(Only::Paper) => command += " --only paper",
         Some(Only::Embedded) => command += " --only embedded",
         Some(Only::Imaging) => command += " --only imaging",
         Some(Only::Contacts) => command += " --only contacts",

@@ -11,6 +11,9 @@ pub struct Options {
     /// A few minutes instead of half an hour: fewer queries. Writes to target/bench, not to docs.
     #[arg(long)]
     pub quick: bool,
+    /// The size of `cargo xtask evidence`.
+    #[arg(long, conflicts_with = "quick")]
+    pub release: bool,
     /// At most this many queries of each brain and tool, instead of the paper's 10,000.
     #[arg(long)]
     pub queries: Option<usize>,
@@ -34,6 +37,8 @@ pub struct Options {
 /// A part that is measured by itself.
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Only {
+    /// The paper's experiments themselves.
+    Paper,
     /// The control loop at imaging rates: ten minutes on a quiet machine.
     Imaging,
     /// Surfaces that nodes move: ten minutes on a quiet machine.
@@ -91,10 +96,29 @@ impl Plan {
 
     /// The plan of these arguments.
     pub fn of(options: &Options) -> Self {
-        let mut plan = if options.quick { Self::quick() } else { Self::full() };
+        let mut plan = match options {
+            Options { quick: true, .. } => Self::quick(),
+            Options { release: true, .. } => Self::release(),
+            _ => Self::full(),
+        };
         let most = options.queries.unwrap_or(usize::MAX);
         plan.brains.iter_mut().for_each(|(_, queries)| *queries = most.min(*queries));
         plan
+    }
+
+    /// Meant for twenty minutes for all parts.
+    pub fn release() -> Self {
+        Self {
+            name: "release",
+            brains: vec![(500, 2_000), (5_000, 2_000), (50_000, 2_000), (500_000, 500)],
+            exhaustive_most: 50,
+            ticks: 3_500,
+            ablation_queries: 500,
+            imaging_ticks: 2_000,
+            contact_ticks: 3_000,
+            board_ticks: 21_000,
+            ..Self::full()
+        }
     }
 
     /// Within ten minutes on two cores, compilation included.

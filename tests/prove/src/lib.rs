@@ -7,6 +7,7 @@ pub mod bound;
 pub mod checks;
 pub mod data;
 pub mod demo;
+pub mod evidence;
 pub mod faults;
 pub mod footprint;
 pub mod harness;

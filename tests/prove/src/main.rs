@@ -1,4 +1,4 @@
-//! Measures and proves: `cargo xtask demo | guarantees | profile | bound | mutants | processors` run this, and `test` its checks.
+//! Measures and proves: `cargo xtask demo | evidence | guarantees | profile | bound | mutants | processors` run this, and `test` its checks.
 //! docs/proofs.md lists the file for each promise.
 
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use dibs_prove::harness::{self, Effort};
-use dibs_prove::{bound, demo, mutants, processors, profile};
+use dibs_prove::{bound, demo, evidence, mutants, processors, profile};
 use xtask::steps::{Outcome, Steps};
 
 /// `cargo xtask` passes its arguments on to this.
@@ -21,6 +21,7 @@ struct Arguments {
 enum Task {
     Demo(demo::Options),
     Guarantees(harness::Options),
+    Evidence(evidence::Options),
     /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     Profile,
     Bound(bound::report::Options),
@@ -52,6 +53,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().task {
         Task::Demo(options) => demo::run(&options),
         Task::Guarantees(options) => harness::guarantees(&options),
+        Task::Evidence(options) => evidence::run(&options),
         Task::Profile => profile::run(),
         Task::Bound(options) => bound::report::run(&options),
         Task::Mutants(options) => mutants::mutants(&options),

@@ -16,6 +16,7 @@ use xtask::toolchain::Cross;
 use xtask::{qemu, workspace};
 
 use crate::harness::record;
+use crate::harness::run::Run;
 use crate::probe::script::{Asks, Script, Start};
 use crate::probe::{build_for_board, executions};
 
@@ -62,7 +63,7 @@ pub fn run() -> Result<()> {
         }
     }
     let queries = script.queries() as f64;
-    let file = workspace::root().join("docs/evidence").join("performance.md");
+    let file = workspace::evidence().join("performance.md");
     fs::write(&file, document(&parts, queries)?)
         .with_context(|| format!("cannot write {}", file.display()))?;
     println!("{}", file.display());
@@ -112,12 +113,13 @@ fn document(parts: &BTreeMap<&str, u64>, queries: f64) -> Result<String> {
     let total: u64 = parts.values().sum();
     let mut text = format!(
         "# Where a query's instructions go\n\n\
-         Written by `cargo xtask profile`: do not edit. Instructions of an emulated Cortex-M7, not cycles; what \
+         Written by `cargo xtask profile` at commit {}: do not edit. Instructions of an emulated Cortex-M7, not cycles; what \
          they say about cycles, and how to measure those on silicon, is in [guarantees.md](guarantees.md).\n\n\
          The generated heart of 10,272 triangles as it beats, limit 1.5, the capsule of table 3 at {queries} \
          ticks spread over its path, warm start, measured stretch; every executed instruction counted: \
          {:.0} a query in the mean.\n\n\
          | part of a query | instructions | share |\n|---|---:|---:|\n",
+        Run::now(String::new()).commit,
         total as f64 / queries
     );
     let mut rows: Vec<_> = parts.iter().collect();

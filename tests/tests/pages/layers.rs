@@ -9,6 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
+use crate::page::evidence;
+
 /// The folders that each folder imports from.
 type Imports = BTreeMap<String, BTreeSet<String>>;
 
@@ -60,7 +62,8 @@ fn the_page_lists_the_imports_of_today() {
     let page = fs::read_to_string(&path).expect("the page");
     let (head, listed) = page.split_once("\n\n|").expect("a table");
     if env::var_os("DIBS_WRITE").is_some() {
-        fs::write(path, format!("{head}\n\n{now}")).expect("writable");
+        // The head is of `docs/evidence`, wherever the page goes.
+        fs::write(evidence("dependencies.md"), format!("{head}\n\n{now}")).expect("writable");
     } else {
         assert_eq!(format!("|{listed}"), now, "write it anew with DIBS_WRITE=1");
     }

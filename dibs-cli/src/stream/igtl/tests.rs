@@ -169,8 +169,9 @@ fn no_vertex_is_taken_for_another() {
     }
     println!("{HEAD}{table}");
     if std::env::var_os("DIBS_WRITE").is_some() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the repository");
-        let page = root.join("docs").join("evidence/bridge.md");
+        let evidence = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/evidence").into();
+        let evidence = std::env::var_os("DIBS_EVIDENCE").unwrap_or(evidence);
+        let page = Path::new(&evidence).join("bridge.md");
         let old = std::fs::read_to_string(&page).expect("the page");
         let before = old.split("\n## Correspondences").next().unwrap_or_default();
         std::fs::write(page, format!("{before}{HEAD}{table}")).expect("writable");

@@ -164,7 +164,9 @@ fn the_bridge_is_recorded() {
     page += "\n`cargo xtask demo --bridge` is the same to the emulated board.\n";
     println!("{page}");
     if env::var_os("DIBS_WRITE").is_some() {
-        let at = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/evidence/bridge.md");
+        let evidence = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/evidence").into();
+        let evidence = env::var_os("DIBS_EVIDENCE").unwrap_or(evidence);
+        let at = Path::new(&evidence).join("bridge.md");
         // The last section is the record of another test, in `src/stream/igtl/tests.rs`.
         let old = fs::read_to_string(&at).unwrap_or_default();
         let kept = old.find("\n## Correspondences").and_then(|start| old.get(start..));

@@ -72,8 +72,12 @@ pub fn run(options: &Options) -> Result<()> {
     qemu::find()?;
     let run = Run::now(String::new());
     let probe = build_for_board(&Cross::find()?, "probe")?;
-    let findings = findings(&probe, options.queries, options.traces)?;
-    let page = page(&findings, &run)?;
+    write(&findings(&probe, options.queries, options.traces)?, &run)
+}
+
+/// Writes the page of a run, unless it found an error.
+pub fn write(findings: &Findings, run: &Run) -> Result<()> {
+    let page = page(findings, run)?;
     let above: usize = findings.rows.iter().map(|row| row.counted.above).sum();
     let broken: Vec<_> = findings.rows.iter().flat_map(|row| &row.traced.broken).collect();
     ensure!(above == 0, "{above} queries are above their bound");
@@ -84,7 +88,7 @@ pub fn run(options: &Options) -> Result<()> {
         println!("{page}\nbound.md is left as it is: commit the changes first");
         return Ok(());
     }
-    let file = workspace::root().join("docs/evidence").join("bound.md");
+    let file = workspace::evidence().join("bound.md");
     fs::write(&file, page).with_context(|| format!("cannot write {}", file.display()))?;
     println!("{}", file.display());
     Ok(())

@@ -5,13 +5,14 @@
 use anyhow::Result;
 use xtask::steps::Outcome;
 
-use crate::bound::report::{Row, findings};
+use crate::bound::report::{Row, findings, write};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{
     Bound, Promise,
     criteria::{FLOW, TIMING},
     note,
 };
+use crate::harness::run::Run;
 use crate::harness::{Check, Effort};
 use crate::probe::{board, build_for_board};
 
@@ -127,6 +128,9 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let probe = build_for_board(&board()?, "probe")?;
     let queries = effort.costs;
     let found = findings(&probe, queries, (queries / TRACED).min(2_000))?;
+    if effort.is_record {
+        write(&found, &Run::now(effort.size()))?;
+    }
     let sum = |of: fn(&Row) -> usize| found.rows.iter().map(of).sum::<usize>() as f64;
     figures.note("bound.queries", sum(|row| row.counted.queries));
     figures.note("bound.above", sum(|row| row.counted.above));

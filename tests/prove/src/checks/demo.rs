@@ -141,6 +141,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     {
         figures.note(name, number(&report["network"][field], field)? * 100.0);
     }
+    keep(effort, "demo", "heart")?;
     Ok(Outcome::Passed)
 }
 
@@ -185,6 +186,23 @@ pub fn report_of(Run { seconds, faults, c, hand, nodes }: Run) -> Result<Value> 
 
 pub fn folder(name: &str) -> PathBuf {
     workspace::target().join("guarantees").join(name)
+}
+
+/// Keeps the report and the pictures of a recorded run in the folder `demo/NAME` of the evidence.
+pub fn keep(effort: &Effort, from: &str, name: &str) -> Result<()> {
+    if !effort.is_record {
+        return Ok(());
+    }
+    let to = workspace::evidence().join("demo").join(name);
+    fs::create_dir_all(&to)?;
+    for file in fs::read_dir(folder(from))? {
+        let file = file?;
+        let name = file.file_name();
+        if name == "report.json" || Path::new(&name).extension().is_some_and(|kind| kind == "svg") {
+            fs::copy(file.path(), to.join(name))?;
+        }
+    }
+    Ok(())
 }
 
 /// The report in a folder.

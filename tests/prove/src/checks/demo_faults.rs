@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use serde_json::Value;
 use xtask::steps::Outcome;
 
-use super::demo::{Run, number, report_of};
+use super::demo::{Run, keep, number, report_of};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{
     Bound, Promise,
@@ -86,5 +86,6 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     ] {
         figures.note(name, number(&report["silence"][field], field)?);
     }
+    keep(effort, "demo-faults", "faults")?;
     Ok(Outcome::Passed)
 }

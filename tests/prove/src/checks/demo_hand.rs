@@ -5,7 +5,7 @@
 use anyhow::Result;
 use xtask::steps::Outcome;
 
-use super::demo::{Run, number, report_of};
+use super::demo::{Run, keep, number, report_of};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{
     Bound, Promise,
@@ -120,5 +120,6 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     note("demo.hand.filter.largest", &commanded["answer_instructions_max"])?;
     let unsafe_ticks = report["reasons"]["no safe motion"].as_f64().unwrap_or(0.0);
     figures.note("demo.hand.unsafe", unsafe_ticks);
+    keep(effort, "demo-hand", "hand")?;
     Ok(Outcome::Passed)
 }

@@ -61,7 +61,7 @@ pub fn tell(
     note("not-recovered", sum(|row| row.not_recovered));
     note("recovered-within", f64::from(most));
     if effort.is_record {
-        let file = workspace::root().join("docs/evidence").join(file);
+        let file = workspace::evidence().join(file);
         record.write(&file).with_context(|| format!("cannot write {}", file.display()))?;
     }
     record.verdict().map(|()| Outcome::Passed)

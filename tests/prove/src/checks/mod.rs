@@ -133,6 +133,15 @@ pub const BESIDE: [&str; 13] = [
     python::CHECK.name,
 ];
 
+/// Checks that build no program and boot none: in `cargo xtask evidence` they run in whatever lane is idle.
+pub const EITHER: [&str; 5] = [
+    anytime::CHECK.name,
+    sides::CHECK.name,
+    hand::CHECK.name,
+    filter::CHECK.name,
+    carried::CHECK.name,
+];
+
 /// Fits all constants, or those whose names contain `only`.
 pub fn fit(only: Option<&str>) -> Result<()> {
     cost::fit(only)?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use xtask::process::{quiet, run};
 use xtask::steps::Outcome;
 use xtask::toolchain::add_target;
@@ -88,10 +88,8 @@ const MACHINES: [Machine; 2] = [
 ];
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    for machine in &MACHINES {
-        if let Err(error) = add_target(machine.target).and_then(|()| machine.find()) {
-            return Ok(Outcome::Skipped(format!("{}: {error:#}", machine.name)));
-        }
+    if let Err(error) = prepare() {
+        return Ok(Outcome::Skipped(format!("{error:#}")));
     }
     let script = Script::adversarial(effort.bits, Draw::EitherWay, 2);
     let path = Script::beating(effort.ticks.min(MOST_TICKS), Start::Warm, Asks::Distance);
@@ -113,6 +111,14 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
         figures.note(&format!("processors.{name}.mean"), machine.mean(&on_path)?);
     }
     Ok(Outcome::Passed)
+}
+
+/// Finds or installs compilers and emulators.
+pub fn prepare() -> Result<()> {
+    for machine in &MACHINES {
+        add_target(machine.target).and_then(|()| machine.find()).context(machine.name)?;
+    }
+    Ok(())
 }
 
 /// Ticks on the path: the same number in every run, because their mean is a golden figure.

@@ -48,6 +48,9 @@ pub struct Effort {
     pub share: u32,
 }
 
+/// In place of a divisor.
+const RELEASED: u32 = u32::MAX;
+
 impl Effort {
     /// The sizes that the documents state.
     pub const FULL: Self = Self {
@@ -102,6 +105,33 @@ impl Effort {
         share: 0,
     };
 
+    /// The sizes of `cargo xtask evidence`, meant for 45 minutes on two idle cores.
+    pub const RELEASE: Self = Self {
+        cases: 100_000,
+        sides: 100_000,
+        carried: 1_000_000,
+        walks: 500,
+        board_walks: 50,
+        board_glides: 3,
+        board_glide_ticks: 3_000,
+        bits: 10_000,
+        costs: 10_000,
+        host_costs: 10_000,
+        ticks: 250,
+        poses: 1_000,
+        tick_frames: 40,
+        torn: 10_000,
+        faults: 1_000,
+        board_faults: 1,
+        demo_seconds: 10,
+        fault_seconds: 20,
+        flood_seconds: 5,
+        fuzz_seconds: 60,
+        is_record: true,
+        is_whole: true,
+        share: RELEASED,
+    };
+
     /// A fraction 1 / `share` of the cases, but at least as many as in a run of the tests.
     pub fn divided(self, share: u32) -> Self {
         let wide = |full: usize, least: usize| (full / share as usize).max(least);
@@ -132,11 +162,12 @@ impl Effort {
         }
     }
 
-    /// The size as the records state it: `full`, `1/4`, or `test`.
+    /// The size as the records state it: `full`, `1/4`, `release`, or `test`.
     pub fn size(&self) -> String {
         match self.share {
             0 => "test".to_owned(),
             1 => "full".to_owned(),
+            RELEASED => "release".to_owned(),
             share => format!("1/{share}"),
         }
     }

@@ -103,7 +103,7 @@ fn of(out: &mut String, run: Option<&Run>) -> Result<()> {
 }
 
 fn read(name: &str) -> Result<Option<Faults>> {
-    let file = workspace::root().join("docs/evidence").join(name);
+    let file = workspace::evidence().join(name);
     if !file.is_file() {
         return Ok(None);
     }

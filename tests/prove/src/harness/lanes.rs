@@ -10,17 +10,18 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
-use xtask::steps::Steps;
+use xtask::steps::{FAILED, Outcome, Steps};
 use xtask::workspace;
 
 use super::figures::Figures;
 use super::run::Run;
-use super::{Effort, Measured};
+use super::{Check, Effort, Measured};
 use crate::checks::{BESIDE, CHECKS};
 use crate::demo;
 
 /// Files through which the two processes communicate.
 const EFFORT: &str = "effort.json";
+const WANTED: &str = "checks.json";
 const FOUND: &str = "found.json";
 const STEPS: &str = "steps.txt";
 const LOG: &str = "log.txt";
@@ -48,11 +49,9 @@ impl Beside {
         if folder.exists() {
             fs::remove_dir_all(&folder)?;
         }
-        fs::create_dir_all(&folder)?;
-        fs::write(folder.join(EFFORT), serde_json::to_string(effort)?)?;
+        let mut command = command(&env::current_exe()?, &folder, effort, &BESIDE)?;
         let log = File::create(folder.join(LOG))?;
-        let mut command = Command::new(env::current_exe()?);
-        command.arg("beside").arg(&folder).stdout(log.try_clone()?).stderr(log);
+        command.stdout(log.try_clone()?).stderr(log);
         Ok(Self { process: command.spawn()?, folder })
     }
 
@@ -84,12 +83,44 @@ impl Beside {
     }
 }
 
+/// The second process, or the process of a part of `cargo xtask evidence`: runs checks, with this program.
+pub fn command(program: &Path, folder: &Path, effort: &Effort, checks: &[&str]) -> Result<Command> {
+    fs::create_dir_all(folder)?;
+    fs::write(folder.join(EFFORT), serde_json::to_string(effort)?)?;
+    fs::write(folder.join(WANTED), serde_json::to_string(checks)?)?;
+    let mut command = Command::new(program);
+    command.arg("beside").arg(folder);
+    Ok(command)
+}
+
+/// The outcome of the process of one check. It is an error if a figure is missing, for whatever reason.
+pub fn outcome(folder: &Path, check: &Check) -> Result<Outcome> {
+    let steps = fs::read_to_string(folder.join(STEPS))?;
+    ensure!(!steps.starts_with(FAILED), "{steps}");
+    let figures = figures(folder)?.context("no figures")?;
+    let missing: Vec<&str> = check.promises.iter().map(|promise| promise.id).collect();
+    let missing: Vec<&str> = missing.into_iter().filter(|id| figures.get(id).is_none()).collect();
+    ensure!(missing.is_empty(), "without {}: {steps}", missing.join(", "));
+    let found: Found = read(&folder.join(FOUND))?;
+    Ok(if found.skipped.is_empty() { Outcome::Passed } else { Outcome::Skipped(steps) })
+}
+
+/// The figures that a process found, if the folder is of one.
+pub fn figures(folder: &Path) -> Result<Option<Figures>> {
+    let file = folder.join(FOUND);
+    if !file.is_file() {
+        return Ok(None);
+    }
+    Ok(Some(read::<Found>(&file)?.figures))
+}
+
 /// Does the work of the second process.
 pub fn run(folder: &Path) -> Result<()> {
     let effort: Effort = read(&folder.join(EFFORT))?;
+    let wanted: Vec<String> = read(&folder.join(WANTED))?;
     let mut steps = Steps::default();
     let mut measured = Measured::new(Run::now(effort.size()));
-    measured.run_each(&effort, |name| BESIDE.contains(&name), &mut steps);
+    measured.run_each(&effort, |name| wanted.iter().any(|one| one == name), &mut steps);
     if !effort.is_record {
         steps.run("demo on this computer", || demo::on_host(effort.demo_seconds));
     }

@@ -11,10 +11,13 @@ pub mod promise;
 pub mod record;
 pub mod run;
 
+use std::path::PathBuf;
+
 use anyhow::{Result, ensure};
 use xtask::steps::{Outcome, Steps};
 
 use crate::checks::{BESIDE, CHECKS, ON_REQUEST};
+use crate::evidence::pages;
 pub use effort::Effort;
 use figures::Figures;
 use lanes::Beside;
@@ -59,6 +62,9 @@ pub struct Options {
     /// run can continue.
     #[arg(long, conflicts_with_all = ["only", "quick"])]
     resume: bool,
+    /// Combines the parts of a run of `cargo xtask evidence` in this folder.
+    #[arg(long, hide = true)]
+    gather: Option<PathBuf>,
     /// Golden figures whose names start with this may be recorded above the lowest value ever recorded.
     #[arg(long, value_delimiter = ',', requires = "because")]
     raise: Vec<String>,
@@ -81,6 +87,9 @@ pub fn guarantees(options: &Options) -> Result<()> {
     let raise = Raise { names: &options.raise, because: &options.because };
     if options.resume {
         return resume(&effort, raise);
+    }
+    if let Some(folder) = &options.gather {
+        return pages::gather(folder, Run::now(Effort::RELEASE.size()), raise);
     }
     let mut steps = Steps::default();
     let measured = run(&effort, only, &mut steps);

@@ -3,7 +3,7 @@
 // Requirements: E-01, E-02
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
@@ -45,12 +45,15 @@ pub struct Raise<'a> {
 }
 
 pub fn json() -> PathBuf {
-    workspace::root().join("docs/evidence").join("guarantees.json")
+    workspace::evidence().join("guarantees.json")
 }
 
 pub fn committed() -> Result<Vec<Record>> {
-    let file = json();
-    let text = fs::read_to_string(&file)
+    read(&json())
+}
+
+fn read(file: &Path) -> Result<Vec<Record>> {
+    let text = fs::read_to_string(file)
         .with_context(|| format!("no {}: `cargo xtask guarantees` makes it", file.display()))?;
     Ok(serde_json::from_str(&text)?)
 }
@@ -92,6 +95,24 @@ pub fn write(measured: &Measured, raise: Raise<'_>) -> Result<()> {
     save(&records)?;
     ensure!(broken.is_empty(), "{}", broken.join("\n"));
     Ok(())
+}
+
+/// Writes both documents, all of one run. The floors of golden figures are those of docs/evidence, wherever it writes.
+///
+/// # Errors
+/// If a figure is missing or breaks its bound; nothing is written then.
+pub fn write_whole(measured: &Measured, raise: Raise<'_>) -> Result<()> {
+    let before = read(&workspace::root().join("docs/evidence/guarantees.json"))?;
+    save(&whole(&before, measured, raise)?)
+}
+
+/// The records of a whole run, or what it lacks and breaks.
+pub fn whole(before: &[Record], measured: &Measured, raise: Raise<'_>) -> Result<Vec<Record>> {
+    let (records, mut broken) = merge(before, measured, raise);
+    let missing = promises().filter(|(_, promise)| measured.figures.get(promise.id).is_none());
+    broken.extend(missing.map(|(check, promise)| format!("{}: no {}", check.name, promise.id)));
+    ensure!(broken.is_empty(), "{}", broken.join("\n"));
+    Ok(records)
 }
 
 /// The records after a run, and the promises that the run broke.

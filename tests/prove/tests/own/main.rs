@@ -4,6 +4,7 @@ mod accuracy;
 mod boards;
 mod bound;
 mod bridged;
+mod evidence;
 mod path;
 mod processors;
 mod proofs;

@@ -6,7 +6,7 @@ use std::fs;
 
 use dibs_prove::harness::figures::Figures;
 use dibs_prove::harness::promise::Bound;
-use dibs_prove::harness::record::{Raise, Record, committed, has, json, merge, promises};
+use dibs_prove::harness::record::{Raise, Record, committed, has, json, merge, promises, whole};
 use dibs_prove::harness::run::{Run, UNKNOWN};
 use dibs_prove::harness::{Measured, markdown};
 
@@ -15,7 +15,7 @@ fn golden() -> &'static str {
     golden.expect("a golden figure").1.id
 }
 
-fn run(commit: &str) -> Run {
+pub fn run(commit: &str) -> Run {
     let [date, compiler, machine, emulator] =
         ["2026-01-01T00:00Z", "rustc", "a machine", "QEMU"].map(str::to_owned);
     Run { date, commit: commit.to_owned(), compiler, machine, emulator, size: "full".into() }
@@ -79,6 +79,33 @@ fn a_partial_recording_does_not_pass_for_a_whole_one() {
     for commit in ["aaaa-dirty", UNKNOWN] {
         let (records, _) = merge(&[], &measured(commit, &all), Raise::default());
         assert!(head(&records).contains("NOT OF ONE"), "{commit}");
+    }
+}
+
+/// Figures that keep their bounds, one of them left out, and one that breaks a bound: its own, another figure, a record.
+#[test]
+fn the_records_of_a_whole_run_are_of_no_other() {
+    let whole_of = |before: &[Record], other: Option<(&str, f64)>| {
+        let kept = promises().map(|(_, promise)| match promise.bound {
+            _ if other.is_some_and(|(id, _)| id == promise.id) => (promise.id, other.unwrap().1),
+            Bound::Is(value) | Bound::AtMost(value) | Bound::AtLeast(value) => (promise.id, value),
+            _ => (promise.id, 1.0),
+        });
+        let kept: Vec<_> = kept.filter(|(_, figure)| !figure.is_nan()).collect();
+        whole(before, &measured("aaaa", &kept), Raise::default())
+    };
+    let (old, _) = merge(&[], &measured("bbbb", &[("filter.ticks", 1.0)]), Raise::default());
+    let records = whole_of(&old, None).expect("all kept");
+    assert!(records.iter().all(|record| record.run.commit == "aaaa"));
+    assert_eq!(records.len(), promises().count());
+    for (id, figure, says) in [
+        ("filter.ticks", f64::NAN, "a filter on this computer: no filter.ticks"),
+        ("filter.violations", 1.0, "filter.violations is 1.0, and must be 0"),
+        ("stack.measured", 1e9, "stack.measured is 1000000000.0, and must be not above"),
+        ("m7.warm.mean", 1e9, "the lowest recorded"),
+    ] {
+        let error = whole_of(&records, Some((id, figure))).expect_err(id).to_string();
+        assert!(error.contains(says), "{error}");
     }
 }
 
