@@ -792,6 +792,10 @@ enum dibs_side
    * No side: the closest point is on an edge of more than two triangles that do not form pairs.
    */
   DIBS_SIDE_NON_MANIFOLD = 9,
+  /**
+   * Of a tracker's kept answer: outside or not, its interval holds the separation.
+   */
+  DIBS_SIDE_EITHER = 10,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
