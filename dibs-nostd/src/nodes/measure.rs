@@ -24,6 +24,21 @@ impl Pass {
         Self { next: 0, squared: LEAST, worst: 0, sizes: [0.0; 2] }
     }
 
+    /// Starts with the stretch of one element, usually the most stretched of the last frame: then few others exceed it,
+    /// and each that exceeds all before it takes twenty times as long as the rest.
+    pub fn start_with<V: VertexTable + ?Sized>(&mut self, nodes: &Nodes<'_>, table: &V, row: u32) {
+        let Some(record) = nodes.parts.elements.get(row as usize) else { return };
+        let Element { corners: [a, b, c, d], rest } = layout::element(record);
+        let at = |node| table.position(node).map(Vec3::into);
+        let (Some(a), Some(b), Some(c), Some(d)) = (at(a), at(b), at(c), at(d)) else { return };
+        let (now, limit) = (Now::of([a, b, c, d]), squared_limit(nodes.limit));
+        // One beyond the limit is an error when its turn comes.
+        if now.is_within(&rest, limit) && !now.is_within(&rest, self.squared) {
+            self.squared = now.squared_stretch(&rest, self.squared, limit);
+            self.worst = row;
+        }
+    }
+
     /// Measures at most `work` elements whose nodes are below row `ready`. Returns the work left. A range of elements
     /// must not shrink below `shrinkage` of its size at rest.
     pub fn advance<V: VertexTable + ?Sized>(
@@ -236,5 +251,38 @@ mod tests {
                 .expect("a stretch error")] += 1;
         }
         assert!(outcomes.iter().all(|&count| count > 20), "{outcomes:?}");
+    }
+
+    /// Wherever a measurement starts, it gives the same stretch to its rounding, and the same refusals.
+    #[test]
+    fn a_start_from_the_last_frame_changes_a_measurement_by_its_rounding() {
+        let mesh = generate::heart(600).expect("a valid size").mesh;
+        let lattice = Volume::lattice(&mesh, [5, 4, 3]).expect("a lattice");
+        let built = Builder::new().stretch(2.0).nodes(&lattice).build(&mesh).expect("held");
+        let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+        let nodes = Nodes::of(&tree).expect("valid");
+        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+        let mut rng = fastrand::Rng::with_seed(63);
+        let mut last = nodes.measure(rest.as_slice()).expect("at rest");
+        let mut outcomes = [0; 2];
+        for round in 0..400 {
+            let mut random = || Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 0.5;
+            let by = if round % 4 == 0 { 30.0 } else { 12.0 };
+            let mut frame: Vec<Vec3> = rest.iter().map(|&at| at + by * random()).collect();
+            if round % 10 == 1 {
+                frame[rng.usize(..rest.len())] = Vec3::NAN;
+            }
+            let [from_none, from_last] =
+                [nodes.measure(frame.as_slice()), nodes.measure_after(frame.as_slice(), &last)];
+            outcomes[usize::from(from_none.is_ok())] += 1;
+            if let (Ok(one), Ok(other)) = (from_none, from_last) {
+                let ratio = other.sigma() / one.sigma();
+                assert!((ratio - 1.0).abs() < 1.0 / 65_536.0, "{one:?} {other:?}");
+                last = other;
+            } else {
+                assert_eq!(std::format!("{from_none:?}"), std::format!("{from_last:?}"));
+            }
+        }
+        assert!(outcomes.iter().all(|&count| count > 50), "{outcomes:?}");
     }
 }

@@ -35,7 +35,10 @@ impl<'t> Frames<'t> {
         self.after.rows.clear();
         self.after.rows.append(&mut self.arrived);
         self.after.stretch = None;
-        let measured = self.nodes.measure(&self.after);
+        let measured = match self.before.stretch {
+            Some(last) => self.nodes.measure_after(&self.after, &last),
+            None => self.nodes.measure(&self.after),
+        };
         self.after.stretch = Some(measured.expect("within the limit"));
     }
 }
