@@ -106,8 +106,10 @@ fn conversation(program: &Path, mesh: &Mesh, is_last: impl Fn(&str) -> bool) -> 
             let line = target.open().expect("a socket");
             let mut sender = Sender::<_, 1024>::new(line, order, Settings::default());
             while !is_over.load(Ordering::Relaxed) && start.elapsed() < PATIENCE {
-                // Refused while the program has no socket yet.
-                let _ = sender.send(&mesh.positions).and_then(|_| sender.poll());
+                // Of now, although it is at rest: otherwise its age is its time at rest. Refused while the program has no
+                // socket yet.
+                let sent = sender.send_captured(&mesh.positions, Duration::ZERO);
+                let _ = sent.and_then(|_| sender.poll());
                 thread::sleep(Duration::from_millis(20));
             }
         });
