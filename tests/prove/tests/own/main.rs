@@ -1,12 +1,11 @@
 //! The program's own tests: it is compiled once, for them and for its user.
 
 mod accuracy;
-mod boards;
 mod bound;
 mod bridged;
 mod evidence;
+mod figures;
 mod path;
-mod processors;
 mod proofs;
 mod records;
 mod root;
