@@ -328,6 +328,8 @@ fn timed(
         Table::Rows if how & how::CONTACTS != 0 => contacts(query, rows, tool, options, machine),
         Table::Rows => clocked(machine, || query.closest(rows, tool, options)),
         Table::Wide => clocked(machine, || query.closest_wide(rows, tool, options)),
+        // The code of all tables is larger than the memory for code of a Cortex-M55's board.
+        _ if cfg!(m55) => Err(Fault),
         Table::Modal(surface) => clocked(machine, || query.closest(surface, tool, options)),
         Table::Remembered(surface) => {
             clocked(machine, || query.closest(&Memo::<_, SLOTS>::new(surface), tool, options))
