@@ -128,8 +128,9 @@ fn follow<I: Index>(
                 query.contacts(&surface, &tool, MARGIN, &options, &mut list)?
             };
             times.push(start.elapsed().as_secs_f64() * 1e6);
-            // Where the axis crosses, another part of it may be inside, less deep.
-            let is_bounded = closest.side == Side::Crossing && list.bound() == closest.lower;
+            // Where the axis crosses or is wholly inside, other parts of it may be inside, less deep.
+            let is_inside = matches!(closest.side, Side::Crossing | Side::Inside);
+            let is_bounded = is_inside && list.bound() == closest.lower;
             let is_whole = list.bound() >= MARGIN || is_bounded;
             ensure!(is_whole, "tick {tick}: contacts only within {} of {closest:?}", list.bound());
             contacts.push(list.len() as f64);
