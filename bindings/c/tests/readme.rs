@@ -44,7 +44,7 @@ fn programs(language: &str) -> Vec<String> {
     blocks.map(str::to_owned).collect()
 }
 
-/// The README's first program, at rest and with moved vertices, says of a sphere what the library in Rust does.
+/// The README's first program prints the Rust library's answers about a sphere, at rest and with moved vertices.
 fn first_answers<I: Index>(mesh: &Mesh, library: &Path, language: &str) {
     let folder = tempfile::tempdir().expect("a folder");
     let built = Builder::new().stretch(1.5).build(mesh).expect("a tree");

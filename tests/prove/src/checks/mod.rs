@@ -133,7 +133,7 @@ pub const BESIDE: [&str; 13] = [
     python::CHECK.name,
 ];
 
-/// Checks that build no program and boot none: in `cargo xtask evidence` they run in whatever lane is idle.
+/// Checks that build no program and boot none: in `cargo xtask evidence` they run in the lane that is idle first.
 pub const EITHER: [&str; 5] = [
     anytime::CHECK.name,
     sides::CHECK.name,

@@ -35,7 +35,7 @@ pub struct Options {
     /// Only parts whose names contain this: measures them and writes no page.
     #[arg(long, conflicts_with = "release")]
     only: Option<String>,
-    /// Lists the parts, the time that each took last, and what is not of the run.
+    /// Lists the parts, the time that each took last, and which pages the run does not write.
     #[arg(long)]
     list: bool,
     /// As for `cargo xtask guarantees`.

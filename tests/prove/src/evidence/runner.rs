@@ -55,7 +55,7 @@ impl Part {
         Self { name: name.to_owned(), place, measure: Box::new(measure) }
     }
 
-    /// Its folder in that of the run.
+    /// The folder of its output, inside the run's.
     pub fn folder(&self, folder: &Path) -> PathBuf {
         folder.join(PARTS).join(self.name.replace(' ', "-"))
     }

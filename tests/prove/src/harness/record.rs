@@ -106,7 +106,7 @@ pub fn write_whole(measured: &Measured, raise: Raise<'_>) -> Result<()> {
     save(&whole(&before, measured, raise)?)
 }
 
-/// The records of a whole run, or what it lacks and breaks.
+/// The records of a whole run. The error names the checks that are missing and the bounds that are broken.
 pub fn whole(before: &[Record], measured: &Measured, raise: Raise<'_>) -> Result<Vec<Record>> {
     let (records, mut broken) = merge(before, measured, raise);
     let missing = promises().filter(|(_, promise)| measured.figures.get(promise.id).is_none());
