@@ -56,6 +56,17 @@ pub enum FrameError {
         /// The unit of the mesh's file, if known.
         unit: Option<Unit>,
     },
+    /// A tetrahedron of a volume is turned inside out, or flat.
+    #[error(
+        "turns the tetrahedron {tetrahedron} (nodes {}) inside out, or flat: no stretch limit admits that, mend the frame",
+        numbers(nodes)
+    )]
+    Inverted {
+        /// The first such tetrahedron, counted from 0.
+        tetrahedron: usize,
+        /// Its nodes.
+        nodes: [u32; 4],
+    },
     /// A closed surface is turned inside out, so that inside and outside are exchanged.
     #[error(
         "is inside out: its volume is {part:.3} times that at rest; an axis is mirrored or two are exchanged, in the mesh or \
@@ -65,6 +76,11 @@ pub enum FrameError {
         /// The signed volume that it encloses over the volume at rest.
         part: f64,
     },
+}
+
+/// Numbers in one line.
+pub(crate) fn numbers(numbers: &[u32]) -> String {
+    numbers.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")
 }
 
 fn of_unit(unit: Option<Unit>) -> String {

@@ -35,7 +35,20 @@ pub enum MotionMismatchError {
         /// Vertices of the frame.
         found: usize,
     },
-    /// A frame is far smaller or larger than the mesh, or has other triangles.
+    /// A frame has too few or too many nodes.
+    #[error(
+        "frame {frame} of the motion has {found} points and the volume has {expected} nodes; use the volume that the \
+         motion was recorded for"
+    )]
+    Nodes {
+        /// The first frame that does not fit, counted from 0.
+        frame: usize,
+        /// Nodes of the volume.
+        expected: usize,
+        /// Points of the frame.
+        found: usize,
+    },
+    /// A frame is far smaller or larger than the mesh, has other triangles, or an inverted tetrahedron.
     #[error("frame {frame} of the motion: {error}")]
     Frame {
         /// The first such frame, counted from 0.
@@ -116,6 +129,22 @@ impl Motion {
     /// # Errors
     /// [`MotionMismatchError`] for another origin, or the first frame that does not fit.
     pub fn check_fits(&self, mesh: &Mesh) -> Result<(), MotionMismatchError> {
+        self.check_positions(mesh)?;
+        check_faces(&mesh.triangles, mesh.positions.len(), &self.faces)
+            .map_err(|error| MotionMismatchError::Frame { frame: 0, error })
+    }
+
+    /// The same of the nodes of a volume with this skeleton: the faces in the files of a volume are its border.
+    pub(crate) fn check_fits_nodes(&self, skeleton: &Mesh) -> Result<(), MotionMismatchError> {
+        self.check_positions(skeleton).map_err(|error| match error {
+            MotionMismatchError::Vertices { frame, expected, found } => {
+                MotionMismatchError::Nodes { frame, expected, found }
+            }
+            other => other,
+        })
+    }
+
+    fn check_positions(&self, mesh: &Mesh) -> Result<(), MotionMismatchError> {
         if self.origin != mesh.origin {
             let (expected, found) = (mesh.origin, self.origin);
             return Err(MotionMismatchError::Origin { expected, found });
@@ -128,8 +157,7 @@ impl Motion {
         let sizes = self.frames.iter().map(|positions| check_mesh_size(mesh, positions).err());
         match (0..).zip(sizes).find_map(|(frame, error)| Some((frame, error?))) {
             Some((frame, error)) => Err(MotionMismatchError::Frame { frame, error }),
-            None => check_faces(&mesh.triangles, expected, &self.faces)
-                .map_err(|error| MotionMismatchError::Frame { frame: 0, error }),
+            None => Ok(()),
         }
     }
 }

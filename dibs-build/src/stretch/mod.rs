@@ -13,7 +13,7 @@ use crate::motion::MotionMismatchError;
 use crate::nodes::{Volume, edges, largest_stretch as largest_stretch_of, least_limit};
 use crate::rest::{RestShape, SHARED, least_limits};
 use crate::rounding::round_up;
-use crate::{Mesh, Motion, Paths};
+use crate::{FrameError, Mesh, Motion, Paths};
 
 /// The stretch of each triangle of a mesh in a recorded motion.
 ///
@@ -92,14 +92,15 @@ impl MotionStretch {
     /// The same for the tetrahedra of a volume whose nodes move: [`Needed::triangle`] is then a tetrahedron.
     ///
     /// # Errors
-    /// [`MotionMismatchError`] where a frame does not fit the nodes.
+    /// [`MotionMismatchError`] where a frame does not fit the nodes, or turns a tetrahedron inside out, which no limit
+    /// admits.
     pub fn of_nodes(
         volume: &Volume,
         motion: &Motion,
         progress: &(dyn Fn(usize) + Sync),
     ) -> Result<Self, MotionMismatchError> {
         let rest = volume.skeleton(motion.origin);
-        motion.check_fits(&rest)?;
+        motion.check_fits_nodes(&rest)?;
         let shape = |tetrahedron: usize, positions: &[Vec3]| {
             volume.tetrahedra()[tetrahedron].map(|node| positions[node as usize].as_dvec3())
         };
@@ -108,6 +109,15 @@ impl MotionStretch {
             largest_stretch_of(rest, edges(shape(tetrahedron, positions)))
         };
         let count = volume.tetrahedra().len();
+        for (frame, positions) in motion.frames.iter().enumerate() {
+            // Written so that a determinant that is not a number passes: positions that are not finite have their own error.
+            let is_inverted = |&at: &usize| edges(shape(at, positions)).determinant() <= 0.0;
+            if let Some(tetrahedron) = (0..count).find(is_inverted) {
+                let nodes = volume.tetrahedra()[tetrahedron];
+                let error = FrameError::Inverted { tetrahedron, nodes };
+                return Err(MotionMismatchError::Frame { frame, error });
+            }
+        }
         let least = |tetrahedron| least_limit(shape(tetrahedron, &rest.positions));
         // The builder refuses a flat tetrahedron, so its factor does not matter.
         let rounding = (0..count).map(|at| least(at).unwrap_or(1.0)).collect();

@@ -13,6 +13,7 @@ mod groups;
 mod labels;
 mod manners;
 mod nodes;
+mod nodes_motions;
 mod overwrite;
 mod pace;
 mod program;

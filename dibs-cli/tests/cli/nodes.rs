@@ -18,7 +18,7 @@ use crate::program::{fails, json, succeeds};
 const NODES: usize = 36;
 
 /// A volume as a legacy VTK file.
-fn vtk(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
+pub fn vtk(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
     let mut text =
         "# vtk DataFile Version 3.0\nvolume\nASCII\nDATASET UNSTRUCTURED_GRID\n".to_owned();
     let _ = writeln!(text, "POINTS {} double", nodes.len());
@@ -35,7 +35,7 @@ fn vtk(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
 }
 
 /// The same as a Gmsh file of version 2.2.
-fn msh(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
+pub fn msh(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
     let mut text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n".to_owned();
     let _ = writeln!(text, "{}", nodes.len());
     for (number, at) in (1..).zip(nodes) {
@@ -48,14 +48,40 @@ fn msh(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
     text + "$EndElements\n"
 }
 
-/// A heart, a volume around it in two formats, and a motion of its nodes.
-fn heart(folder: &Path) -> Volume {
+/// The same as a VTK file in XML.
+pub fn vtu(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
+    let numbers = |numbers: &mut dyn Iterator<Item = String>| numbers.collect::<Vec<_>>().join(" ");
+    let array = |name: &str, kind: &str, values: String| {
+        format!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"1\" format=\"ascii\">{values}</DataArray>"
+        )
+    };
+    let points = numbers(&mut nodes.iter().map(|at| format!("{} {} {}", at.x, at.y, at.z)));
+    let points = array("Points", "Float64", points).replace("\"1\"", "\"3\"");
+    let corners = numbers(&mut tetrahedra.iter().flatten().map(u32::to_string));
+    let ends = numbers(&mut (1..=tetrahedra.len()).map(|count| (4 * count).to_string()));
+    let kinds = numbers(&mut tetrahedra.iter().map(|_| "10".to_owned()));
+    let cells = array("connectivity", "Int64", corners)
+        + &array("offsets", "Int64", ends)
+        + &array("types", "UInt8", kinds);
+    format!(
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"><UnstructuredGrid>\
+         <Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\"><Points>{points}</Points><Cells>{cells}</Cells></Piece>\
+         </UnstructuredGrid></VTKFile>",
+        nodes.len(),
+        tetrahedra.len()
+    )
+}
+
+/// A heart, a volume around it in three formats, and a motion of its nodes.
+pub fn heart(folder: &Path) -> Volume {
     succeeds(folder, "generate heart --triangles 1000 -o heart.ply");
     let mesh = dibs_build::read(folder.join("heart.ply")).unwrap().mesh;
     let volume = Volume::lattice(&mesh, [2, 2, 3]).unwrap();
     let (nodes, tetrahedra) = (volume.nodes(), volume.tetrahedra());
     std::fs::write(folder.join("volume.vtk"), vtk(nodes, tetrahedra)).unwrap();
     std::fs::write(folder.join("volume.msh"), msh(nodes, tetrahedra)).unwrap();
+    std::fs::write(folder.join("volume.vtu"), vtu(nodes, tetrahedra)).unwrap();
     let frame = |number: usize| {
         let by = 4.0 * (number as f64 * 0.4).sin();
         let at = |node: &DVec3| (*node + DVec3::Z * by * node.x / 60.0).as_vec3();
@@ -72,7 +98,7 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
     let folder = folder.path();
     let volume = heart(folder);
     let mut answers = Vec::new();
-    for nodes in ["volume.vtk", "volume.msh", "lattice:2,2,3"] {
+    for nodes in ["volume.vtk", "volume.msh", "volume.vtu", "lattice:2,2,3"] {
         let line =
             format!("build heart.ply -o heart.dibs --nodes {nodes} --motion nodes.pc2 --json");
         let built = json(folder, &line);
@@ -95,6 +121,14 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
         answers.push((at_rest["separation"].clone(), moved["separation"].clone()));
     }
     assert!(answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
+    // Another hierarchy over the same surface.
+    succeeds(folder, "build heart.ply -o paper.dibs --nodes volume.vtu --construction paper");
+    let ask = "query paper.dibs --tool sphere:0,0,150,5 --json";
+    let moved = json(folder, &format!("{ask} --vertices nodes.pc2 --frame 4"));
+    for (asked, answer) in [(json(folder, ask), &answers[0].0), (moved, &answers[0].1)] {
+        let [asked, answer] = [&asked["separation"], answer].map(|of| of.as_f64().unwrap());
+        assert!((asked - answer).abs() < 1e-3, "{asked} {answer}");
+    }
 
     // Limits of each tetrahedron.
     let line = "stretch heart.ply --nodes volume.msh --motion nodes.pc2 --margin 0.05 --limits heart.limits";
