@@ -6,6 +6,8 @@ use dibs_nostd::{
 };
 use glam::Vec3;
 
+use crate::frames::numbers;
+
 /// The vertices of a tree's surface in one frame, in the order of its rows, and how far it is stretched. For a tree
 /// with [nodes](dibs_nostd::nodes) a frame holds the nodes' positions, and every vertex is computed from them.
 #[derive(Clone, Debug)]
@@ -40,6 +42,19 @@ impl SurfaceRows {
             Ok(nodes) => (0..nodes.count()).map(|node| nodes.rest_position(node)).collect(),
             Err(_) => (0..tree.vertex_count()).map(|row| tree.rest_position(row)).collect(),
         }
+    }
+
+    /// The sentence for a frame that [`stretch`](Self::stretch) refuses: what is wrong with it and `remedy`, which allows
+    /// more stretch. No limit admits an element that is turned inside out, so its nodes are named instead, by the numbers
+    /// of the volume's file.
+    #[must_use]
+    pub fn refusal<I: Index>(tree: &Tree<'_, I>, error: StretchError, remedy: &str) -> String {
+        let StretchError::Inverted { element } = error else { return format!("{error}; {remedy}") };
+        let nodes = Nodes::of(tree).ok().and_then(|nodes| nodes.element(element));
+        let nodes = nodes.map_or_else(String::new, |nodes| format!(" (nodes {})", numbers(&nodes)));
+        format!(
+            "element {element}{nodes} is inverted or flat: no stretch limit admits that, mend the frame"
+        )
     }
 
     /// The positions of the vertices.

@@ -3,7 +3,7 @@
 use crate::mesh_file::Lengths;
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::Vec3;
-use dibs_build::{BuiltTree, FrameCheck, Mesh, Volume};
+use dibs_build::{BuiltTree, FrameCheck, Mesh, SurfaceRows, Volume};
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree};
 use std::path::{Path, PathBuf};
@@ -62,7 +62,8 @@ fn check_frames<I: Index>(tree: &Tree<'_, I>, path: &Path, frames: &[Vec<Vec3>])
         let at = || format!("{}, frame {number}", path.display());
         let rows = check.to_rows(frame).map_err(|error| anyhow!("{}: {error}", at()))?;
         if let Err(error) = Nodes::of(tree)?.measure(rows.as_slice()) {
-            bail!("{}: {error}; build with a larger --stretch", at());
+            let remedy = "build with a larger --stretch";
+            bail!("{}: {}", at(), SurfaceRows::refusal(tree, error, remedy));
         }
     }
     Ok(())

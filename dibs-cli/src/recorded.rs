@@ -9,7 +9,7 @@ use dibs_nostd::{Index, MeasuredStretch, PathKind, Tree};
 
 use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
-use crate::query::rows;
+use crate::query::{ALLOW, rows};
 
 /// The options for a moving surface, and for the ticks of a control loop.
 #[derive(clap::Args)]
@@ -75,10 +75,8 @@ impl Recorded {
         for (number, frame) in frames.into_iter().enumerate() {
             let surface = SurfaceRows::of(tree, frame)?;
             let measured = surface.stretch.map_err(|error| {
-                anyhow!(
-                    "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with \
-                     --limits that allow it"
-                )
+                let refused = SurfaceRows::refusal(tree, error, ALLOW);
+                anyhow!("{name}, frame {number}: {refused}")
             })?;
             rows.push(surface.positions().to_vec());
             stretches.push(measured);

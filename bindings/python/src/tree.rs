@@ -131,9 +131,9 @@ impl Tree {
                 Err(StretchError::NoMetric) => None,
                 // Beyond the stretch limit a distance could be wrong, so the surface is refused.
                 Err(error) => {
-                    return Err(invalid(format!(
-                        "{error}; build the tree with a larger stretch, or with limits that allow it"
-                    )));
+                    let remedy = "build the tree with a larger stretch, or with limits that allow it";
+                    let refused = of_any_width!(self.0.view(), tree => SurfaceRows::refusal(tree, error, remedy));
+                    return Err(invalid(refused));
                 }
             };
             Ok(Surface { tree: Arc::clone(&self.0), rows, velocities, stretch })

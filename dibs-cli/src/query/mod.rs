@@ -5,7 +5,7 @@ mod bulk;
 mod scene;
 
 pub use answer::{ContactRecord, Touch, side_name, vector};
-pub use scene::{STACK, rows};
+pub use scene::{ALLOW, STACK, rows};
 
 use crate::mesh_file::Lengths;
 use crate::tool::{self, ToolSpec};

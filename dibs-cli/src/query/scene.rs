@@ -16,6 +16,9 @@ use std::path::{Path, PathBuf};
 /// Enough for any tree.
 pub const STACK: usize = dibs_nostd::format::MAX_STACK;
 
+/// What to do about a frame that is stretched beyond the tree's limit.
+pub const ALLOW: &str = "build the tree with a larger --stretch, or with --limits that allow it";
+
 /// A tree, and the positions of its vertices.
 pub struct Surface<'a> {
     pub name: String,
@@ -223,6 +226,11 @@ fn measured<I: Index>(
     lengths: &Lengths,
 ) -> Result<(SurfaceRows, Option<MeasuredStretch>)> {
     let name = path.display();
+    let shown = match (vertices, frame) {
+        (None, _) => name.to_string(),
+        (Some(path), None) => path.display().to_string(),
+        (Some(path), Some(frame)) => format!("{}, frame {frame}", path.display()),
+    };
     let frame = match vertices {
         None => SurfaceRows::rest_frame(tree)
             .ok_or_else(|| anyhow!("{name}: the tree has no rest shape, give --vertices"))?,
@@ -233,9 +241,7 @@ fn measured<I: Index>(
     match rows.stretch {
         Ok(measured) => Ok((rows, Some(measured))),
         Err(StretchError::NoMetric) => Ok((rows, None)),
-        Err(error) => bail!(
-            "{name}: {error}; build the tree with a larger --stretch, or with --limits that allow it"
-        ),
+        Err(error) => bail!("{shown}: {}", SurfaceRows::refusal(tree, error, ALLOW)),
     }
 }
 

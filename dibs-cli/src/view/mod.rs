@@ -6,7 +6,7 @@ mod ticks;
 
 use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
-use crate::query::rows;
+use crate::query::{ALLOW, rows};
 use crate::tree_file::{self, AnyTree};
 use crate::{overwrite, tool};
 use anyhow::{Result, bail};
@@ -134,10 +134,7 @@ fn motion<I: Index>(args: &Args, tree: &Tree<'_, I>, path: &Path) -> Result<(Vec
     for (number, frame) in motion.frames.iter().enumerate() {
         let frame = rows(tree, path, number, frame)?;
         if let Err(error) = SurfaceRows::of(tree, frame.clone())?.stretch {
-            bail!(
-                "{name}, frame {number}: {error}; build the tree with a larger --stretch, or with --limits that \
-                 allow it"
-            );
+            bail!("{name}, frame {number}: {}", SurfaceRows::refusal(tree, error, ALLOW));
         }
         frames.push(frame);
     }

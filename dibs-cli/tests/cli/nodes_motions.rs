@@ -2,11 +2,13 @@
 
 // Requirements: F-07, P-08
 
+use std::path::Path;
+
 use dibs_build::glam::DVec3;
-use dibs_build::Motion;
+use dibs_build::{Motion, Volume};
 
 use crate::nodes::{heart, msh, vtk, vtu};
-use crate::program::{json, succeeds};
+use crate::program::{fails, json, succeeds};
 
 /// A frame of the motion as nodes of a volume's file.
 fn nodes(motion: &Motion, frame: usize) -> Vec<DVec3> {
@@ -54,4 +56,81 @@ fn a_series_of_volumes_is_a_motion_for_every_command() {
         assert_eq!(build(&series), built, "{format}");
         assert_eq!(track(&series), tracked, "{format}");
     }
+}
+
+/// A motion whose frame 2 has an element inside out: one node of it is moved through the opposite face.
+fn inverted(folder: &Path, volume: &Volume) -> [u32; 4] {
+    let mut motion = Motion::read(folder.join("nodes.pc2")).unwrap();
+    motion.frames.truncate(4);
+    let corners = volume.tetrahedra()[0];
+    let [a, b, c, d] = corners.map(|node| motion.frames[2][node as usize]);
+    motion.frames[2][corners[0] as usize] = a + 1.6 * ((b + c + d) / 3.0 - a);
+    motion.write_pc2(folder.join("inverted.pc2")).unwrap();
+    corners
+}
+
+#[test]
+fn a_frame_that_turns_an_element_inside_out_is_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let volume = heart(folder);
+    succeeds(folder, "build heart.ply -o h.dibs --nodes volume.vtk --stretch 9");
+    let corners = inverted(folder, &volume);
+    std::fs::write(folder.join("tools.csv"), "sphere:0,0,120,5\n".repeat(200)).unwrap();
+    std::fs::write(folder.join("page.html"), "<!--data-->").unwrap();
+    let ask = "query h.dibs --tool sphere:0,0,150,5 --vertices";
+    for line in [
+        format!("{ask} inverted.pc2 --frame 2"),
+        "track h.dibs --motion inverted.pc2 --path tools.csv".to_owned(),
+        "view h.dibs --motion inverted.pc2 -o h.html --page page.html".to_owned(),
+        "build heart.ply -o i.dibs --nodes volume.vtk --stretch 9 --motion inverted.pc2".to_owned(),
+    ] {
+        let error = fails(folder, &line);
+        assert!(error.starts_with("inverted.pc2, frame 2: element "), "{line}: {error}");
+        let part = "inverted or flat: no stretch limit admits that, mend the frame";
+        assert!(error.contains(part) && !error.contains("--"), "{line}: {error}");
+        // Its nodes have the numbers of the volume's file.
+        let named = error.split_once("(nodes ").and_then(|(_, rest)| rest.split_once(')'));
+        let named = named.unwrap_or_else(|| panic!("{error}")).0.split(", ");
+        let named: Vec<u32> = named.map(|node| node.parse().unwrap()).collect();
+        assert!(named.len() == 4 && named.contains(&corners[0]), "{error}");
+    }
+    // As a file of its own.
+    let frame = nodes(&Motion::read(folder.join("inverted.pc2")).unwrap(), 2);
+    std::fs::write(folder.join("inverted.vtk"), vtk(&frame, volume.tetrahedra())).unwrap();
+    let error = fails(folder, &format!("{ask} inverted.vtk"));
+    assert!(error.starts_with("inverted.vtk: element "), "{error}");
+
+    // No limits are learned from it.
+    let line = "stretch heart.ply --nodes volume.vtk --motion inverted.pc2 --limits i.limits";
+    let error = fails(folder, line);
+    let part = "inverted.pc2: frame 2 of the motion: turns the tetrahedron";
+    assert!(error.starts_with(part) && error.contains("no stretch limit admits that"), "{error}");
+    assert!(!folder.join("i.limits").exists());
+
+    // Beyond the limit, a larger one is what helps, and the file is named too.
+    succeeds(folder, "build heart.ply -o narrow.dibs --nodes volume.vtk --stretch 1.005");
+    let ask = "query narrow.dibs --tool sphere:0,0,150,5 --vertices nodes.pc2 --frame 4";
+    let error = fails(folder, ask);
+    assert!(error.starts_with("nodes.pc2, frame 4: element "), "{error}");
+    assert!(error.contains("a larger --stretch"), "{error}");
+}
+
+#[test]
+fn another_count_of_nodes_is_said_of_nodes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    heart(folder);
+    succeeds(folder, "build heart.ply -o h.dibs --nodes volume.vtk");
+    let mut motion = Motion::read(folder.join("nodes.pc2")).unwrap();
+    motion.frames.iter_mut().for_each(|frame| frame.truncate(30));
+    motion.write_pc2(folder.join("fewer.pc2")).unwrap();
+    let error = fails(folder, "stream h.dibs --motion fewer.pc2 --to udp:127.0.0.1:9");
+    assert!(
+        error.contains("fewer.pc2, frame 0: the frame has 30 points and the tree has 36 nodes"),
+        "{error}"
+    );
+    let error = fails(folder, "stretch heart.ply --nodes volume.vtk --motion fewer.pc2");
+    let part = "fewer.pc2: frame 0 of the motion has 30 points and the volume has 36 nodes";
+    assert!(error.contains(part), "{error}");
 }

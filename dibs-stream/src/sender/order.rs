@@ -76,8 +76,8 @@ impl SurfaceOrder {
     /// Reorders positions from the mesh's order to the tree's rows.
     ///
     /// # Errors
-    /// [`SendError::Vertices`] if a vertex of the tree has no position; if the order was made from a tree, also
-    /// [`SendError::Positions`] if they are not a frame of its surface.
+    /// [`SendError::Positions`] if they are not a frame of the tree's surface; if the order was not made from a tree,
+    /// [`SendError::Vertices`] if a vertex that is sent has no position.
     pub fn to_rows(&self, positions: &[Vec3]) -> Result<Vec<Vec3>, SendError> {
         let mut rows = Vec::new();
         self.to_rows_in(positions, &mut rows)?;
@@ -91,14 +91,14 @@ impl SurfaceOrder {
         rows: &mut Vec<Vec3>,
     ) -> Result<(), SendError> {
         rows.clear();
+        if let Some(check) = &self.check {
+            return Ok(check.to_rows_in(positions, rows)?);
+        }
         let found = positions.len();
         if let Some(&vertex) = self.order.iter().find(|&&vertex| vertex as usize >= found) {
             return Err(SendError::Vertices { vertex, found });
         }
-        match &self.check {
-            Some(check) => check.to_rows_in(positions, rows)?,
-            None => rows.extend(self.order.iter().map(|&vertex| positions[vertex as usize])),
-        }
+        rows.extend(self.order.iter().map(|&vertex| positions[vertex as usize]));
         Ok(())
     }
 }
