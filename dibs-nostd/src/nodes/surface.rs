@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::Nodes;
 use super::layout::Scale;
 use crate::surface::motion::sealed::Sealed;
-use crate::surface::{MeasuredStretch, MotionReading, MovingSurface, VertexTable};
+use crate::surface::{MeasuredStretch, MotionReading, MovingSurface, Odometer, Step, VertexTable};
 
 /// The surface at a table of nodes: [`Nodes::surface`] makes one.
 ///
@@ -30,6 +30,23 @@ impl<'n, 'a, V: VertexTable + ?Sized> EmbeddedSurface<'n, 'a, V> {
     #[must_use]
     pub const fn table(&self) -> &'n V {
         self.table
+    }
+
+    /// The step from this surface to a later one, for a [`Sweep`](crate::Sweep) and a [`Tracker`](crate::Tracker), by the
+    /// motion of the nodes. `odometer` is from [`Nodes::odometer`]; one that counts otherwise is replaced by that. Between
+    /// the two surfaces a vertex is computed from both.
+    ///
+    /// Cost: one pass over the nodes of both.
+    pub fn step<'s, W: VertexTable + ?Sized>(
+        &'s self,
+        after: &'s EmbeddedSurface<'n, 'a, W>,
+        odometer: &mut Odometer,
+    ) -> Step<'s, Self, EmbeddedSurface<'n, 'a, W>> {
+        if !odometer.counts(self.nodes.motion) {
+            *odometer = self.nodes.odometer();
+        }
+        let step = odometer.step(self.table, after.table);
+        step.carried(self, after, self.nodes.parts.amplification)
     }
 
     /// Upper bound (mm) on the f32 error of a pin's and a vertex's position relative to each other and to their

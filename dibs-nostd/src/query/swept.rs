@@ -29,6 +29,15 @@ pub struct SweepAnswer {
 /// The motion of tool and surface from one tick to the next: the ends of the tool's axis and the surface's vertices
 /// each move in a straight line at constant speed.
 ///
+/// A surface that nodes move has its step from [`EmbeddedSurface::step`](crate::nodes::EmbeddedSurface::step).
+///
+/// If the mesh also turns and shifts as a whole, give the tools in mesh coordinates, each by its own pose
+/// ([`RigidPose::apply_inverse`](crate::RigidPose::apply_inverse)): so the angle counts times its lever, as motion of the
+/// tool. There a point of the tool follows an arc. While the mesh turns by `angle` about a centre that moves in a straight
+/// line, the arc leaves its chord by at most `angle * (angle * lever + 2 * shift) / 8`, with the largest distance of the
+/// tool's ends from the centre as `lever` and their largest motion relative to it as `shift`. Add that to the margin.
+/// ([`Guard::admit`](crate::guard::Guard::admit) of frames with poses needs none of this.)
+///
 /// ```
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::{Odometer, Options, Sphere, Sweep, SweepAnswer, Tracker, Tree, glam::Vec3};

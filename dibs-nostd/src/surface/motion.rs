@@ -351,6 +351,12 @@ impl Odometer {
         Self { unit, tree, vertices, surface, motion: None, digest: 0 }
     }
 
+    /// Whether it counts motion in this unit, which rows that move more than themselves have for their own.
+    #[cfg(feature = "nodes")]
+    pub(crate) fn counts(&self, unit: MotionUnit) -> bool {
+        self.tree == unit.tree && self.unit.length == unit.unit.length
+    }
+
     /// Starts anew with a frame.
     ///
     /// Cost: one pass over the vertices.

@@ -68,6 +68,19 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
         self.unless_unmeasured(between)
     }
 
+    /// The same step of two surfaces whose vertices move at most so many times as far as these rows.
+    #[cfg(feature = "nodes")]
+    pub(crate) fn carried<'s, X: ?Sized, Y: ?Sized>(
+        &self,
+        before: &'s X,
+        after: &'s Y,
+        amplification: f32,
+    ) -> Step<'s, X, Y> {
+        let length = self.length * amplification * (1.0 + f32::EPSILON);
+        let Self { from, motion, units, is_measured, .. } = *self;
+        Step { before, after, from, motion, units, is_measured, length }
+    }
+
     fn unless_unmeasured(&self, mut between: SurfaceBlend<'v, W, V>) -> SurfaceBlend<'v, W, V> {
         if !self.is_measured {
             between.motion = None;
