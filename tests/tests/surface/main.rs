@@ -3,6 +3,7 @@
 mod as_configured;
 mod embedded;
 mod embedded_climbed;
+mod embedded_contacts;
 mod embedded_damaged;
 mod embedded_limits;
 mod embedded_outside;
