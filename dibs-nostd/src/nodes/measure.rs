@@ -4,7 +4,7 @@ use glam::{Vec3, Vec4};
 
 use super::Nodes;
 use super::kernel::Now;
-use super::layout::{self, ELEMENT_BYTES, Element};
+use super::layout::{self, AtRest, ELEMENT_BYTES, Element};
 use crate::math::vec3x4::Vec3x4;
 use crate::stretch::{LEAST, StretchError, root_up, squared_limit};
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
@@ -28,15 +28,37 @@ impl Pass {
     /// and each that exceeds all before it takes twenty times as long as the rest.
     pub fn start_with<V: VertexTable + ?Sized>(&mut self, nodes: &Nodes<'_>, table: &V, row: u32) {
         let Some(record) = nodes.parts.elements.get(row as usize) else { return };
-        let Element { corners: [a, b, c, d], rest } = layout::element(record);
-        let at = |node| table.position(node).map(Vec3::into);
-        let (Some(a), Some(b), Some(c), Some(d)) = (at(a), at(b), at(c), at(d)) else { return };
-        let (now, limit) = (Now::of([a, b, c, d]), squared_limit(nodes.limit));
-        // One beyond the limit is an error when its turn comes.
-        if now.is_within(&rest, limit) && !now.is_within(&rest, self.squared) {
-            self.squared = now.squared_stretch(&rest, self.squared, limit);
-            self.worst = row;
+        let Element { corners, rest } = layout::element(record);
+        if let Ok(now) = now_of(table, corners) {
+            // One beyond the limit is an error when its turn comes.
+            let _ = self.compare(nodes, row, &now, &rest, squared_limit(nodes.limit));
         }
+    }
+
+    /// Compares an element's stretch with the largest so far and the squared limit.
+    #[inline(always)]
+    fn compare(
+        &mut self,
+        nodes: &Nodes<'_>,
+        row: u32,
+        now: &Now<f32>,
+        rest: &AtRest<f32>,
+        limit: f32,
+    ) -> Result<(), StretchError> {
+        if now.is_within(rest, self.squared) {
+            return Ok(());
+        }
+        if !now.is_within(rest, limit) {
+            let stretch = now.stretch_beyond(rest, limit);
+            return Err(StretchError::ElementExceeded {
+                element: row,
+                stretch,
+                limit: nodes.limit,
+            });
+        }
+        self.squared = now.squared_stretch(rest, self.squared, limit);
+        self.worst = row;
+        Ok(())
     }
 
     /// Measures at most `work` elements whose nodes are below row `ready`. Returns the work left. A range of elements
@@ -121,7 +143,7 @@ impl Pass {
                 break;
             }
             let (corners, rest) = layout::four(records);
-            let Some(now) = now_of(table, corners) else { break };
+            let Some(now) = four_of(table, corners) else { break };
             if now.is_within(&rest, self.squared) & now.is_upright(&rest) != 0b1111 {
                 break;
             }
@@ -147,23 +169,13 @@ impl Pass {
         ready: u32,
         limit: f32,
     ) -> Result<bool, StretchError> {
-        let Element { corners: [a, b, c, d], rest } = layout::element(record);
+        let Element { corners, rest } = layout::element(record);
+        let [a, b, c, d] = corners;
         if (a >= ready) | (b >= ready) | (c >= ready) | (d >= ready) {
             return Ok(false);
         }
-        let at =
-            |node| table.position(node).map(Vec3::into).ok_or(StretchError::Corrupt { row: node });
-        let now = Now::of([at(a)?, at(b)?, at(c)?, at(d)?]);
-        if !now.is_within(&rest, self.squared) {
-            let row = self.next;
-            if !now.is_within(&rest, limit) {
-                let stretch = now.stretch_beyond(&rest, limit);
-                let limit = nodes.limit;
-                return Err(StretchError::ElementExceeded { element: row, stretch, limit });
-            }
-            self.squared = now.squared_stretch(&rest, self.squared, limit);
-            self.worst = row;
-        }
+        let now = now_of(table, corners)?;
+        self.compare(nodes, self.next, &now, &rest, limit)?;
         if !now.is_upright(&rest) {
             return Err(StretchError::Inverted { element: self.next });
         }
@@ -186,9 +198,19 @@ impl Pass {
     }
 }
 
+/// A current element; an error if a node is outside of the table.
+#[inline(always)]
+fn now_of<V: VertexTable + ?Sized>(
+    table: &V,
+    [a, b, c, d]: [u32; 4],
+) -> Result<Now<f32>, StretchError> {
+    let at = |row| table.position(row).map(Vec3::into).ok_or(StretchError::Corrupt { row });
+    Ok(Now::of([at(a)?, at(b)?, at(c)?, at(d)?]))
+}
+
 /// Four current elements; `None` if a node is outside of the table.
 #[inline(always)]
-fn now_of<V: VertexTable + ?Sized>(table: &V, corners: [[u32; 4]; 4]) -> Option<Now<Vec4>> {
+fn four_of<V: VertexTable + ?Sized>(table: &V, corners: [[u32; 4]; 4]) -> Option<Now<Vec4>> {
     let at = |nodes| {
         let Vec3x4 { x, y, z } = Vec3x4::of(|node| table.position(node), nodes)?;
         Some([x, y, z])
@@ -208,18 +230,17 @@ mod tests {
     use super::*;
     use crate::tree::Tree;
 
-    /// Frames of nodes, some with elements beyond the limit, inverted or not finite: measured four at a time in slices
-    /// of any length, the bits and the refused element are the same as one at a time.
-    #[test]
-    fn four_at_a_time_are_measured_as_one_after_another() {
+    /// Calls `each` with the nodes of a heart in a lattice and frames of them, some with elements beyond the limit, inverted
+    /// or not finite.
+    fn around_rest(seed: u64, mut each: impl FnMut(&Nodes<'_>, &[Vec3], &mut fastrand::Rng)) {
         let mesh = generate::heart(600).expect("a valid size").mesh;
         let lattice = Volume::lattice(&mesh, [5, 4, 3]).expect("a lattice");
         let built = Builder::new().stretch(2.0).nodes(&lattice).build(&mesh).expect("held");
         let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
         let nodes = Nodes::of(&tree).expect("valid");
         let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
-        let mut rng = fastrand::Rng::with_seed(62);
-        let mut outcomes = [0; 4];
+        let mut rng = fastrand::Rng::with_seed(seed);
+        each(&nodes, &rest, &mut rng);
         for round in 0..400 {
             let mut random = || Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 0.5;
             let by = if round % 4 == 0 { 30.0 } else { 12.0 };
@@ -227,13 +248,22 @@ mod tests {
             if round % 10 == 1 {
                 frame[rng.usize(..rest.len())] = Vec3::NAN;
             }
+            each(&nodes, &frame, &mut rng);
+        }
+    }
+
+    /// Measured four at a time in slices of any length, the bits and the refused element are the same as one at a time.
+    #[test]
+    fn four_at_a_time_are_measured_as_one_after_another() {
+        let mut outcomes = [0; 4];
+        around_rest(62, |nodes, frame, rng| {
             let ready = if rng.bool() { nodes.count() } else { rng.u32(..nodes.count()) };
             let shrinkage = if rng.bool() { 0.0 } else { 1.01 };
             let mut measured = |longest: u32| {
                 let mut pass = Pass::new();
                 let error = loop {
                     let (next, work) = (pass.next, rng.u32(1..=longest));
-                    match pass.advance(&nodes, frame.as_slice(), ready, shrinkage, work) {
+                    match pass.advance(nodes, frame, ready, shrinkage, work) {
                         Ok(_) if pass.next > next => (),
                         other => break other.err(),
                     }
@@ -249,40 +279,27 @@ mod tests {
                 .iter()
                 .position(|start| error.starts_with(start))
                 .expect("a stretch error")] += 1;
-        }
+        });
         assert!(outcomes.iter().all(|&count| count > 20), "{outcomes:?}");
     }
 
     /// Wherever a measurement starts, it gives the same stretch to its rounding, and the same refusals.
     #[test]
     fn a_start_from_the_last_frame_changes_a_measurement_by_its_rounding() {
-        let mesh = generate::heart(600).expect("a valid size").mesh;
-        let lattice = Volume::lattice(&mesh, [5, 4, 3]).expect("a lattice");
-        let built = Builder::new().stretch(2.0).nodes(&lattice).build(&mesh).expect("held");
-        let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
-        let nodes = Nodes::of(&tree).expect("valid");
-        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
-        let mut rng = fastrand::Rng::with_seed(63);
-        let mut last = nodes.measure(rest.as_slice()).expect("at rest");
-        let mut outcomes = [0; 2];
-        for round in 0..400 {
-            let mut random = || Vec3::new(rng.f32(), rng.f32(), rng.f32()) - 0.5;
-            let by = if round % 4 == 0 { 30.0 } else { 12.0 };
-            let mut frame: Vec<Vec3> = rest.iter().map(|&at| at + by * random()).collect();
-            if round % 10 == 1 {
-                frame[rng.usize(..rest.len())] = Vec3::NAN;
-            }
-            let [from_none, from_last] =
-                [nodes.measure(frame.as_slice()), nodes.measure_after(frame.as_slice(), &last)];
+        let (mut last, mut outcomes) = (None, [0; 2]);
+        around_rest(63, |nodes, frame, _| {
+            let from_none = nodes.measure(frame);
+            let last = last.get_or_insert_with(|| from_none.expect("at rest"));
+            let from_last = nodes.measure_after(frame, last);
             outcomes[usize::from(from_none.is_ok())] += 1;
             if let (Ok(one), Ok(other)) = (from_none, from_last) {
                 let ratio = other.sigma() / one.sigma();
                 assert!((ratio - 1.0).abs() < 1.0 / 65_536.0, "{one:?} {other:?}");
-                last = other;
+                *last = other;
             } else {
                 assert_eq!(std::format!("{from_none:?}"), std::format!("{from_last:?}"));
             }
-        }
+        });
         assert!(outcomes.iter().all(|&count| count > 50), "{outcomes:?}");
     }
 }

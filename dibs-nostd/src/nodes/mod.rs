@@ -237,7 +237,8 @@ impl<'a> Nodes<'a> {
     }
 
     /// The same in less time for a frame that follows another: its `last` frame's most stretched element is measured
-    /// first. `sigma` is rounded up from another start, by less than one part in 65,536.
+    /// first. `sigma` is rounded up from another start, by less than one part in 65,536. The measurement of any other
+    /// frame or tree is only a worse start: every element is still measured.
     ///
     /// # Errors
     /// As [`measure`](Self::measure).
