@@ -1,10 +1,12 @@
 //! A surface that a coarse model moves: a frame carries nodes, and all work from there to the answers counts.
 //!
 //! This library checks the elements, and computes the vertices that a query reads. Peers know vertices: they move all of
-//! them, in their own order and layout, and refit. A frame's nodes reach each method at no cost.
+//! them, in their own order and layout, and refit. Each method receives a frame's nodes in packets, all by this library's
+//! receiver; from there they reach it at no cost.
 
 mod moved;
 mod ours;
+mod received;
 mod table;
 
 use std::time::Instant;
@@ -12,7 +14,6 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use dibs_build::{Builder, BuiltTree, Mesh, Motion, Volume};
 use dibs_nostd::nodes::Nodes;
-use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{Index, Sphere, StretchMonitor, Tree, VertexTable};
 use dibs_tests::baselines::{AabbTree, Blend, Hybrid, Lazy, Refit, Swept};
 use dibs_tests::method::{Layout, Probe};
@@ -21,6 +22,7 @@ use glam::Vec3;
 
 use super::brain::STRETCH;
 use super::facts;
+use super::imaging::controller::Controller;
 use super::imaging::course::{Course, TICK_RATE};
 use super::imaging::ours::{Surface, measured};
 use super::imaging::race::Contender;
@@ -34,6 +36,7 @@ use super::statistics::{Paired, Summary};
 use super::subjects;
 use moved::{Moved, MovedSwept, Unmoved, Weighed};
 use ours::{Tracking, Whole};
+use received::{Line, Received};
 pub use table::table;
 
 /// The experiment, and its facts.
@@ -65,8 +68,6 @@ const OURS: [&str; 2] = [NODES_TRACKER, NODES_QUERY];
 const SEED: u64 = 3_100;
 /// Frames that are checked both ways.
 const CHECKS: u32 = 40;
-/// Bytes of a packet's rows, as on Ethernet.
-const PACKET: usize = 1_400;
 
 /// Runs this experiment anew, whatever the records have of it.
 pub fn run(plan: &Plan, options: &Options, records: &mut Records) -> Result<()> {
@@ -87,6 +88,16 @@ pub fn run(plan: &Plan, options: &Options, records: &mut Records) -> Result<()> 
         }
     }
     Ok(())
+}
+
+/// A method that receives frames of these nodes.
+fn received<'a>(
+    name: &'static str,
+    surface: Surface,
+    method: impl Controller + 'a,
+    nodes: &Nodes<'_>,
+) -> Contender<'a> {
+    Contender::new(name, surface, Received::new(method, nodes))
 }
 
 /// A surface in a lattice.
@@ -130,31 +141,32 @@ impl Scene {
             let course = Course { frame: &frame, tool };
             let hybrid = |level| {
                 let method = Hybrid::new(boxes.clone(), level).warm();
-                self.moved(HYBRID, method, surface, &blends, &vertices)
+                self.moved(HYBRID, method, surface, &blends, &vertices, &nodes)
             };
             let lazy = |level| {
                 let method = Hybrid::new(boxes.clone(), level).warm();
                 let method = Lazy::new(method, &blends, &vertices, &rest);
-                Contender::new(LAZY, surface, Unmoved::new(method, surface))
+                received(LAZY, surface, Unmoved::new(method, surface), &nodes)
             };
             let size = self.mesh.triangles.len();
             let level = course.split_level(size, rate, hybrid)?;
             let lazy_level = course.split_level(size, rate, lazy)?;
-            let of = |name, method: Refit| self.moved(name, method, surface, &blends, &vertices);
+            let of =
+                |name, method: Refit| self.moved(name, method, surface, &blends, &vertices, &nodes);
             let mut contenders = vec![
-                Contender::new(NODES_TRACKER, surface, Tracking::new(tree, nodes, surface)),
-                Contender::new(NODES_QUERY, surface, Whole::new(tree, nodes, surface)),
+                received(NODES_TRACKER, surface, Tracking::new(tree, nodes, surface), &nodes),
+                received(NODES_QUERY, surface, Whole::new(tree, nodes, surface), &nodes),
                 of(REFIT, Refit::new(boxes.clone()).warm()),
                 hybrid(level),
-                self.moved(OBVHS, Obvhs::new(&rested).warm(), surface, &blends, &vertices),
+                self.moved(OBVHS, Obvhs::new(&rested).warm(), surface, &blends, &vertices, &nodes),
             ];
             let parry = ParryBvh::new(&rested).warm();
-            let parry = self.moved(PARRY_BVH, parry, surface, &blends, &vertices);
+            let parry = self.moved(PARRY_BVH, parry, surface, &blends, &vertices, &nodes);
             contenders.push(Contender { every: super::imaging::rarely(size), ..parry });
             contenders.push(lazy(lazy_level));
             if surface == Surface::Continuous {
                 let swept = MovedSwept::new(Swept::new(boxes.clone()), &blends);
-                contenders.push(Contender::new(SWEPT, surface, swept));
+                contenders.push(received(SWEPT, surface, swept, &nodes));
             }
             let title = format!("{} of {size} triangles, {condition}", self.name);
             let periods = self.ticks * rate / TICK_RATE;
@@ -180,11 +192,12 @@ impl Scene {
         surface: Surface,
         blends: &[Blend],
         rest: &[Vec3],
+        nodes: &Nodes<'_>,
     ) -> Contender<'a>
     where
         M::Position: Weighed + 'a,
     {
-        Contender::new(name, surface, Moved::new(method, surface, blends, rest))
+        received(name, surface, Moved::new(method, surface, blends, rest), nodes)
     }
 
     /// What each vertex of the mesh is bound to.
@@ -211,7 +224,7 @@ impl Scene {
         vertices
     }
 
-    /// What a frame takes on the line and in memory, and its check: of the elements, and of the surface's triangles, in
+    /// What a frame takes on the line and in memory, its packets' way to the buffers, and its check: of the elements, and of the surface's triangles, in
     /// turns on the same frames.
     fn checks<I: Index>(
         &self,
@@ -225,6 +238,7 @@ impl Scene {
         let cell = self.cell(FRAME);
         let mut monitor = StretchMonitor::new(plain).context("the tree has a metric")?;
         let (mut table, mut ours, mut theirs) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut line, mut payload, mut received) = (Line::new(nodes), 0, Vec::new());
         for number in 0..CHECKS {
             frame(number as f32 * 0.1, &mut table);
             let vertices = of_vertices.to_rows(&self.vertices(nodes, &table, built));
@@ -234,12 +248,11 @@ impl Scene {
             let start = Instant::now();
             nodes.measure(table.as_slice()).context("within the limit")?;
             ours.push(microseconds(start));
+            payload = line.send(&table);
+            let start = Instant::now();
+            line.receive();
+            received.push(microseconds(start));
         }
-        let id = FrameId { mesh_id: nodes.mesh_id(), session: 1, epoch: 1 };
-        let grid = QuantisedBox::covering(&table).context("finite nodes")?;
-        let encoder = FrameEncoder::<_, PACKET>::new(id, Encoding::Quantised(grid), &table[..])
-            .context("nodes for a frame")?;
-        let payload: usize = dibs_tests::bus::collect(encoder).iter().map(Vec::len).sum();
         let rows = 2 * size_of_val(table.as_slice());
         let ratio = Paired::of(&theirs, &ours).ratio;
         let count = |value: u32| f64::from(value);
@@ -253,6 +266,7 @@ impl Scene {
             records.push(Record::number(&cell, NODES_QUERY, metric, value, unit));
         }
         for (method, metric, summary, unit) in [
+            (NODES_QUERY, "receive", Summary::of(&received), "us a frame"),
             (NODES_QUERY, "check", Summary::of(&ours), "us a frame"),
             (DIBS, "check", Summary::of(&theirs), "us a frame"),
             (NODES_QUERY, "check of triangles", ratio, "theirs / ours"),
