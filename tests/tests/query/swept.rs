@@ -1,4 +1,6 @@
 //! Sweeps compared with dense sampling in f64: no contact may be missed.
+//!
+//! One file, because all motions are checked in one way.
 
 // Requirement: A-10
 
