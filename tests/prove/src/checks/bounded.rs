@@ -186,7 +186,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("bounded.near", sum(|tally| tally.widths.len()));
     for (tally, row) in tallies.iter().zip(&USUAL) {
         tally.note(row.name, figures);
-        row.note_board(&scene, figures)?;
+        row.note_board(&scene, &tally.work, figures)?;
     }
     Ok(Outcome::Passed)
 }

@@ -86,10 +86,14 @@ impl Row {
     }
 
     /// Notes its budget, and on the board the instructions of its largest and its mean tick, and in the median of those
-    /// that use the whole budget.
-    pub fn note_board(&self, scene: &Scene, figures: &mut Figures) -> Result<()> {
+    /// that use the whole budget. `work` is that of the ticks on this computer, which must be the same there.
+    pub fn note_board(&self, scene: &Scene, work: &[u32], figures: &mut Figures) -> Result<()> {
         let budget = self.budget()?;
-        let ticks = on_board(scene, self.bits, budget)?;
+        let mut ticks = on_board(scene, self.bits, budget)?;
+        let here = work.iter().skip(1);
+        let other = here.zip(&ticks).position(|(&here, there)| here != there.work());
+        ensure!(other.is_none(), "{}: other tests on the board, after tick {other:?}", self.name);
+        ticks.sort_unstable_by_key(|tick| tick.instructions);
         let taken: Vec<f64> = ticks.iter().map(|tick| tick.instructions.into()).collect();
         let is_spent = |tick: &&Tick| tick.work() + Budget::TRIANGLE > budget.tests();
         let spent: Vec<u32> = ticks.iter().filter(is_spent).map(|tick| tick.instructions).collect();
@@ -110,7 +114,7 @@ impl Row {
         for _ in 0..HALVINGS {
             let tests = fits.midpoint(over);
             let ticks = on_board(&scene, self.bits, Budget::new(tests))?;
-            let is_fitting = ticks.last().is_some_and(|largest| largest.instructions <= self.most);
+            let is_fitting = ticks.iter().all(|tick| tick.instructions <= self.most);
             *if is_fitting { &mut fits } else { &mut over } = tests;
         }
         ensure!(fits > 0, "{}: no tick stays within {} instructions", self.name, self.most);

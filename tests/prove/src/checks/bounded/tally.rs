@@ -18,6 +18,8 @@ pub struct Tally {
     turned: usize,
     /// Widths of the intervals near the wall, in order.
     pub widths: Vec<f32>,
+    /// Work of each tick, in node tests.
+    pub work: Vec<u32>,
 }
 
 impl Tally {
@@ -46,6 +48,7 @@ pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
         let tracked = tracker.closest(surface, tool, &options).expect("an answer");
         let is_settled = settling.is_settled(tracked.moved);
         let (found, truth) = (tracked.closest, &truth[tick]);
+        tally.work.push(found.work());
         tally.wrong += usize::from(truth.is_missed_by(&found));
         if truth.lower >= MARGIN || !is_settled {
             return;
