@@ -17,6 +17,7 @@ mod options;
 mod passed;
 mod plane;
 mod precision;
+mod prices;
 mod proximity;
 mod search;
 mod separation;

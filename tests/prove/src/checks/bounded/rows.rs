@@ -72,6 +72,9 @@ pub const TICKS: usize = 30_000;
 /// Halvings of the range in which a budget is searched.
 const HALVINGS: u32 = 7;
 
+/// The dearest work of a tick that is not begun if the budget does not cover it: a bound on the depth between two points.
+const DEAREST: u32 = 36;
+
 impl Row {
     /// The scene; none if its mesh is not on this machine.
     pub fn scene(&self) -> Result<Option<Scene>> {
@@ -95,7 +98,7 @@ impl Row {
         ensure!(other.is_none(), "{}: other tests on the board, after tick {other:?}", self.name);
         ticks.sort_unstable_by_key(|tick| tick.instructions);
         let taken: Vec<f64> = ticks.iter().map(|tick| tick.instructions.into()).collect();
-        let is_spent = |tick: &&Tick| tick.work() + Budget::TRIANGLE > budget.tests();
+        let is_spent = |tick: &&Tick| tick.work() + DEAREST > budget.tests();
         let spent: Vec<u32> = ticks.iter().filter(is_spent).map(|tick| tick.instructions).collect();
         let mean = taken.iter().sum::<f64>() / taken.len() as f64;
         let mut note =
