@@ -110,7 +110,7 @@ impl Scene {
             }
             let surface = step.as_ref().expect("a step").at(share);
             let both = stretch.or_larger(*next_stretch).expect("one tree");
-            ask(tick, &surface, tool, Options::new().stretch(both))
+            ask(tick, &surface, tool, Options::cold().stretch(both))
         });
         ticks.collect()
     }
