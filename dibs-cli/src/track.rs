@@ -34,8 +34,7 @@ it moved before (extrapolated). One line a tick on standard output, and what it 
 
 Where a budget ends, is_cut is true and the certified interval is wider: it is that of the last ticks, less what has moved
 since. is_kept says that the side is the last tick's. contacts_bound says how far the list of contacts is complete; it is
-null where nothing is certain. A budget counts by the fit of plain queries, which is too low for a shaft deep in the
-tissue: there a tick took up to twice as many instructions.")]
+null where nothing is certain. A budget counts by the fit of a tracker's ticks; the list of contacts takes more.")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,
@@ -262,11 +261,14 @@ impl<I: Index> Session<'_, I> {
         stretch: MeasuredStretch,
         tool: &LocalTool,
     ) -> Result<Answer> {
+        let of_query = match tool {
+            LocalTool::Sphere(_) => &Cost::M7_SPHERE,
+            LocalTool::Capsule(_) => &Cost::M7_CAPSULE,
+        };
+        let cost = if self.tracker.is_some() { &Cost::M7_TICK } else { of_query };
         match tool {
-            LocalTool::Sphere(sphere) => self.closest(surface, sphere, stretch, &Cost::M7_SPHERE),
-            LocalTool::Capsule(capsule) => {
-                self.closest(surface, capsule, stretch, &Cost::M7_CAPSULE)
-            }
+            LocalTool::Sphere(sphere) => self.closest(surface, sphere, stretch, cost),
+            LocalTool::Capsule(capsule) => self.closest(surface, capsule, stretch, cost),
         }
     }
 

@@ -15,7 +15,7 @@ use crate::{BusStatus, Receiver, Robot, TICK_RATE, Trust, time_of};
 
 /// The budget for a tick's closest pair, side and depth. On frames chosen to be expensive the whole tick stays below
 /// 120,000 instructions (docs/evidence/guarantees.md). If the budget ends a search, the last tick's bounds stay valid.
-pub const BUDGET: Budget = Budget::new(300);
+pub const BUDGET: Budget = Budget::for_instructions(75_000, &Cost::M7_TICK);
 
 /// How exactly the depth of a crossing axis is found, in mm: this changes the spring's force by a quarter of a newton,
 /// and few depths exceed the budget.
@@ -25,7 +25,7 @@ const DEPTH_TOLERANCE: f32 = 0.25;
 pub const TICK_INSTRUCTIONS: u64 = 480_000;
 
 // The rest of the tick takes some thousand instructions.
-const _: () = assert!(Cost::M7_CAPSULE.instructions_within(BUDGET) < TICK_INSTRUCTIONS);
+const _: () = assert!(Cost::M7_TICK.instructions_within(BUDGET) < TICK_INSTRUCTIONS);
 
 /// Stiffness of the constraint, in N/mm.
 pub const STIFFNESS: f32 = 1.0;

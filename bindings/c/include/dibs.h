@@ -888,6 +888,10 @@ enum dibs_cost
    * A capsule on x86-64.
    */
   DIBS_COST_X86_CAPSULE = 3,
+  /**
+   * A tick of a tracker or guard on a Cortex-M7, without contacts.
+   */
+  DIBS_COST_M7_TICK = 4,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -2788,7 +2792,7 @@ dibs_code dibs_query_closest(dibs_query *query,
                              dibs_proximity *proximity);
 
 /**
- * The budget of a query that must end within this number of instructions, by a fitted model with a margin of 20 %.
+ * The budget of a query or tick that must end within this number of instructions, by a fitted model with a margin.
  *
  * @param cost  A `dibs_cost`.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_ARGUMENT` for a number that is not a `dibs_cost`, or a misuse.

@@ -147,13 +147,9 @@ impl Tracker {
         check(surface.get(), &self.tree)?;
         let tool = AnyTool::of(&bytes::doubles(tool), self.tree.origin);
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
-        let cost = match tool {
-            AnyTool::Sphere(_) => &Cost::M7_SPHERE,
-            AnyTool::Capsule(_) => &Cost::M7_CAPSULE,
-        };
         let mut options = options(surface.get());
         if let Some(instructions) = instructions {
-            options = options.budget(Budget::for_instructions(instructions, cost));
+            options = options.budget(Budget::for_instructions(instructions, &Cost::M7_TICK));
         }
         // While a thread waits for the list, it releases Python, so that the thread that holds the list can return.
         let list = self.contacts.lock_py_attached(py);

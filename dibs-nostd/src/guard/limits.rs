@@ -56,7 +56,7 @@ impl GuardLimits {
         self
     }
 
-    /// The work limit of a tick: [`Budget::for_instructions`].
+    /// The work limit of a tick: [`Budget::for_instructions`] by [`Cost::M7_TICK`](crate::Cost::M7_TICK).
     #[must_use]
     pub const fn budget(mut self, budget: Budget) -> Self {
         self.options = self.options.budget(budget);

@@ -16,12 +16,12 @@ impl Tests {
         self.node_tests.saturating_add(self.triangle_tests.saturating_mul(Budget::TRIANGLE))
     }
 
-    /// The sum of both counts.
+    /// The sum of both counts, each far below the largest number.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self {
-            node_tests: self.node_tests.saturating_add(other.node_tests),
-            triangle_tests: self.triangle_tests.saturating_add(other.triangle_tests),
+            node_tests: self.node_tests.wrapping_add(other.node_tests),
+            triangle_tests: self.triangle_tests.wrapping_add(other.triangle_tests),
         }
     }
 }

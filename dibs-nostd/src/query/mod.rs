@@ -5,6 +5,7 @@ mod contacts;
 mod corners;
 mod cost;
 mod cost_m7;
+mod cost_tick;
 mod cost_x86_64;
 mod depth;
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod options;
 mod passed;
 mod plane;
 mod precision;
+mod prices;
 mod proximity;
 mod search;
 mod separation;

@@ -9,7 +9,8 @@ use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 /// A node test is that of a sphere, or of the plane of a leaf or triangle. An exact triangle test counts as
 /// [`TRIANGLE`](Self::TRIANGLE) node tests. The tests of the roots' spheres and of a warm start's triangle are not
 /// counted. The depth of an axis that crosses or is inside counts its work outside of searches as node tests of equal
-/// time.
+/// time. A tracker's tick within a budget counts all of its work so, but a constant part and a comparison for each
+/// opened node; without a budget it counts tests alone.
 ///
 /// Every answer's interval holds the true separation. For the same query a larger budget never lowers the lower end,
 /// and raises the upper end by no more than the accuracy. From tick to tick only the upper end keeps this rule, if the
@@ -58,6 +59,9 @@ impl Budget {
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Options {
     pub(super) budget: Budget,
+    /// Whether the budget is the user's own: then a tracker's tick also counts its work [between tests](super::prices).
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(super) is_priced: bool,
     #[cfg_attr(feature = "serde", serde(skip))]
     first: First,
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -91,6 +95,7 @@ impl Options {
     pub const fn new() -> Self {
         Self {
             budget: Budget::UNLIMITED,
+            is_priced: false,
             first: First::Last,
             stretch: None,
             is_signed: true,
@@ -108,13 +113,19 @@ impl Options {
     /// Bounds the work.
     #[must_use]
     pub const fn budget(mut self, budget: Budget) -> Self {
+        self.is_priced = budget.tests < Budget::UNLIMITED.tests;
+        self.within(budget)
+    }
+
+    /// The same options with another budget, for a part of the work, or for a filter, which counts by a query's fit.
+    pub(crate) const fn within(mut self, budget: Budget) -> Self {
         self.budget = budget;
         self
     }
 
     /// The same options with the budget left after these tests.
     pub(super) const fn after(self, made: Tests) -> Self {
-        self.budget(self.budget.less(made.work()))
+        self.within(self.budget.less(made.work()))
     }
 
     /// Starts from this triangle instead of the last answer's. A wrong or outdated one costs one triangle test; `None`

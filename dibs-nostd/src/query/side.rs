@@ -231,7 +231,7 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
     let options = rest(pair);
     let left = options.budget.tests() / 2;
     let mut exact = Exact::<_, _, f64>::new(tree, vertices, &at, left);
-    let options = options.budget(options.budget.less(left));
+    let options = options.within(options.budget.less(left));
     let search = Search::start(roots, tree, stack, vertices, &tool, &options, first, None)?;
     let (is_complete, made) = search.each_tie(|row| exact.add(row))?;
     pair.add_tests(made);

@@ -28,7 +28,7 @@ static SURFACE: heart::Surface = heart::Surface::new();
 const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
     .without_transit()
     .automatic()
-    .budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
+    .budget(Budget::for_instructions(400_000, &Cost::M7_TICK));
 
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static TICK: Signal<CriticalSectionRawMutex, Millis> = Signal::new();

@@ -38,7 +38,7 @@ mod app {
     const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
         .without_transit()
         .automatic()
-        .budget(Budget::for_instructions(400_000, &Cost::M7_CAPSULE));
+        .budget(Budget::for_instructions(400_000, &Cost::M7_TICK));
 
     /// Number of control ticks so far: the time, in ms.
     static NOW: AtomicU32 = AtomicU32::new(0);

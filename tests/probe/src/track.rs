@@ -51,7 +51,8 @@ pub const ANSWER_WORDS: usize = 8;
 pub const TREE_BYTES: usize = 5 << 19;
 /// Most vertices.
 pub const VERTICES: usize = 26_000;
-const STACK: usize = 128;
+/// Entries of a tracker's stack.
+pub const STACK: usize = 128;
 /// Opened nodes that the tracker remembers.
 pub const OPENED: usize = 512;
 

@@ -36,7 +36,7 @@ fn the_budgets_shown_are_enough_for_the_heart() {
     let (beat, mut positions) = (Beat::new(&motion), Vec::new());
     let models = [
         ("M7_SPHERE", Cost::M7_SPHERE),
-        ("M7_CAPSULE", Cost::M7_CAPSULE),
+        ("M7_TICK", Cost::M7_TICK),
         ("X86_64_CAPSULE", Cost::X86_64_CAPSULE),
     ];
     let mut queries: Vec<_> = budgets

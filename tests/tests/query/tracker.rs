@@ -247,15 +247,20 @@ fn a_tick_takes_all_of_its_budget_and_no_more() {
             let options = Options::cold().unsigned().budget(budget);
             tracker.closest(&surface, &sphere, &options).expect("an answer").closest
         };
-        let whole = first(Budget::UNLIMITED);
+        // Within a budget a tick also counts its work between tests.
+        let [unlimited, whole] = [Budget::UNLIMITED, Budget::new(1_000_000)].map(first);
+        assert!(whole.node_tests > unlimited.node_tests, "{whole:?} {unlimited:?}");
+        let mut counted = whole;
+        counted.node_tests = unlimited.node_tests;
+        assert_eq!(counted, unlimited);
         // A plane's test requires that an exact test would still fit.
         let enough = whole.work() + Budget::TRIANGLE;
         assert_eq!(first(Budget::new(enough)), whole);
         most = most.max(whole.triangle_tests);
         for too_few in 0..whole.work() - 1 {
             let found = first(Budget::new(too_few));
-            // Children are only tested if all of them fit in the budget.
-            let spare = 8.max(1 + Budget::TRIANGLE);
+            // A triangle is only tested if the visit to its leaf, its plane and an exact test fit in the budget.
+            let spare = 5 + Budget::TRIANGLE;
             assert!(
                 found.work() <= too_few + 1 && found.work() + spare > too_few,
                 "{too_few} {found:?}"

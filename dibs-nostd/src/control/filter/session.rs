@@ -383,7 +383,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         left: Budget,
     ) -> Result<Found, FilterError> {
         let Filter { cost, options, .. } = self.filter;
-        let options = options.signed().budget(left);
+        let options = options.signed().budget(Budget::UNLIMITED).within(left);
         let found = match near {
             // Without labels that is not compiled.
             Some(near) if LABELS > 0 => {

@@ -102,7 +102,7 @@ impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
         let Self { tree, vertices, roots, options, spent } = self;
         let left = options.after(*spent).budget.tests().checked_sub(1 + LOOK_COST);
         let Some(left) = left else { return Ok(None) };
-        let options = options.budget(Budget::new(left));
+        let options = options.within(Budget::new(left));
         let (point, first) = (AxisPoint(point), options.first(None));
         let search = Search::start(*roots, tree, stack, *vertices, &point, &options, first, None)?;
         let found = search.run::<WHOLE>(f32::INFINITY)?;

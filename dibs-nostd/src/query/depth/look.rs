@@ -6,8 +6,9 @@
 use super::part::{Fit, Parts, Sample, smaller};
 use super::{Depth, EXACT};
 use crate::query::memory::depth::Remembered;
+use crate::query::prices::TIE;
 use crate::query::search::{Search, UNTIL};
-use crate::query::side::{self, COORDINATES, NoSide, OnAxis, Side};
+use crate::query::side::{self, COORDINATES, NoSide, OnAxis, PointSide, Side};
 use crate::query::{Options, Proximity};
 use crate::tool::{AxisPoint, Tool};
 use crate::unavailable::QueryError;
@@ -15,7 +16,7 @@ use crate::{Index, VertexTable};
 
 /// The work for a point of the axis outside of its search, in node tests. Without it a budget would not bound a
 /// tracker's tick, which may visit many points and triangles without a search.
-const LOOK_COST: u32 = 16;
+pub(super) const LOOK_COST: u32 = 16;
 
 /// With this many node tests left, a search is expected to finish within a tick.
 const ONE_TICK: u32 = 768;
@@ -76,7 +77,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let &Sample { parameter, triangle, .. } = sample;
         let point = AxisPoint(sample.on_axis);
         let length = self.tool.axis_length();
-        let Self { roots, tree, stack, vertices, ties, remembered, .. } = self;
+        let Self { roots, tree, stack, vertices, ties, remembered, is_priced, .. } = self;
+        let is_priced = *is_priced;
         let search = Search::start(
             *roots,
             tree,
@@ -92,7 +94,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             for leaves in [&mut *best, &mut *other] {
                 let way = leaves.way_to(parameter, length);
                 if search.is_among(leaves, way) {
-                    return search.among(leaves, way).map(Some);
+                    return search.among(leaves, way, is_priced).map(Some);
                 }
             }
             let gathered = match (best.are_around(parameter), other.are_around(parameter)) {
@@ -111,7 +113,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 if !waiting.is_empty() && !gathered.is_gathering() {
                     return Ok(None);
                 }
-                return search.gather(gathered, waiting).map(Some);
+                return search.gather(gathered, waiting, is_priced).map(Some);
             }
             // No early end: a bound that barely suffices now would not at the next tick.
             limit = EXACT;
@@ -136,7 +138,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         if self.is_spent() {
             return Ok(sample);
         }
-        let options = self.options.budget(self.options.budget.less(1));
+        let options = self.options.within(self.options.budget.less(1));
         let point = AxisPoint(on_axis);
         let Some(mut found) = self.search(&sample, &options, enough)? else { return Ok(sample) };
         if found.is_cut_short() && self.has_leaves(parameter) {
@@ -154,16 +156,23 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 side::of_many(roots, tree, self.stack, vertices, &mut found, on_axis, &options)
             })
             .transpose()?;
-        self.options = self.options.after(found.tests());
+        self.options.budget = self.options.budget.less(found.tests().work());
         self.answer.add_tests(found.tests());
         let distance = found.axis_distance;
-        let at = if found.is_cut_short() {
+        let mut is_cut = found.is_cut_short();
+        if self.is_priced {
+            self.spend(TIE * self.ties.count());
+            is_cut |= self.is_spent();
+        }
+        let at = if is_cut {
             None
         } else {
             let (at, left) = (OnAxis::new(&point, 0.0), self.options.budget.tests());
             Some(side::of_point(tree, vertices, &found, &at, self.ties, many, left)?)
         };
-        self.spend(at.map_or(0, |at| at.work));
+        if let Some(PointSide { work: work @ 1.., .. }) = at {
+            self.spend(work);
+        }
         let mut is_deepest = false;
         let answer = &mut self.answer;
         let depth = match at {

@@ -28,6 +28,7 @@ use glam::Vec3;
 
 use super::corners::positions;
 use super::memory::depth::{Point, Points, Remembered};
+use super::prices::TURN;
 use super::search::{Ties, Waiting};
 use super::side::{self, NoSide, Side};
 use super::{Options, Proximity};
@@ -35,7 +36,8 @@ use crate::tool::Tool;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
-use part::{Bound, Fit, Part, Parts, Sample, larger, smaller};
+use look::LOOK_COST;
+use part::{Bound, Fit, MOST_DISTANCES, Part, Parts, Sample, larger, smaller};
 use touches::Touches;
 
 /// A limit that never ends a search early.
@@ -55,6 +57,9 @@ const LEAST_WORK: u32 = 4_608;
 
 /// Node tests that take as long as a point's distance to one triangle.
 const DISTANCE_COST: u32 = 3;
+
+/// The most for a bound between two points.
+const BOUND_COST: u32 = MOST_DISTANCES * DISTANCE_COST;
 
 /// The search for the deepest point of a tool's axis.
 pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
@@ -76,6 +81,8 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     deepest_at: f32,
     looks: u32,
     remembered: Option<Remembered<'s>>,
+    /// Whether a tick's [work besides its tests](super::prices) counts.
+    is_priced: bool,
     /// Roots of the shells that decide.
     roots: RootSet,
     /// The triangles that the axis may touch; then those that may be the closest to the last searched point.
@@ -121,6 +128,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             deepest,
             deepest_at,
             looks: 0,
+            is_priced: options.is_priced && remembered.is_some(),
             remembered,
             roots,
             ties,
@@ -198,11 +206,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 return Ok(bound);
             }
             let ends = [row, next];
-            let is_closest = ends.iter().all(|&row| parts.sample(row).fit >= Fit::Closest);
+            let is_closest = ends.iter().all(|&row| parts.fit(row) >= Fit::Closest);
             let Some(split) = split.filter(|_| is_closest) else {
-                if self.is_spent() {
+                // A walk is not begun if no bound could follow.
+                if self.is_spent_for(TURN + BOUND_COST) {
                     return Ok(bound);
                 }
+                self.spend_if_priced(TURN);
                 for row in ends {
                     if split.is_none() {
                         self.place(parts, row)?;
@@ -210,20 +220,27 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                         self.walk(parts, row)?;
                     }
                 }
+                if self.lacks(BOUND_COST) {
+                    return Ok(bound);
+                }
                 self.renew(parts, row, enough);
                 continue;
             };
             let is_open = |sample: &Sample| sample.fit == Fit::Closest && sample.depth > enough;
-            if self.remembered.is_some()
-                && let Some(end) = ends.into_iter().find(|&row| is_open(&parts.sample(row)))
-            {
-                if self.looks >= LOOKS || self.is_spent() {
-                    return Ok(bound);
+            if self.remembered.is_some() {
+                self.spend_if_priced(TURN);
+                if let Some(end) = ends.into_iter().find(|&row| is_open(&parts.sample(row))) {
+                    if self.looks >= LOOKS || self.is_spent() {
+                        return Ok(bound);
+                    }
+                    let sample = self.look(parts.sample(end), enough)?;
+                    parts.set_sample(end, sample);
+                    if self.lacks(BOUND_COST) {
+                        return Ok(bound);
+                    }
+                    self.renew(parts, row, enough);
+                    continue;
                 }
-                let sample = self.look(parts.sample(end), enough)?;
-                parts.set_sample(end, sample);
-                self.renew(parts, row, enough);
-                continue;
             }
             let Some(place) = self.room(parts, enough) else { return Ok(bound) };
             let (from, to) = (parts.sample(row), parts.sample(next));
@@ -234,8 +251,15 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 middle = self.look(middle, enough)?;
             }
             let enough = self.enough(tolerance);
-            let before = self.bound(&from, &middle, enough);
-            let after = self.bound(&middle, &to, enough);
+            if self.lacks(2 * BOUND_COST) {
+                // A later turn, of this tick or another, bounds them.
+                parts.set(row, Part::remembered(from, place, bound));
+                parts.push(Part::remembered(middle, next, bound));
+                continue;
+            }
+            let before = Bound::between(&from, &middle, enough, &self.touches);
+            let after = Bound::between(&middle, &to, enough, &self.touches);
+            self.spend((before.distances + after.distances) * DISTANCE_COST);
             parts.set(row, Part::new(from, place, &before, bound));
             parts.push(Part::new(middle, next, &after, bound));
         }
@@ -245,13 +269,6 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     fn enough(&self, tolerance: f32) -> f32 {
         let least = self.remembered.as_ref().map_or(0.0, |known| known.between[0]);
         larger(self.deepest, least) + tolerance
-    }
-
-    /// The bound between two samples.
-    fn bound(&mut self, from: &Sample, to: &Sample, enough: f32) -> Bound {
-        let bound = Bound::between(from, to, enough, &self.touches);
-        self.spend(bound.distances * DISTANCE_COST);
-        bound
     }
 
     /// Bounds a remembered part again.
@@ -265,7 +282,25 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let rest = self.options.budget;
         let spent = rest.tests().min(node_tests);
         self.options.budget = rest.less(spent);
-        self.answer.node_tests = self.answer.node_tests.saturating_add(spent);
+        self.answer.node_tests = self.answer.node_tests.wrapping_add(spent);
+    }
+
+    /// Counts a tick's work besides its tests.
+    fn spend_if_priced(&mut self, node_tests: u32) {
+        if self.is_priced {
+            self.spend(node_tests);
+        }
+    }
+
+    /// Whether a tick's budget does not cover the next work.
+    fn lacks(&self, node_tests: u32) -> bool {
+        self.options.budget.tests() < node_tests && self.is_priced
+    }
+
+    /// Whether the budget is spent, or that of a tick does not cover the next work.
+    fn is_spent_for(&self, node_tests: u32) -> bool {
+        let left = self.options.budget.tests();
+        left < node_tests && (left == 0 || self.is_priced)
     }
 
     const fn is_spent(&self) -> bool {
@@ -274,7 +309,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// The row for another part, if one may be divided.
     fn room(&self, parts: &mut Parts, enough: f32) -> Option<usize> {
-        if self.looks >= LOOKS || self.is_spent() {
+        if self.looks >= LOOKS || self.is_spent_for(2 * LOOK_COST) {
             return None;
         }
         if parts.free().is_none() {

@@ -16,6 +16,9 @@ const NEAREST_SPLIT: f32 = 0.125;
 /// Most steps towards the point at equal distance from two triangles.
 const ROUNDS: u32 = 2;
 
+/// Most distances to triangles computed for a bound.
+pub(super) const MOST_DISTANCES: u32 = 2 * (2 + 2 + ROUNDS);
+
 /// A point of the axis and the triangle found closest to it; if the budget ended, one pin as all three corners.
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
@@ -288,6 +291,11 @@ impl Parts {
     /// The row of the sample with a parameter.
     pub fn row_of(&self, parameter: f32) -> Option<usize> {
         self.rows.iter().take(self.end).position(|part| part.from.parameter == parameter)
+    }
+
+    /// How the triangle at a part's start was found.
+    pub fn fit(&self, row: usize) -> Fit {
+        self.rows.get(row).map_or(Fit::Remembered, |part| part.from.fit)
     }
 
     /// The sample at a part's start.

@@ -5,6 +5,7 @@ use super::touches::Touches;
 use super::{DISTANCE_COST, Depth};
 use crate::query::Proximity;
 use crate::query::memory::depth::Point;
+use crate::query::prices::POINT;
 use crate::tool::Tool;
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
@@ -104,6 +105,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// The last tick's parts, each at most `reach` deep. Returns the parameter of the deepest point, if there are any.
     pub(super) fn resume(&mut self, parts: &mut Parts, reach: f32) -> Option<f32> {
         let (points, deepest) = self.remembered.as_ref()?.points.known()?;
+        let price = POINT * points.len() as u32;
         for point in points {
             let Point { parameter, depth, bound, triangle } = *point;
             let triangle = Some(triangle);
@@ -114,6 +116,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             parts.push(Part::remembered(from, parts.count() + 1, smaller(bound, reach)));
         }
         parts.end();
+        self.spend_if_priced(price);
         Some(deepest)
     }
 }

@@ -4,11 +4,19 @@
 use super::part::{self, Fit, Parts, Sample, smaller};
 use super::{DISTANCE_COST, Depth};
 use crate::math::sqrt::sqrt;
+use crate::query::prices::STEP;
 use crate::tool::Tool;
 use crate::unavailable::QueryError;
 use crate::{Index, TriangleRow, VertexTable};
 
 const STEPS: u32 = 4;
+
+/// Most steps of a walk, and what a distance counts as.
+#[derive(Clone, Copy)]
+struct Walk {
+    steps: u32,
+    cost: u32,
+}
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Reads the corners of a remembered sample's triangle.
@@ -26,17 +34,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     pub(super) fn walk(&mut self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let mut sample = parts.sample(row);
         if sample.fit < Fit::Closest {
-            self.descend(&mut sample, 0.0)?;
+            let walk = self.affordable();
+            self.descend(&mut sample, 0.0, walk)?;
             parts.set_sample(row, sample);
         }
         Ok(())
     }
 
     /// Moves a sample's triangle to closer neighbours, until none is closer or the distance is within `enough`.
-    fn descend(&mut self, sample: &mut Sample, enough: f32) -> Result<(), QueryError> {
+    fn descend(&mut self, sample: &mut Sample, enough: f32, walk: Walk) -> Result<(), QueryError> {
         let (mut least, mut distances) = (sample.square(sample.on_axis), 1);
         let mut before = None;
-        for _ in 0..STEPS {
+        for _ in 0..walk.steps {
             let Some(TriangleRow(from)) = sample.triangle.filter(|_| least > enough * enough)
             else {
                 break;
@@ -59,8 +68,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         }
         sample.fit = Fit::Closest;
         sample.depth = smaller(sample.depth, sqrt(least));
-        self.spend(distances * DISTANCE_COST);
+        self.spend(distances * walk.cost);
         Ok(())
+    }
+
+    /// As many steps as the budget covers twice, from either neighbour.
+    fn affordable(&self) -> Walk {
+        if !self.is_priced {
+            return Walk { steps: STEPS, cost: DISTANCE_COST };
+        }
+        let cost = DISTANCE_COST + STEP;
+        let affordable = self.options.budget.tests() / (2 * 3 * cost);
+        Walk { steps: affordable.min(STEPS), cost }
     }
 
     /// A point of the axis between two samples, with a triangle found by steps from theirs, whose distance bounds the
@@ -76,10 +95,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             this.at(parameter, end.depth + (along - end.along).abs(), end)
         };
         let mut closest = at(self, near);
-        self.descend(&mut closest, enough)?;
+        let walk = self.affordable();
+        self.descend(&mut closest, enough, walk)?;
         if closest.depth > enough {
             let mut other = at(self, far);
-            self.descend(&mut other, enough)?;
+            self.descend(&mut other, enough, walk)?;
             if other.depth < closest.depth {
                 closest = other;
             }

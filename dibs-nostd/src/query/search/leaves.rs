@@ -13,6 +13,7 @@ use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::memory::leaves::{Leaf, Leaves};
 use crate::query::plane::least;
+use crate::query::prices::LEAF_PLANE;
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
@@ -28,7 +29,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 
     /// Searches only these leaves.
-    pub fn among(mut self, leaves: &mut Leaves, way: f32) -> Result<Proximity, QueryError> {
+    pub fn among(
+        mut self,
+        leaves: &mut Leaves,
+        way: f32,
+        is_priced: bool,
+    ) -> Result<Proximity, QueryError> {
+        let price = if is_priced { 1 + LEAF_PLANE } else { 1 };
         let moved = leaves.moved(way);
         let slack = self.slack + self.coordinate_slack;
         let (leaves, moved_before) = leaves.each();
@@ -39,7 +46,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let Link::Leaf { first, count } = Link::decode(leaf.link) else {
                 return Err(QueryError::Corrupt { row: leaf.link });
             };
-            let Some(bound) = self.leaf_bound(first, count)? else { return self.finish(0.0) };
+            let Some(bound) = self.leaf_bound(first, count, price)? else {
+                return self.finish(0.0);
+            };
             let bound = (bound - slack - way + moved_before) * (1.0 - f32::EPSILON);
             if bound > leaf.bound {
                 leaf.bound = bound;
@@ -56,7 +65,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         mut self,
         leaves: &mut Leaves,
         waiting: &mut VecView<Waiting>,
+        is_priced: bool,
     ) -> Result<Proximity, QueryError> {
+        let price = if is_priced { 1 + LEAF_PLANE } else { 1 };
         let is_first = waiting.is_empty();
         if is_first {
             leaves.begin();
@@ -82,7 +93,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                     continue;
                 }
             };
-            let Some(own) = self.leaf_bound(first, count)? else {
+            let Some(own) = self.leaf_bound(first, count, price)? else {
                 return self.leave(Waiting { lower, link }, wider, leaves, waiting);
             };
             let bound = (if own > lower { own } else { lower }) - slack;
@@ -137,9 +148,15 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self.finish(0.0)
     }
 
-    /// Tests a leaf. Returns a lower bound on its distance, or `None` if out of budget.
-    fn leaf_bound(&mut self, first: u32, count: u32) -> Result<Option<f32>, QueryError> {
-        if self.meter.node().is_none() {
+    /// Tests a leaf, whose plane counts as `price` node tests. Returns a lower bound on its distance, or `None` if out of
+    /// budget.
+    fn leaf_bound(
+        &mut self,
+        first: u32,
+        count: u32,
+        price: u32,
+    ) -> Result<Option<f32>, QueryError> {
+        if self.meter.nodes(price).is_none() {
             return Ok(None);
         }
         let corrupt = QueryError::Corrupt { row: first };

@@ -19,6 +19,7 @@ use crate::query::Budget;
 use crate::query::made::Tests;
 use crate::query::memory::clock::{Deadline, MotionClock};
 use crate::query::memory::front::{ChildSlot, FrontMut, NOWHERE, UNUSED};
+use crate::query::prices::{CHILD_PLANE, TRIANGLE, VISIT};
 use crate::surface::motion::FAR;
 use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
@@ -44,6 +45,8 @@ pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
     /// Distance from the axis beyond which the search does not go.
     limit: f32,
     facing: Facing,
+    /// Whether its [work besides tests](crate::query::prices) counts.
+    is_priced: bool,
 }
 
 impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I, V, T> {
@@ -53,7 +56,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         mut search: Search<'s, 't, I, V, T>,
         front: FrontMut<'f>,
         clock: MotionClock,
-        budget: Budget,
+        (budget, is_priced): (Budget, bool),
         separation: f32,
     ) -> Self {
         // A tick tests each node's sphere, each leaf's plane and each triangle at most twice.
@@ -65,7 +68,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let limit =
             if separation < f32::INFINITY { search.limit_to(separation) } else { f32::INFINITY };
         let facing = Facing::new(&search);
-        Self { search, front, clock, margin, limit, facing }
+        Self { search, front, clock, margin, limit, facing, is_priced }
     }
 
     /// Tests the bounds that run out with a motion of `moved` units.
@@ -208,10 +211,17 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             _ if opened.link == UNUSED => (Expansion::Done, 0),
             Link::Children { first, count } => {
                 let due = opened.due(count, threshold);
+                if self.is_priced && self.search.meter.nodes(VISIT).is_none() {
+                    return Ok(Expansion::OutOfBudget);
+                }
                 (self.test_children(at, first, due)?, count)
             }
             Link::Leaf { first, count } => {
                 let due = opened.due(count, threshold);
+                let price = VISIT + TRIANGLE * due.count_ones();
+                if self.is_priced && self.search.meter.nodes(price).is_none() {
+                    return Ok(Expansion::OutOfBudget);
+                }
                 (self.test_triangles(at, first, due)?, count)
             }
         };
@@ -228,7 +238,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     ) -> Result<Expansion, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         let base = self.search.waiting;
-        let (clock, margin) = (self.clock, self.margin);
+        let (clock, margin, is_priced) = (self.clock, self.margin, self.is_priced);
         let later = |due: Deadline, bound: f32| due.or_later(clock.deadline(bound - margin));
         let search = &mut self.search;
         let tree = search.tree;
@@ -249,7 +259,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 continue;
             }
             if let Link::Leaf { first, count } = Link::decode(node.link)
-                && search.meter.node().is_some()
+                && search.meter.nodes(if is_priced { 1 + CHILD_PLANE } else { 1 }).is_some()
             {
                 let plane = search.plane_across(normal, position, distance);
                 let excess = plane.excess(tree, search.vertices, first, count).ok_or(corrupt)?;

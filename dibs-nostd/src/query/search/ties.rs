@@ -78,6 +78,11 @@ impl Ties {
         }
     }
 
+    /// Number of triangles kept.
+    pub fn count(&self) -> u32 {
+        self.rows.len() as u32
+    }
+
     /// Whether triangles may be missing.
     pub const fn are_lost(&self) -> bool {
         self.are_lost

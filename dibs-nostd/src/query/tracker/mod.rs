@@ -271,7 +271,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let all = RootSet::ALL;
         let search = Search::start(all, &self.tree, stack, surface, tool, options, first, ties)?;
         let front = memory.front.borrow();
-        let mut tick = Tick::new(search, front, memory.clock, budget, separation);
+        let mut tick =
+            Tick::new(search, front, memory.clock, (budget, options.is_priced), separation);
         let outcome = tick.run(moved)?;
         let best = tick.triangle();
         self.triangle = best.or(self.triangle);
@@ -284,7 +285,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             }
             Outcome::Full { tests } => {
                 fallback = Some(Fallback::Full);
-                (self.whole(surface, tool, &options.budget(budget), best, tests)?, true)
+                (self.whole(surface, tool, &options.within(budget), best, tests)?, true)
             }
         };
         let memory = &mut self.memory;

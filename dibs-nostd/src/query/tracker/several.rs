@@ -131,7 +131,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         } else {
             (options.unsigned(), closest + self.memory.clock.length(LEAD))
         };
-        let options = options.budget(options.budget.at_most(AHEAD.tests()));
+        let options = options.within(options.budget.at_most(AHEAD.tests()));
         let found = self.within(surface, tool, &options, separation, Purpose::Ahead)?.closest;
         if let Some(last) = &mut self.last {
             last.is_signed |= keeps_side;

@@ -147,7 +147,7 @@ pub const CHECK: Check = Check {
 
 /// How the small budgets were chosen, and what did not narrow their intervals.
 const SMALL: &str = "The budget is the largest whose dearest tick was measured within the instructions; the median tick that uses it up \
-     takes {bounded.40k.spent}, because tests differ in cost. Four designs did not narrow the interval: an unfinished \
+     takes {bounded.40k.spent}, because a test's price is its mean cost. Four designs did not narrow the interval: an unfinished \
      search among the leaves as its lower end, a certain depth of the last deepest point from its leaves, half of the \
      budget for dividing the axis, and no look at a point while another search waits.";
 
@@ -186,7 +186,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("bounded.near", sum(|tally| tally.widths.len()));
     for (tally, row) in tallies.iter().zip(&USUAL) {
         tally.note(row.name, figures);
-        row.note_board(&scene, figures)?;
+        row.note_board(&scene, &tally.work, figures)?;
     }
     Ok(Outcome::Passed)
 }

@@ -133,7 +133,7 @@ fn measure(rows: &[Row], name: &str, figures: &mut Figures) -> Result<Outcome> {
         };
         let tally = run(&scene, &truth(&scene), row.budget()?);
         tally.note(row.name, figures);
-        row.note_board(&scene, figures)?;
+        row.note_board(&scene, &tally.work, figures)?;
         wrong += tally.wrong;
         damped += tally.damped;
         near += tally.widths.len();

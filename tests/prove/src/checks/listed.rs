@@ -114,6 +114,8 @@ struct Tally {
     near: u32,
     without: u32,
     complete: u32,
+    /// Work of each tick, in node tests.
+    work: Vec<u32>,
 }
 
 impl Tally {
@@ -137,6 +139,7 @@ fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
         let tracked = tracked.expect("an answer");
         let is_settled = settling.is_settled(tracked.moved);
         tally.wrong += u32::from(truth[tick].is_missed_by(&tracked.closest));
+        tally.work.push(tracked.closest.work());
         if truth[tick].lower >= MARGIN || !is_settled {
             return;
         }
@@ -160,7 +163,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         wrong += tally.wrong;
         figures.note(&format!("{}.without", row.name), tally.without.into());
         figures.note(&format!("{}.complete", row.name), tally.share());
-        row.note_board(&scene, figures)?;
+        row.note_board(&scene, &tally.work, figures)?;
     }
     figures.note("listed.ticks", scene.ticks() as f64);
     figures.note("listed.wrong", wrong.into());

@@ -40,6 +40,7 @@ mod sanitizers;
 mod sides;
 mod signed;
 mod stack;
+mod tick_cost;
 mod ticks;
 mod torn;
 mod tracked;
@@ -62,6 +63,7 @@ pub const CHECKS: &[Check] = &[
     filter_board::CHECK,
     cost::BOARD,
     cost::HOST,
+    tick_cost::CHECK,
     bound::CHECK,
     path::CHECK,
     tracked::CHECK,
@@ -100,10 +102,11 @@ pub const CHECKS: &[Check] = &[
 
 /// Checks that `cargo xtask test` runs only with `--whole`: each builds one more program, or takes half a minute in
 /// addition to checks of the same parts, or runs the tests again under a sanitizer.
-pub const ON_REQUEST: [&str; 12] = [
+pub const ON_REQUEST: [&str; 13] = [
     dearer::CHECK.name,
     dearer::OF_HUMAN.name,
     listed::CHECK.name,
+    tick_cost::CHECK.name,
     demo_nodes::CHECK.name,
     filter_board::CHECK.name,
     nodes::CHECK.name,
@@ -145,5 +148,6 @@ pub const EITHER: [&str; 5] = [
 /// Fits all constants, or those whose names contain `only`.
 pub fn fit(only: Option<&str>) -> Result<()> {
     cost::fit(only)?;
-    bounded::rows::fit(only)
+    bounded::rows::fit(only)?;
+    if only.is_none_or(|only| "tick".contains(only)) { tick_cost::fit() } else { Ok(()) }
 }

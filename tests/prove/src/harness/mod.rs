@@ -38,8 +38,8 @@ pub struct Check {
 /// Measures every promise, and writes docs/evidence/guarantees.json and docs/evidence/guarantees.md.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Fits the constants of the cost model again (`--only board`, `--only host`: for one machine) and the budgets of
-    /// the table of bounded ticks (`--only bounded.60k`: of one row), and ends; then run the checks with a program
+    /// Fits the constants of the cost model again (`--only board`, `--only host`: for one machine; `--only tick`: of
+    /// a tracker's ticks) and the budgets of the table of bounded ticks (`--only bounded.60k`: of one row), and ends; then run the checks with a program
     /// that has the new constants.
     #[arg(long)]
     fit: bool,

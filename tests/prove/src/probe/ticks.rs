@@ -41,8 +41,11 @@ impl Script {
     /// Adds a tick at the fraction `share` of the interval to the last frame. `bits` selects what the probe must find.
     pub fn tick(&mut self, bits: u32, share: f32, tool: &Capsule) {
         self.put(&[command::TICK, bits, share.to_bits()]);
-        let joints = joints(tool);
-        self.put_points(if bits & tick::CHAIN == 0 { &joints[..2] } else { &joints });
+        if bits & tick::CHAIN == 0 {
+            self.put_points(&[tool.start(), tool.end()]);
+        } else {
+            self.put_points(&joints(tool));
+        }
         self.put(&[tool.radius().to_bits()]);
     }
 

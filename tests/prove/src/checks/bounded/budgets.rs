@@ -2,14 +2,14 @@
 
 /// The budget in tests of each row.
 pub const TESTS: &[(&str, u32)] = &[
-    ("bounded.20k", 35),
-    ("bounded.40k", 134),
-    ("bounded.60k", 257),
-    ("bounded.100k", 468),
-    ("listed.40k", 43),
-    ("listed.60k", 107),
-    ("listed.100k", 319),
-    ("dearer.fast", 247),
-    ("dearer.large", 182),
-    ("dearer.human", 182),
+    ("bounded.20k", 103),
+    ("bounded.40k", 312),
+    ("bounded.60k", 501),
+    ("bounded.100k", 898),
+    ("listed.40k", 103),
+    ("listed.60k", 196),
+    ("listed.100k", 343),
+    ("dearer.fast", 487),
+    ("dearer.large", 468),
+    ("dearer.human", 487),
 ];

@@ -110,7 +110,7 @@ impl Scene {
             }
             let surface = step.as_ref().expect("a step").at(share);
             let both = stretch.or_larger(*next_stretch).expect("one tree");
-            ask(tick, &surface, tool, Options::new().stretch(both))
+            ask(tick, &surface, tool, Options::cold().stretch(both))
         });
         ticks.collect()
     }
@@ -133,8 +133,7 @@ pub fn truth(scene: &Scene) -> Vec<Truth> {
     })
 }
 
-/// All ticks except the first of a tracker on the board within a budget, sorted by their instructions. `bits` selects
-/// what else the tracker must find.
+/// All ticks except the first of a tracker on the board within a budget. `bits` selects what else the tracker must find.
 pub fn on_board(scene: &Scene, bits: u32, budget: Budget) -> Result<Vec<Tick>> {
     let program = build_for_board(&board()?, "chain")?;
     let frames = &scene.frames;
@@ -148,7 +147,5 @@ pub fn on_board(scene: &Scene, bits: u32, budget: Budget) -> Result<Vec<Tick>> {
         script.tick(bits, share, tool);
     }
     let ticks = scene.path.len() as u32;
-    let mut ticks = read(&run_on_board(&program, &script.end(), COUNTING)?, ticks)?;
-    ticks.sort_unstable_by_key(|tick| tick.instructions);
-    Ok(ticks)
+    read(&run_on_board(&program, &script.end(), COUNTING)?, ticks)
 }

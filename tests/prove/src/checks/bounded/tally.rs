@@ -4,6 +4,7 @@ use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Options, Proximity, Query, Sphere, SurfaceBlend, Tool, Tracker};
 use glam::Vec3;
+use probe::track::{OPENED, STACK};
 
 use super::path::RADIUS;
 use super::scene::{Scene, Truth};
@@ -18,6 +19,8 @@ pub struct Tally {
     turned: usize,
     /// Widths of the intervals near the wall, in order.
     pub widths: Vec<f32>,
+    /// Work of each tick, in node tests.
+    pub work: Vec<u32>,
 }
 
 impl Tally {
@@ -36,7 +39,9 @@ impl Tally {
 /// Runs a tracker over the path within a budget.
 pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
     let tree = scene.tree();
-    let mut tracker = Tracker::<_, MAX_STACK, 512>::new(&tree).expect("enough for any tree");
+    // As on the board.
+    let mut tracker =
+        Tracker::<_, STACK, OPENED, OPENED>::with_range(&tree).expect("enough for the tree");
     let mut point = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let wall = ForbiddenRegion::new(spring, MARGIN).expect("a valid margin");
@@ -46,6 +51,7 @@ pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
         let tracked = tracker.closest(surface, tool, &options).expect("an answer");
         let is_settled = settling.is_settled(tracked.moved);
         let (found, truth) = (tracked.closest, &truth[tick]);
+        tally.work.push(found.work());
         tally.wrong += usize::from(truth.is_missed_by(&found));
         if truth.lower >= MARGIN || !is_settled {
             return;

@@ -1,0 +1,143 @@
+//! The cost of a tracker's ticks: a line fitted above the instructions of ticks within a budget, with a margin, and checked
+//! on other surfaces and speeds.
+
+// Requirements: A-05, T-02
+
+use std::fs;
+use std::process::Command;
+
+use anyhow::{Context, Result};
+use dibs_nostd::{Budget, Cost};
+use rayon::prelude::*;
+use xtask::process::run;
+use xtask::steps::Outcome;
+use xtask::workspace;
+
+use super::bounded::rows::{DEARER, HUMAN, USUAL};
+use super::bounded::scene::on_board;
+use crate::harness::figures::Figures;
+use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
+use crate::harness::{Check, Effort};
+
+pub const CHECK: Check = Check {
+    name: "cost model of a tracker's ticks",
+    run: check,
+    promises: &[
+        note("tick.ticks"),
+        note("tick.surfaces"),
+        Promise {
+            id: "tick.late",
+            says: "A tracker's ticks with `Budget::for_instructions` by `Cost::M7_TICK` that end later",
+            criterion: TIMING,
+            bound: Bound::Is(0.0),
+            unit: "of {tick.ticks} ticks on the emulated Cortex-M7, within 20,000, 40,000, 60,000, 100,000 and 400,000 \
+                   instructions: {tick.surfaces}",
+            limits: "Not a proof: a line above the measured ticks of the first surface's path, with a margin of 15 %; the others are \
+                     not in the fit. A capsule; closest pair, side and depth, without contacts; instructions, not cycles.",
+        },
+        Promise {
+            id: "tick.largest-share",
+            says: "Tightness: what the largest of these ticks takes of its budget",
+            criterion: TIMING,
+            bound: Bound::Informs,
+            unit: "%",
+            limits: "Constants: {tick.base} + {tick.test} a test.",
+        },
+        note("tick.base"),
+        note("tick.test"),
+    ],
+};
+
+/// Margin on the fitted constants, in per cent: on a surface outside of the fit the dearest tick was 10 per cent above.
+const MARGIN: u32 = 15;
+
+/// The instructions for which budgets are made.
+const DEADLINES: [u32; 5] = [20_000, 40_000, 60_000, 100_000, 400_000];
+
+/// A tick's tests, less the root's, which the base includes; and its instructions.
+type Sample = (u32, u32);
+
+fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
+    let [usual, ..] = USUAL;
+    let [fast, large] = DEARER;
+    let mut names = vec![
+        "a generated heart of 10,272 triangles",
+        "the same at twice the speed",
+        "one of 40,000",
+    ];
+    let mut scenes =
+        [usual, fast, large].map(|row| row.scene()).into_iter().collect::<Result<Vec<_>>>()?;
+    scenes.push(HUMAN.scene()?);
+    if scenes.iter().all(Option::is_some) {
+        names.push("a human heart of 10,272");
+    } else {
+        println!("skipped: the real heart is not beside the repository");
+    }
+    let cost = Cost::M7_TICK;
+    let cases: Vec<_> =
+        scenes.iter().flatten().flat_map(|scene| DEADLINES.map(|most| (scene, most))).collect();
+    let shares = cases.par_iter().map(|&(scene, most)| {
+        let ticks = on_board(scene, 0, Budget::for_instructions(most, &cost))?;
+        let shares = ticks.iter().map(|tick| f64::from(tick.instructions) / f64::from(most));
+        Ok(shares.collect::<Vec<f64>>())
+    });
+    let shares = shares.collect::<Result<Vec<_>>>()?.concat();
+    figures.note("tick.ticks", shares.len() as f64);
+    figures.text("tick.surfaces", names.join(", "));
+    figures.note("tick.late", shares.iter().filter(|&&share| share > 1.0).count() as f64);
+    let largest = shares.iter().copied().fold(0.0, f64::max);
+    figures.note("tick.largest-share", (1_000.0 * largest).round() / 10.0);
+    figures.note("tick.base", f64::from(cost.base));
+    figures.note("tick.test", f64::from(cost.node_test));
+    Ok(Outcome::Passed)
+}
+
+/// Fits the line, and writes it into the core crate.
+pub fn fit() -> Result<()> {
+    let [usual, ..] = USUAL;
+    let scene = usual.scene()?.context("a generated scene")?;
+    let budgets = USUAL.iter().map(|row| row.budget()).collect::<Result<Vec<_>>>()?;
+    let samples = budgets.par_iter().map(|&budget| {
+        let ticks = on_board(&scene, 0, budget)?;
+        Ok(ticks
+            .iter()
+            .map(|tick| (tick.work().saturating_sub(1), tick.instructions))
+            .collect::<Vec<Sample>>())
+    });
+    let samples = samples.collect::<Result<Vec<_>>>()?.concat();
+    let usual = budgets.iter().map(|budget| budget.tests()).sum::<u32>() / budgets.len() as u32;
+    let (base, test) = line_above(&samples, usual);
+    let [base, test] = [base, test].map(|constant| (constant * (100 + MARGIN)).div_ceil(100));
+    let triangle = test * Budget::TRIANGLE;
+    let file = workspace::root().join("dibs-nostd/src/query/cost_tick.rs");
+    fs::write(
+        &file,
+        format!(
+            "//! Measured on an emulated Cortex-M7. Written by `cargo xtask guarantees --fit`: do not edit.
+
+use super::Cost;
+
+impl Cost {{
+    /// A [`Tracker`](crate::Tracker)'s tick within a budget, on a Cortex-M7, without contacts.
+    pub const M7_TICK: Self = Self {{ base: {base}, node_test: {test}, triangle_test: {triangle} }};
+}}
+"
+        ),
+    )
+    .with_context(|| format!("cannot write {}", file.display()))?;
+    run(Command::new("rustfmt").args(["--edition", "2024"]).arg(&file))?;
+    println!("tick: {base} + {test} a test");
+    Ok(())
+}
+
+/// The line above all samples that is lowest at `usual` tests.
+fn line_above(samples: &[Sample], usual: u32) -> (u32, u32) {
+    const DEAREST: u32 = 300;
+    let base = |test: u32| {
+        let bases =
+            samples.iter().map(|&(tests, instructions)| instructions.saturating_sub(test * tests));
+        bases.max().unwrap_or_default()
+    };
+    let lines = (1..DEAREST).map(|test| (base(test), test));
+    lines.min_by_key(|&(base, test)| base + test * usual).unwrap_or_default()
+}
