@@ -89,15 +89,13 @@ impl Row {
     }
 
     /// Notes its budget, and on the board the instructions of its largest and its mean tick, and in the median of those
-    /// that use the whole budget. `work` is that of the ticks on this computer: says where the board's differs.
+    /// that use the whole budget. `work` is that of the ticks on this computer, which must be the same there.
     pub fn note_board(&self, scene: &Scene, work: &[u32], figures: &mut Figures) -> Result<()> {
         let budget = self.budget()?;
         let mut ticks = on_board(scene, self.bits, budget)?;
         let here = work.iter().skip(1);
         let other = here.zip(&ticks).position(|(&here, there)| here != there.work());
-        if let Some(tick) = other {
-            println!("{}: other tests on the board from tick {} on", self.name, tick + 1);
-        }
+        ensure!(other.is_none(), "{}: other tests on the board, after tick {other:?}", self.name);
         ticks.sort_unstable_by_key(|tick| tick.instructions);
         let taken: Vec<f64> = ticks.iter().map(|tick| tick.instructions.into()).collect();
         let is_spent = |tick: &&Tick| tick.work() + DEAREST > budget.tests();

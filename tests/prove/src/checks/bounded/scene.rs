@@ -5,7 +5,7 @@ use dibs_build::{Builder, BuiltTree, Mesh, Motion, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
     Budget, Capsule, MeasuredStretch, Odometer, Options, Proximity, Query, Side, SurfaceBlend,
-    Tree, measure_stretch,
+    Tool, Tree, measure_stretch,
 };
 use glam::Vec3;
 use probe::track::tick;
@@ -102,6 +102,8 @@ impl Scene {
         let mut odometer = Odometer::new(tree);
         let mut step = None;
         let ticks = self.path.iter().enumerate().map(|(tick, tool)| {
+            // From its ends, as on the board: a capsule keeps their rounded difference.
+            let tool = Capsule::new(tool.start(), tool.end(), tool.radius()).expect("a valid tool");
             let (frame, share) = place(tick);
             let (rows, stretch) = &self.frames[frame % self.frames.len()];
             let (next, next_stretch) = &self.frames[(frame + 1) % self.frames.len()];
@@ -110,7 +112,7 @@ impl Scene {
             }
             let surface = step.as_ref().expect("a step").at(share);
             let both = stretch.or_larger(*next_stretch).expect("one tree");
-            ask(tick, &surface, tool, Options::cold().stretch(both))
+            ask(tick, &surface, &tool, Options::cold().stretch(both))
         });
         ticks.collect()
     }
