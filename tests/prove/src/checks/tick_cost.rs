@@ -13,7 +13,7 @@ use xtask::process::run;
 use xtask::steps::Outcome;
 use xtask::workspace;
 
-use super::bounded::rows::{DEARER, HUMAN, USUAL};
+use super::bounded::rows::{DEARER, HUMAN, Row, USUAL};
 use super::bounded::scene::on_board;
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
@@ -96,7 +96,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
 pub fn fit() -> Result<()> {
     let [usual, ..] = USUAL;
     let scene = usual.scene()?.context("a generated scene")?;
-    let budgets = USUAL.iter().map(|row| row.budget()).collect::<Result<Vec<_>>>()?;
+    let budgets = USUAL.iter().map(Row::budget).collect::<Result<Vec<_>>>()?;
     let samples = budgets.par_iter().map(|&budget| {
         let ticks = on_board(&scene, 0, budget)?;
         Ok(ticks
