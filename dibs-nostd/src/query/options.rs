@@ -123,6 +123,12 @@ impl Options {
         self
     }
 
+    /// The same options with a budget of tests alone.
+    pub(super) const fn unpriced(mut self) -> Self {
+        self.is_priced = false;
+        self
+    }
+
     /// The same options with the budget left after these tests.
     pub(super) const fn after(self, made: Tests) -> Self {
         self.within(self.budget.less(made.work()))

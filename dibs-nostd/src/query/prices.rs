@@ -1,7 +1,7 @@
 //! What a tracker's tick pays for work besides its tests, in node tests.
 //!
 //! A budget bounds a tick's time, so a tick within a budget counts this work, too. A tick without one counts tests alone,
-//! and so does a query, whose cost is fitted to its tests.
+//! and so do one with contacts, whose list has no prices, and a query, whose cost is fitted to its tests.
 //!
 //! Each price is a slope of the instructions of 60,000 ticks on an emulated Cortex-M7 over the counts of each kind of work
 //! (least squares, R² 0.998), in hundreds of instructions: a test of a node's sphere takes 105.

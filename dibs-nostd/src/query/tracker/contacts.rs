@@ -42,6 +42,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         options: &Options,
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<TrackerAnswer, QueryError> {
+        // A list's own work has no price, so one price for pair and list would leave too few tests for either.
+        let options = &options.unpriced();
         let mut tracked = self.within(surface, tool, options, f32::INFINITY, Purpose::Contacts)?;
         let is_cut = tracked.is_kept || tracked.closest.side == Side::Undefined(NoSide::CutShort);
         let mut closest = tracked.closest;
