@@ -1618,7 +1618,7 @@ typedef struct {
    */
   uint32_t instructions;
   /**
-   * A `dibs_cost`.
+   * A `dibs_cost`, but not that of a tracker's tick.
    */
   uint32_t cost;
   /**

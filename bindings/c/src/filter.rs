@@ -3,7 +3,7 @@
 use bytemuck::{AnyBitPattern, Pod, Zeroable};
 use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Capsule, MovingSurface, Options};
+use dibs_nostd::{Capsule, Cost, MovingSurface, Options};
 use heapless::Vec;
 
 use crate::border::{Handle, Handles, Input, Output, some_of};
@@ -48,7 +48,7 @@ pub struct dibs_filter {
     pub approach: f32,
     /// Most instructions of all queries of a tick, by `cost`.
     pub instructions: u32,
-    /// A `dibs_cost`.
+    /// A `dibs_cost`, but not that of a tracker's tick.
     pub cost: u32,
     /// As in `dibs_options`.
     pub depth_tolerance: f32,
@@ -82,7 +82,12 @@ impl dibs_filter {
             *place = (u8::try_from(label).map_err(|_| dibs_code::Argument)?, stand_off);
         }
         let filter = filter.stand_off_of(labels)?;
-        Ok(filter.budget(self.instructions, *cost_of(self.cost)?).options(options))
+        let cost = *cost_of(self.cost)?;
+        // A filter counts its queries by a plain query's fit.
+        if cost == Cost::M7_TICK {
+            return Err(dibs_code::Argument);
+        }
+        Ok(filter.budget(self.instructions, cost).options(options))
     }
 }
 

@@ -100,7 +100,7 @@ pub struct Args {
     #[arg(long, value_parser = tool::one, allow_hyphen_values = true, requires = "tool_device")]
     tool: Option<ToolSpec>,
     /// The OpenIGTLink device whose TRANSFORM, TDATA or QTDATA are the poses of --tool
-    #[arg(long, value_name = "TRACKED", requires = "tool")]
+    #[arg(long, value_name = "INSTRUMENT", requires = "tool")]
     tool_device: Option<String>,
     /// The separation is null, with a reason, once the surface or the tool's pose is older than this
     #[arg(long, value_name = "MS", default_value_t = 100, requires = "tool")]
