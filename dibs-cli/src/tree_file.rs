@@ -7,6 +7,7 @@ use dibs_nostd::{FormatError, Tree, TriangleRow};
 use std::path::Path;
 
 /// A validated tree of either width.
+#[derive(Clone, Copy)]
 pub enum AnyTree<'a> {
     Narrow(Tree<'a, u16>),
     Wide(Tree<'a, u32>),

@@ -331,6 +331,10 @@ enum dibs_code
    */
   DIBS_CODE_TREE_NO_REST_SHAPE = 109,
   /**
+   * The tree was built without displacement modes, or without the rest shape that they displace.
+   */
+  DIBS_CODE_TREE_NO_MODES = 110,
+  /**
    * A coordinate of the tool is not finite or too large.
    */
   DIBS_CODE_TOOL_COORDINATE = 200,
@@ -1208,38 +1212,6 @@ typedef struct {
 } dibs_guard_limits;
 
 /**
- * A point, a direction, a force or a velocity.
- */
-typedef struct {
-  /**
-   * Along x.
-   */
-  float x;
-  /**
-   * Along y.
-   */
-  float y;
-  /**
-   * Along z.
-   */
-  float z;
-} dibs_vec3;
-
-/**
- * A rigid pose of a mesh: its point `p` is at `rotation p + shift`.
- */
-typedef struct {
-  /**
-   * A quaternion x, y, z, w; the square of its length is within 2^-20 of 1.
-   */
-  float rotation[4];
-  /**
-   * In mm.
-   */
-  dibs_vec3 shift;
-} dibs_pose;
-
-/**
  * State of a bus.
  */
 typedef struct {
@@ -1256,6 +1228,24 @@ typedef struct {
    */
   uint32_t rounds;
 } dibs_bus_facts;
+
+/**
+ * A point, a direction, a force or a velocity.
+ */
+typedef struct {
+  /**
+   * Along x.
+   */
+  float x;
+  /**
+   * Along y.
+   */
+  float y;
+  /**
+   * Along z.
+   */
+  float z;
+} dibs_vec3;
 
 /**
  * A wall: a margin around the surface, with a spring and a damper.
@@ -1875,6 +1865,20 @@ typedef struct {
 } dibs_answer;
 
 /**
+ * A rigid pose of a mesh: its point `p` is at `rotation p + shift`.
+ */
+typedef struct {
+  /**
+   * A quaternion x, y, z, w; the square of its length is within 2^-20 of 1.
+   */
+  float rotation[4];
+  /**
+   * In mm.
+   */
+  dibs_vec3 shift;
+} dibs_pose;
+
+/**
  * A chain of tools whose axes touch each other, and the surfaces around it. A chain and one surface are a scene as
  * well.
  */
@@ -2205,53 +2209,6 @@ dibs_code dibs_bus_packet(dibs_bus *bus,
                           size_t length,
                           uint32_t now,
                           dibs_progress *progress);
-
-/**
- * Receives a whole frame from this process, for example from a solver's own thread. `dibs_bus_work` then checks and
- * publishes it like a frame of packets.
- *
- * The call counts as a good packet, and the frame's transit time is 0. Use one source at a time: an unfinished frame
- * of packets is abandoned. There is no lock: the control tick reads the last surface meanwhile.
- *
- * Cost: linear in the vertices, each of which is read several times.
- *
- * @param bus        The bus.
- * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order.
- *                   Read during the call.
- * @param count      Their number: the vertices of the mesh's file.
- * @param captured   Time of capture on the receiver's clock, in ms: at most 65,534 before `now`.
- * @param now        The receiver's clock, in ms; wraps.
- * @return `DIBS_CODE_OK`, a cause of refusal as from `dibs_receiver_accept` (the last good surface stays), or a
- *         misuse.
- */
-dibs_code dibs_bus_frame(dibs_bus *bus,
-                         const float *positions,
-                         uint32_t count,
-                         uint32_t captured,
-                         uint32_t now);
-
-/**
- * The same as `dibs_bus_frame`, with a rigid pose of the whole mesh, for example from a tracker of the patient: tools,
- * answers and commands are then in world coordinates. Without a pose the mesh is where its file has it.
- *
- * The limits on speed and recovery apply to positions and pose together; the reach applies to the positions alone. If
- * a step rotates by more than half a radian, the surface is held at the last frame, not extrapolated.
- *
- * @param bus        The bus.
- * @param positions  As for `dibs_bus_frame`.
- * @param count      Their number.
- * @param pose       The pose, read during the call.
- * @param captured   Time of capture of positions and pose.
- * @param now        The receiver's clock, in ms; wraps.
- * @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM`
- *         for an invalid pose.
- */
-dibs_code dibs_bus_frame_at(dibs_bus *bus,
-                            const float *positions,
-                            uint32_t count,
-                            const dibs_pose *pose,
-                            uint32_t captured,
-                            uint32_t now);
 
 /**
  * Does a slice of the checks: checks some rows and triangles of the arriving frame, and publishes it once it is
@@ -2743,6 +2700,78 @@ dibs_code dibs_answer_force(const dibs_answer *answer, const dibs_wall *wall, di
  * @param age    Largest age (ms) of a surface.
  */
 dibs_guard_limits dibs_guard_limits_of(float speed, uint32_t age);
+
+/**
+ * Receives a whole frame from this process, for example from a solver's own thread. `dibs_bus_work` then checks and
+ * publishes it like a frame of packets.
+ *
+ * The call counts as a good packet, and the frame's transit time is 0. Use one source at a time: an unfinished frame
+ * of packets is abandoned. There is no lock: the control tick reads the last surface meanwhile.
+ *
+ * Cost: linear in the vertices, each of which is read several times.
+ *
+ * @param bus        The bus.
+ * @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order.
+ *                   Read during the call.
+ * @param count      Their number: the vertices of the mesh's file.
+ * @param captured   Time of capture on the receiver's clock, in ms: at most 65,534 before `now`.
+ * @param now        The receiver's clock, in ms; wraps.
+ * @return `DIBS_CODE_OK`, a cause of refusal as from `dibs_receiver_accept` (the last good surface stays), or a
+ *         misuse.
+ */
+dibs_code dibs_bus_frame(dibs_bus *bus,
+                         const float *positions,
+                         uint32_t count,
+                         uint32_t captured,
+                         uint32_t now);
+
+/**
+ * The same as `dibs_bus_frame`, with a rigid pose of the whole mesh, for example from a tracker of the patient: tools,
+ * answers and commands are then in world coordinates. Without a pose the mesh is where its file has it.
+ *
+ * The limits on speed and recovery apply to positions and pose together; the reach applies to the positions alone. If
+ * a step rotates by more than half a radian, the surface is held at the last frame, not extrapolated.
+ *
+ * @param bus        The bus.
+ * @param positions  As for `dibs_bus_frame`.
+ * @param count      Their number.
+ * @param pose       The pose, read during the call.
+ * @param captured   Time of capture of positions and pose.
+ * @param now        The receiver's clock, in ms; wraps.
+ * @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM`
+ *         for an invalid pose.
+ */
+dibs_code dibs_bus_frame_at(dibs_bus *bus,
+                            const float *positions,
+                            uint32_t count,
+                            const dibs_pose *pose,
+                            uint32_t captured,
+                            uint32_t now);
+
+/**
+ * The same as `dibs_bus_frame`, by the weights of the tree's displacement modes (`dibs build --motion --modes`), with
+ * or without a pose. All vertices are computed, and the modes' own error is part of each answer's accuracy.
+ *
+ * Cost: linear in vertices times modes, several times.
+ *
+ * @param bus       The bus.
+ * @param tree      Its tree.
+ * @param weights   The weight of each mode, read during the call.
+ * @param count     Their number.
+ * @param pose      The pose of the whole mesh, as for `dibs_bus_frame_at`, or null.
+ * @param captured  As for `dibs_bus_frame`.
+ * @param now       The receiver's clock, in ms; wraps.
+ * @return As `dibs_bus_frame_at`; `DIBS_CODE_TREE_NO_MODES`; `DIBS_CODE_PACKET_ROWS` for another number of weights than
+ *         modes; `DIBS_CODE_PACKET_NOT_FINITE`; `DIBS_CODE_PACKET_TOO_FAR` for a weight out of its range;
+ *         `DIBS_CODE_PACKET_MESH` for another tree than the bus's.
+ */
+dibs_code dibs_bus_weights(dibs_bus *bus,
+                           dibs_tree *tree,
+                           const float *weights,
+                           uint32_t count,
+                           const dibs_pose *pose,
+                           uint32_t captured,
+                           uint32_t now);
 
 /**
  * The certified interval of a separation: both bounds include the accuracy, rounded outwards. Act on the lower one.

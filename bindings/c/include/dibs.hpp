@@ -173,6 +173,10 @@ template <class Base> struct BusOf : Base {
     Code frame_at(Span<const float> positions, const dibs_pose &pose, uint32_t captured, uint32_t now) {
         return dibs_bus_frame_at(*this, positions.data(), uint32_t(positions.size() / 3), &pose, captured, now);
     }
+    /** The same, by the weights of the tree's displacement modes, at a pose or where the mesh's file has it. */
+    Code weights(dibs_tree *tree, Span<const float> weights, const dibs_pose *pose, uint32_t captured, uint32_t now) {
+        return dibs_bus_weights(*this, tree, weights.data(), uint32_t(weights.size()), pose, captured, now);
+    }
     Code work(uint32_t work, dibs_advance *outcome = nullptr) { return dibs_bus_work(*this, work, outcome); }
 };
 struct Bus : BusOf<Object<dibs_bus, DIBS_BUS_SIZE, dibs_bus_init>> {

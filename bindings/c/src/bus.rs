@@ -8,10 +8,8 @@ use dibs_nostd::{Advance, Millis, Progress, ReceiveError, TreeBytes, VertexTable
 
 use crate::border::{Handle, Input, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
-use crate::frame::rows;
 use crate::limits::dibs_guard_limits;
 use crate::outcome::{dibs_advance, dibs_progress};
-use crate::pose::dibs_pose;
 use crate::receiver::{DIBS_EVENTS, DIBS_STATUS};
 use crate::surface::{OfNodes, OfVertices, Poses, dibs_surface};
 use crate::tags::dibs_tags;
@@ -27,14 +25,14 @@ pub const DIBS_BUS_SIZE: usize = 3_136;
 /// Two contexts may use it, one at a time: an interrupt that receives bytes, and an idle loop that checks. Both have a
 /// lower priority than the control tick. The interrupt gets `DIBS_CODE_IN_USE` while the loop uses the bus: it then
 /// keeps its bytes for later, or the loop masks the interrupt while it works.
-pub struct dibs_bus(TheBus);
+pub struct dibs_bus(pub(crate) TheBus);
 
 type OfRows<R, M> = Bus<'static, 'static, Row, M, R>;
 type Variant<R, M> = fn(OfRows<R, M>) -> TheBus;
 type Tags = &'static AesCmac;
 
 /// For frames of vertices, or of the nodes that move the surface; in packets without tags, or with them.
-enum TheBus {
+pub(crate) enum TheBus {
     Vertices(OfRows<OfVertices, NoMac>),
     Nodes(OfRows<OfNodes, NoMac>),
     TaggedVertices(OfRows<OfVertices, Tags>),
@@ -52,6 +50,7 @@ macro_rules! with_bus {
         }
     };
 }
+pub(crate) use with_bus;
 
 impl TheBus {
     const STATUS_BYTES: usize = Bus::<'static, 'static, Row>::STATUS_BYTES;
@@ -201,68 +200,6 @@ pub extern "C" fn dibs_bus_packet(
         let (progress, mut bus) = (progress.check_if_any()?, bus.open()?);
         let outcome = bus.0.packet(packet.slice(length)?, Millis(now))?;
         Out::set_if_any(progress, outcome.into());
-        Ok(())
-    })
-}
-
-/// Receives a whole frame from this process, for example from a solver's own thread. `dibs_bus_work` then checks and
-/// publishes it like a frame of packets.
-///
-/// The call counts as a good packet, and the frame's transit time is 0. Use one source at a time: an unfinished frame
-/// of packets is abandoned. There is no lock: the control tick reads the last surface meanwhile.
-///
-/// Cost: linear in the vertices, each of which is read several times.
-///
-/// @param bus        The bus.
-/// @param positions  x, y and z (mm, less the tree's origin) of each vertex of the mesh's file, in that file's order.
-///                   Read during the call.
-/// @param count      Their number: the vertices of the mesh's file.
-/// @param captured   Time of capture on the receiver's clock, in ms: at most 65,534 before `now`.
-/// @param now        The receiver's clock, in ms; wraps.
-/// @return `DIBS_CODE_OK`, a cause of refusal as from `dibs_receiver_accept` (the last good surface stays), or a
-///         misuse.
-#[unsafe(no_mangle)]
-pub extern "C" fn dibs_bus_frame(
-    bus: *mut dibs_bus,
-    positions: *const f32,
-    count: u32,
-    captured: u32,
-    now: u32,
-) -> dibs_code {
-    dibs_code::of(|| {
-        let (mut bus, rows) = (bus.open()?, rows(positions, count)?);
-        let _ = with_bus!(&mut bus.0, |bus| bus.frame(rows, Millis(captured), Millis(now)))?;
-        Ok(())
-    })
-}
-
-/// The same as `dibs_bus_frame`, with a rigid pose of the whole mesh, for example from a tracker of the patient: tools,
-/// answers and commands are then in world coordinates. Without a pose the mesh is where its file has it.
-///
-/// The limits on speed and recovery apply to positions and pose together; the reach applies to the positions alone. If
-/// a step rotates by more than half a radian, the surface is held at the last frame, not extrapolated.
-///
-/// @param bus        The bus.
-/// @param positions  As for `dibs_bus_frame`.
-/// @param count      Their number.
-/// @param pose       The pose, read during the call.
-/// @param captured   Time of capture of positions and pose.
-/// @param now        The receiver's clock, in ms; wraps.
-/// @return As `dibs_bus_frame`; `DIBS_CODE_PACKET_NOT_FINITE`, `DIBS_CODE_PACKET_TOO_FAR` or `DIBS_CODE_PACKET_FORM`
-///         for an invalid pose.
-#[unsafe(no_mangle)]
-pub extern "C" fn dibs_bus_frame_at(
-    bus: *mut dibs_bus,
-    positions: *const f32,
-    count: u32,
-    pose: *const dibs_pose,
-    captured: u32,
-    now: u32,
-) -> dibs_code {
-    dibs_code::of(|| {
-        let (pose, mut bus, rows) = (pose.get()?, bus.open()?, rows(positions, count)?);
-        let (captured, now) = (Millis(captured), Millis(now));
-        let _ = with_bus!(&mut bus.0, |bus| bus.frame_at(rows, pose.into(), captured, now))?;
         Ok(())
     })
 }

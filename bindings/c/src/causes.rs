@@ -3,6 +3,7 @@
 use dibs_nostd::constraint::GainError;
 use dibs_nostd::failsafe::{AcknowledgeError, LimitError};
 use dibs_nostd::filter::FilterError;
+use dibs_nostd::modes::ModesError;
 use dibs_nostd::wire::{Event, PacketError, StreamError};
 use dibs_nostd::{
     CorruptTreeError, Error, FormatError, PoseError, QueryError, ReceiveError, StretchError,
@@ -27,6 +28,15 @@ impl From<FormatError> for dibs_code {
 impl From<CorruptTreeError> for dibs_code {
     fn from(_: CorruptTreeError) -> Self {
         Self::TreeCorrupt
+    }
+}
+
+impl From<ModesError> for dibs_code {
+    fn from(error: ModesError) -> Self {
+        match error {
+            ModesError::Absent | ModesError::NoRestShape => Self::TreeNoModes,
+            _ => Self::TreeForm,
+        }
     }
 }
 

@@ -52,6 +52,8 @@ pub enum dibs_code {
     TreeNoAdjacency = 108,
     /// The tree was built without its rest shape, or has no such row.
     TreeNoRestShape = 109,
+    /// The tree was built without displacement modes, or without the rest shape that they displace.
+    TreeNoModes = 110,
     /// A coordinate of the tool is not finite or too large.
     ToolCoordinate = 200,
     /// The tool's radius is negative, not finite or too large.
@@ -220,6 +222,7 @@ impl dibs_code {
         Self::TreeNoMetric,
         Self::TreeNoAdjacency,
         Self::TreeNoRestShape,
+        Self::TreeNoModes,
         Self::ToolCoordinate,
         Self::ToolRadius,
         Self::VertexCount,
@@ -315,6 +318,7 @@ impl dibs_code {
             Self::TreeNoMetric => c"the tree has no rest metric",
             Self::TreeNoAdjacency => c"the tree has no sides: its triangles are wound against each other (dibs build --orient), or it was built without adjacency",
             Self::TreeNoRestShape => c"the tree has no such rest position",
+            Self::TreeNoModes => c"the tree has no displacement modes",
             Self::ToolCoordinate => c"a coordinate of the tool is not finite or too large",
             Self::ToolRadius => c"the tool's radius is negative, not finite or too large",
             Self::VertexCount => c"the surface has another number of vertices than the tree",

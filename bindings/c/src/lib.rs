@@ -29,6 +29,7 @@ mod filter;
 mod frame;
 mod guard;
 mod limits;
+mod local;
 mod outcome;
 #[cfg(target_os = "none")]
 mod panic;

@@ -17,4 +17,5 @@ mod script;
 mod sender;
 mod sweep;
 mod tags;
+mod weights;
 mod wrapper;

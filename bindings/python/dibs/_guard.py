@@ -192,6 +192,24 @@ class Guard(Remade):
         placed = None if pose is None else _arrays.pose(pose)
         self._native.frame(_arrays.points("positions", positions).tobytes(), placed, when, now)
 
+    def frame_of_weights(
+        self,
+        weights: npt.ArrayLike,
+        now: int,
+        *,
+        captured: Optional[int] = None,
+        pose: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None,
+    ) -> None:
+        """The same as `frame`, by the weight of each of the displacement modes that the tree was built with (`dibs build
+        --motion MOTION --modes N`). The modes' own error is part of each answer's accuracy."""
+        now = _now(now)
+        when = now if captured is None else _arrays.whole("captured", captured, 0, _WRAP - 1)
+        placed = None if pose is None else _arrays.pose(pose)
+        array = _arrays.numbers("weights", weights)
+        if array.ndim != 1:
+            raise ValueError(f"weights: the shape is {array.shape}; give one number for each mode")
+        self._native.weights(_arrays.finite("weights", array).tobytes(), placed, when, now)
+
     def work(self, most: int = 1_000) -> Advance:
         """Checks at most this many rows and triangles of the arriving frame, and publishes it once it is complete and
         admitted. "pending" if more work is due at once. Raises `ValueError` with the reason if a frame is refused."""

@@ -4,15 +4,15 @@ use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use dibs_build::glam::{DVec3, Vec3};
-use dibs_nostd::constraint::{ConstraintForce, ConstraintState, SpringDamper};
 use dibs_nostd::failsafe::LimitError;
 use dibs_nostd::filter::FilterError;
 use dibs_nostd::guard::{Bus, GuardLimits, Notes, Posed, Rows, Vertices};
+use dibs_nostd::modes::Modes;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::{Event, NoMac};
 use dibs_nostd::{
     Advance, Budget, Buffer, Buffers, Error, Head, Index, Millis, PathKind, Position, Progress,
-    TreeBytes, constraint, guard,
+    ReceiveError, TreeBytes, guard,
 };
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -21,7 +21,7 @@ use pyo3::types::{PyByteArray, PyBytes};
 use crate::record::push_answer;
 use crate::surface::List;
 use crate::tool::AnyTool;
-use crate::tracker::{Admitted, Filter, Listed, Tracked, listed, motion, named, record};
+use crate::tracker::{Admitted, Filter, Listed, listed, motion, named, record};
 use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, error, invalid, pose};
 
@@ -195,6 +195,30 @@ impl Guard {
         outcome.map(|_| ()).map_err(invalid)
     }
 
+    /// Weights of the tree's modes, their time of capture, and the mesh's rotation and translation.
+    #[pyo3(signature = (weights, pose, captured, now))]
+    fn weights(
+        &self,
+        py: Python<'_>,
+        weights: &[u8],
+        pose: Option<pose::Given>,
+        captured: u32,
+        now: u32,
+    ) -> PyResult<()> {
+        let (captured, now) = (Millis(captured), Millis(now));
+        let pose = pose.map(|pose| pose::local(pose, self.tree.origin));
+        let modes = of_any_width!(self.tree.view(), tree => Modes::of(tree)).map_err(invalid)?;
+        let weights: Vec<f32> =
+            bytes::doubles(weights).into_iter().map(|each| each as f32).collect();
+        let outcome = py.detach(|| {
+            with_ends!(self, pair => match pose {
+                Some(pose) => pair.bus.frame_of_weights_at(&modes, &weights, pose, captured, now),
+                None => pair.bus.frame_of_weights(&modes, &weights, captured, now),
+            })
+        });
+        outcome.map(|_| ()).map_err(|error| invalid(of_weights(&modes, &weights, &error)))
+    }
+
     fn work(&self, py: Python<'_>, most: u32) -> PyResult<&'static str> {
         let outcome = py.detach(|| with_ends!(self, pair => pair.bus.work(most)));
         Ok(match outcome.map_err(invalid)? {
@@ -304,6 +328,11 @@ impl Guard {
     }
 }
 
+/// Why weights are refused: in the words of their check, unless it is for another cause.
+fn of_weights(modes: &Modes<'_>, weights: &[f32], error: &ReceiveError) -> String {
+    modes.check(weights).map_or_else(|error| error.to_string(), |()| error.to_string())
+}
+
 /// A sentence with the names of Python's arguments.
 fn start_error(error: Error) -> PyErr {
     match error {
@@ -322,7 +351,7 @@ fn start_error(error: Error) -> PyErr {
 /// A tick's answer.
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Answer {
-    answer: guard::Answer,
+    pub answer: guard::Answer,
     tree: Arc<Owned>,
 }
 
@@ -362,42 +391,4 @@ impl Answer {
         let searched = self.answer.searched?;
         Some((searched.frame.epoch, searched.frame.age.0, searched.lag.map(|lag| lag.0)))
     }
-}
-
-/// A wall around the surface.
-#[pyclass(frozen, module = "dibs._dibs")]
-pub struct ForbiddenRegion(constraint::ForbiddenRegion);
-
-#[pymethods]
-impl ForbiddenRegion {
-    #[new]
-    fn new(stiffness: f32, damping: f32, hold: f32, most: f32, margin: f32) -> PyResult<Self> {
-        let spring = SpringDamper::stiffness(stiffness).damping(damping);
-        let spring = spring.hold_damping(hold).max_force(most);
-        constraint::ForbiddenRegion::new(spring, margin).map(Self).map_err(invalid)
-    }
-
-    /// Force (N), state, and the cause of a hold.
-    fn force(&self, answer: &Answer) -> Force {
-        force(answer.answer.force(&self.0))
-    }
-
-    /// The same of a tracker's pair, for a velocity (mm/s) of the tool relative to the surface.
-    fn force_of(&self, tracked: &Tracked, velocity: [f32; 3]) -> Force {
-        force(self.0.force(&Ok(tracked.closest()), velocity.into()))
-    }
-}
-
-/// Force (N), state, and the cause of a hold.
-type Force = ([f32; 3], u8, Option<String>);
-
-fn force(force: ConstraintForce) -> Force {
-    let (state, cause) = match force.state {
-        ConstraintState::Inactive => (0, None),
-        ConstraintState::Active => (1, None),
-        ConstraintState::Saturated => (2, None),
-        ConstraintState::Safe(cause) => (3, Some(error::sentence(cause))),
-        _ => (3, None),
-    };
-    (force.force.to_array(), state, cause)
 }

@@ -16,6 +16,7 @@ mod surface;
 mod tool;
 mod tracker;
 mod tree;
+mod wall;
 
 use pyo3::prelude::*;
 
@@ -25,7 +26,7 @@ mod _dibs {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::guard::{Answer, ForbiddenRegion, Guard};
+    use crate::guard::{Answer, Guard};
     #[pymodule_export]
     use crate::mesh::Mesh;
     #[pymodule_export]
@@ -40,6 +41,8 @@ mod _dibs {
     use crate::tracker::{Filter, Tracked, Tracker};
     #[pymodule_export]
     use crate::tree::Tree;
+    #[pymodule_export]
+    use crate::wall::ForbiddenRegion;
 
     use crate::record;
 

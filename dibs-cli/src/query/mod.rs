@@ -4,14 +4,13 @@ mod answer;
 mod bulk;
 mod scene;
 
-pub use answer::{ContactRecord, Touch, side_name, vector};
-pub use scene::{ALLOW, STACK, rows};
+pub use answer::{Answer, ContactRecord, Record, Touch, side_name, vector};
+pub use scene::{ALLOW, Room, STACK, Surface, ask, rows};
 
 use crate::mesh_file::Lengths;
 use crate::tool::{self, ToolSpec};
 use crate::{overwrite, tree_file};
 use anyhow::{Result, bail};
-use scene::{Room, Surface};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -90,7 +89,7 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(poses) = &args.poses {
         return bulk::run(&surfaces, args.contacts, poses, &args.output);
     }
-    let answer = scene::ask(&surfaces, &args.tool, args.contacts, &mut Room::default())?;
+    let answer = ask(&surfaces, &args.tool, args.contacts, &mut Room::default())?;
     if let Some(margin) = args.contacts
         && answer.bound < margin
     {

@@ -68,6 +68,21 @@ impl<'a> Surface<'a> {
         Ok(Self { name: name.to_string(), tree, rows, stretch, options })
     }
 
+    /// The surface of a tree at a frame in the mesh's order, or of its nodes.
+    pub fn of_frame(tree: AnyTree<'a>, name: &str, frame: &[Vec3]) -> Result<Self> {
+        let of = |error| anyhow!("{name}: {error}");
+        let (rows, largest) = match &tree {
+            AnyTree::Narrow(tree) => framed(tree, frame).map_err(of)?,
+            AnyTree::Wide(tree) => framed(tree, frame).map_err(of)?,
+        };
+        let stretch = match &rows.stretch {
+            Ok(measured) => Some(largest.unwrap_or(measured.sigma().into())),
+            Err(StretchError::NoMetric) => None,
+            Err(error) => bail!("{name}: {error}"),
+        };
+        Ok(Self { name: name.to_owned(), tree, rows, stretch, options: Options::cold() })
+    }
+
     fn ask(&self, tool: &ToolSpec, margin: Option<f32>, room: &mut Room) -> Result<Found> {
         let tool = tool.local(self.tree.origin());
         tool.and_then(|tool| match &self.tree {
@@ -243,6 +258,13 @@ fn measured<I: Index>(
         Err(StretchError::NoMetric) => Ok((rows, None)),
         Err(error) => bail!("{shown}: {}", SurfaceRows::refusal(tree, error, ALLOW)),
     }
+}
+
+/// The rows of a frame in the mesh's order, and their largest stretch.
+fn framed<I: Index>(tree: &Tree<'_, I>, frame: &[Vec3]) -> Result<(SurfaceRows, Option<f64>)> {
+    let rows = SurfaceRows::of(tree, FrameCheck::of(tree).to_rows(frame)?)?;
+    let largest = largest_stretch(tree, rows.positions());
+    Ok((rows, largest))
 }
 
 /// Positions in the order of the tree's rows, relative to its origin.

@@ -45,6 +45,13 @@ impl SourceCoordinates {
         Ok(positions)
     }
 
+    /// Converts a point (mm) of a tool's own frame, which has this pose in the source's unit and axes, to the
+    /// coordinates of the mesh's file.
+    pub fn of_tool(&self, rotation: &DQuat, shift: DVec3, point: DVec3) -> DVec3 {
+        let at = *rotation * point + shift * self.unit.map_or(1.0, Unit::millimetres);
+        self.axes.map_or(at, |axes| axes.turn(at.to_array()).into())
+    }
+
     /// Converts a pose in the source's unit and axes to the tree's. If the tree has an origin, the world frame has the
     /// same.
     ///

@@ -14,8 +14,9 @@ mod timing;
 
 use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
+use crate::tool::ToolSpec;
 use crate::tree_file::{self, AnyTree};
-use crate::{modes, overwrite};
+use crate::{modes, overwrite, tool};
 use anyhow::{Context, Result, anyhow, bail};
 use coordinates::{Axes, SourceCoordinates};
 use dibs_build::glam::{DVec3, Vec3};
@@ -23,7 +24,7 @@ use dibs_build::{Builder, Import, ReadOptions};
 use dibs_nostd::wire::AesCmac;
 use dibs_stream::transport::Target;
 use dibs_stream::{Sender, Settings, SurfaceOrder};
-use igtl::{Address, Exchange, Igtl};
+use igtl::{Address, Exchange, Igtl, Tracked};
 use interrupt::Interrupt;
 use live::Live;
 use memory::Memory;
@@ -50,6 +51,7 @@ Examples:
   dibs stream heart.dibs --from shm:heart --to udp:192.168.1.20:5000
   dibs bridge heart.dibs --from igtl:192.168.1.30:18944 --axes RAS:LPS --to udp:192.168.1.20:5000
   dibs bridge heart.dibs --from igtl:192.168.1.30:18944 --pose-device organ --to udp:192.168.1.20:5000
+  dibs bridge heart.dibs --from igtl:192.168.1.30:18944 --tool 0,0,0,0,0,150,2.5 --tool-device needle --to udp:192.168.1.20:5000
 
 Frames of --from shm:NAME are raw in memory of that name, /dev/shm/NAME, after 16 bytes: a sequence number (u64), the number of
 positions (u32), 0 (u32). The number is 0 while there is no frame; the program that writes adds 1 before a frame and 1 after
@@ -92,6 +94,17 @@ pub struct Args {
     /// that of the older of the two. A pose that equals the one before is new only if its message has another time
     #[arg(long, value_name = "TRACKED", conflicts_with_all = ["motion", "unnamed_motion"])]
     pose_device: Option<String>,
+    /// Print how far this tool is from the surface that was sent last, in a JSON object a line, for each message of
+    /// --tool-device: the fields of `dibs query --json`, with the ages of both. In millimetres and in the tool's own frame,
+    /// in the grammar of `dibs query --tool`. The peer gets the separation as a STRING
+    #[arg(long, value_parser = tool::one, allow_hyphen_values = true, requires = "tool_device")]
+    tool: Option<ToolSpec>,
+    /// The OpenIGTLink device whose TRANSFORM, TDATA or QTDATA are the poses of --tool
+    #[arg(long, value_name = "INSTRUMENT", requires = "tool")]
+    tool_device: Option<String>,
+    /// The separation is null, with a reason, once the surface or the tool's pose is older than this
+    #[arg(long, value_name = "MS", default_value_t = 100, requires = "tool")]
+    tool_age: u64,
     /// The receiver's address: `serial:PORT` or `serial:PORT@BAUD`, `tcp:HOST:PORT`, `udp:HOST:PORT` or
     /// `udp:HOST:PORT@LOCAL_PORT`, `unix:PATH`. A frame's UDP packets are spread over half of the time to the next
     /// frame
@@ -147,13 +160,13 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     overwrite::check([&args.tree].into_iter().chain(args.motion.given()).chain(&args.key), [])?;
     let key = args.key.as_deref().map(key::read).transpose()?;
-    let (order, origin) = order(&args.tree, &args.lengths)?;
+    let (order, origin, bytes) = order(&args.tree, &args.lengths)?;
     if args.partial.is_some_and(|tolerance| !(tolerance >= 0.0 && tolerance.is_finite())) {
         bail!("--partial: a tolerance is a length of at least 0");
     }
     let source = match args.motion.given() {
         Some(motion) => recorded(args, motion, &order, origin)?,
-        None => live(args, args.motion_rate.given()?, &order, origin)?,
+        None => live(args, args.motion_rate.given()?, (&order, origin, bytes))?,
     };
     if args.mtu == "64" {
         connect::<64>(args, key, order, &source)
@@ -216,14 +229,22 @@ enum Frames {
 }
 
 /// Starts to read live frames.
-fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> Result<Source> {
+fn live(
+    args: &Args,
+    rate: Option<f64>,
+    (order, origin, tree): (&SurfaceOrder, DVec3, Vec<u8>),
+) -> Result<Source> {
     let (unit, axes, keeps_all) = (args.lengths.unit(), args.axes, rate.is_some());
     let place = SourceCoordinates { unit, axes, origin, order: order.clone() };
     let source = args.from.as_ref().unwrap_or(&LiveSource::Input);
     if args.format != Format::Raw && !matches!(source, LiveSource::Input) {
         bail!("--format: frames in shared memory are raw, and those of OpenIGTLink have its own");
     }
-    for (word, device) in [("--device", &args.device), ("--pose-device", &args.pose_device)] {
+    for (word, device) in [
+        ("--device", &args.device),
+        ("--pose-device", &args.pose_device),
+        ("--tool-device", &args.tool_device),
+    ] {
         if device.is_some() && !matches!(source, LiveSource::Igtl(_)) {
             bail!("{word}: only OpenIGTLink has devices");
         }
@@ -243,7 +264,12 @@ fn live(args: &Args, rate: Option<f64>, order: &SurfaceOrder, origin: DVec3) -> 
             let exchange = Arc::<Exchange>::default();
             let devices = [args.device.clone(), args.pose_device.clone()];
             let patience = Duration::from_secs(args.retry);
-            let mut igtl = Igtl::new(address, devices, patience, place, Arc::clone(&exchange))?;
+            let tool = args.tool.zip(args.tool_device.clone()).map(|(tool, device)| {
+                let most = Duration::from_millis(args.tool_age);
+                Tracked::new(tool, device, most, (tree, &args.tree))
+            });
+            let (tool, counts) = (tool.transpose()?, Arc::clone(&exchange));
+            let mut igtl = Igtl::new(address, devices, tool, patience, place, counts)?;
             (address.to_string(), Live::start(move || igtl.next(), keeps_all), Some(exchange))
         }
     };
@@ -293,8 +319,8 @@ fn connect<const MTU: usize>(
     Player::new(args, source, sender, interrupt).run()
 }
 
-/// The order and origin of a tree's vertices: from the given tree file, or from the tree built of the given mesh file.
-fn order(path: &Path, lengths: &Lengths) -> Result<(SurfaceOrder, DVec3)> {
+/// The order and origin of a tree's vertices, and its bytes: from the given tree file, or from the tree built of the given mesh file.
+fn order(path: &Path, lengths: &Lengths) -> Result<(SurfaceOrder, DVec3, Vec<u8>)> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("dibs")) {
         let bytes = tree_file::load(path)?;
         let tree = tree_file::validate(&bytes, path)?;
@@ -302,7 +328,8 @@ fn order(path: &Path, lengths: &Lengths) -> Result<(SurfaceOrder, DVec3)> {
             AnyTree::Narrow(tree) => SurfaceOrder::of(tree),
             AnyTree::Wide(tree) => SurfaceOrder::of(tree),
         };
-        return Ok((order, tree.origin()));
+        let origin = tree.origin();
+        return Ok((order, origin, bytes));
     }
     let options = ReadOptions { unit: lengths.unit(), ..Import::options() };
     let mesh = options.read(path)?.mesh;
@@ -314,5 +341,5 @@ fn order(path: &Path, lengths: &Lengths) -> Result<(SurfaceOrder, DVec3)> {
         16 => SurfaceOrder::of(&built.tree::<u16>().context("the tree just built")?),
         _ => SurfaceOrder::of(&built.tree::<u32>().context("the tree just built")?),
     };
-    Ok((order, built.origin()))
+    Ok((order, built.origin(), built.blob().to_vec()))
 }

@@ -1,6 +1,6 @@
 //! Sends a motion to a receiver: a recording at its rate, live frames as they arrive.
 
-use super::igtl::Exchange;
+use super::igtl::{Exchange, Sent};
 use super::interrupt::Interrupt;
 use super::live::{Frame, Next, Parsed};
 use super::report::{self, Display, Outcome};
@@ -91,7 +91,13 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             self.display.note(&note);
         }
         self.display.finish();
-        report::print(&self.sender, &self.outcome, exchange, self.args.json);
+        let totals = report::totals(&self.sender, &self.outcome, exchange, self.args.json);
+        // Beside the answers about a tool the totals are no results.
+        if self.args.tool.is_some() {
+            eprintln!("{totals}");
+        } else {
+            println!("{totals}");
+        }
         played.and(refused)
     }
 
@@ -222,7 +228,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             Target::Udp { .. } if !self.args.at_once => SPREAD.min(frame.period / 2),
             _ => Duration::ZERO,
         };
-        let sender = &mut self.sender;
+        let (at, sender) = (Instant::now(), &mut self.sender);
         let prepared = match &frame.rows {
             Rows::Weights(weights) => sender.prepare_weights_captured(weights, frame.ago),
             Rows::Positions(positions, None) => sender.prepare_captured(positions, frame.ago),
@@ -237,6 +243,16 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         });
         if let (Ok(_), Some(came)) = (&sent, frame.came) {
             self.outcome.timing.get_or_insert_with(Timing::new).count(came);
+        }
+        if let (
+            Ok(_),
+            Rows::Positions(positions, pose),
+            Frames::Live { exchange: Some(exchange), .. },
+        ) = (&sent, &frame.rows, &self.source.frames)
+            && self.args.tool.is_some()
+        {
+            let (positions, ago) = (positions.to_vec(), frame.ago);
+            exchange.keep(Sent { positions, pose: *pose, at, ago });
         }
         match sent {
             Ok(sent) => {

@@ -131,13 +131,13 @@ fn causes(counters: &Counters) -> Vec<String> {
         .collect()
 }
 
-/// The totals.
-pub fn print<M: Mac, const MTU: usize>(
+/// The totals, as text or JSON.
+pub fn totals<M: Mac, const MTU: usize>(
     sender: &Sender<Line, MTU, M>,
     outcome: &Outcome,
     source: Option<&Exchange>,
     json: bool,
-) {
+) -> String {
     let &Outcome { late, passed_over, reconnections, refused, ref timing, is_interrupted } =
         outcome;
     let totals = sender.totals();
@@ -147,7 +147,7 @@ pub fn print<M: Mac, const MTU: usize>(
             .into_iter()
             .map(|event| (event.name().to_owned(), sender.counters().of(event).into()))
             .collect();
-        println!(
+        return format!(
             "{:#}",
             serde_json::json!({
                 "frames": totals.frames,
@@ -167,41 +167,41 @@ pub fn print<M: Mac, const MTU: usize>(
                 "events": events,
             })
         );
-        return;
     }
-    println!(
+    let mut lines = vec![format!(
         "sent      {} frames, {} of them partial; {} packets, {per_frame:.0} bytes a frame",
         totals.frames, totals.partial, totals.packets
-    );
+    )];
     if late > 0 {
-        println!("late      {late} frames: the line is slower than the motion");
+        lines.push(format!("late      {late} frames: the line is slower than the motion"));
     }
     if passed_over > 0 {
-        println!(
+        lines.push(format!(
             "passed    {passed_over} frames over: newer ones came; --motion-rate sends all of a recording"
-        );
+        ));
     }
     if let Some(timing) = timing {
-        println!("timing    {}", timing.text());
+        lines.push(format!("timing    {}", timing.text()));
     }
     if let Some(source) = source {
-        println!("source    {}", source.text());
+        lines.push(format!("source    {}", source.text()));
     }
     if reconnections > 0 {
-        println!("line      broke and came back {reconnections} times");
+        lines.push(format!("line      broke and came back {reconnections} times"));
     }
     if refused > 0 {
-        println!("refused   {refused} datagrams came back");
+        lines.push(format!("refused   {refused} datagrams came back"));
     }
     if is_interrupted {
-        println!("stopped   by a signal");
+        lines.push("stopped   by a signal".to_owned());
     }
     if totals.statuses == 0 {
-        println!("receiver  no status came back");
-        return;
+        lines.push("receiver  no status came back".to_owned());
+        return lines.join("\n");
     }
     let newest =
         sender.acknowledged().map_or("none of these frames".to_owned(), |n| format!("frame {n}"));
-    println!("receiver  published {newest} last");
-    println!("events    {}", sender.counters());
+    lines.push(format!("receiver  published {newest} last"));
+    lines.push(format!("events    {}", sender.counters()));
+    lines.join("\n")
 }

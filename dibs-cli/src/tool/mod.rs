@@ -43,6 +43,16 @@ impl ToolSpec {
         })
     }
 
+    /// The tool with its points moved so.
+    pub fn moved(&self, to: impl Fn(DVec3) -> DVec3) -> Self {
+        match *self {
+            Self::Sphere { centre, radius } => Self::Sphere { centre: to(centre), radius },
+            Self::Capsule { start, end, radius } => {
+                Self::Capsule { start: to(start), end: to(end), radius }
+            }
+        }
+    }
+
     /// The numbers of the tool for a tree with this origin: four for a sphere, seven for a capsule.
     pub fn numbers(&self, origin: DVec3) -> Result<Vec<f32>> {
         self.local(origin)?;

@@ -4,7 +4,11 @@ use glam::{Quat, Vec3};
 
 use super::surface::Notes;
 use super::{GuardLimits, Posed, Rows, Vertices};
+#[cfg(feature = "modes")]
+use crate::modes::{MAX_MODES, ModalSurface, Modes, WeightsError};
 use crate::surface::FrameView;
+#[cfg(feature = "modes")]
+use crate::surface::VertexTable;
 use crate::tree::VertexOrder;
 use crate::wire::{Counters, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use crate::{
@@ -138,11 +142,53 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
         [captured, now]: [Millis; 2],
     ) -> Result<Progress, ReceiveError> {
         let outcome = match self.order.rows(positions) {
-            Some(rows) => self.assembler.frame_at(rows, pose, captured, now),
+            Some(rows) => self.assembler.frame_at(rows, (pose, 0.0), [captured, now]),
             None => {
                 let rows = u32::try_from(positions.len()).unwrap_or(u32::MAX);
                 Err(self.assembler.refuse_frame(ReceiveError::RowCount { rows }, now))
             }
+        };
+        self.note(outcome.ok());
+        outcome
+    }
+
+    /// Takes a frame of this process by the weights of the tree's displacement modes: all vertices are computed, and the
+    /// modes' own [`position_error`](Modes::position_error) is part of each answer's accuracy. Otherwise the same as
+    /// [`frame`](Self::frame). An [`Assembler`] with a [`ModalGate`](crate::modes::ModalGate) stores the weights alone.
+    ///
+    /// Cost: O(vertices times modes), several times.
+    ///
+    /// # Errors
+    /// [`ReceiveError`], counted; the last good surface stays. [`RowCount`](ReceiveError::RowCount) for another number of
+    /// weights than modes; [`NotFinite`](ReceiveError::NotFinite), or [`TooFar`](ReceiveError::TooFar) for a weight out of
+    /// its [range](Modes::range), with the mode as `row`; [`WrongMesh`](ReceiveError::WrongMesh) for another tree's modes.
+    #[cfg(feature = "modes")]
+    pub fn frame_of_weights(
+        &mut self,
+        modes: &Modes<'_>,
+        weights: &[f32],
+        captured: Millis,
+        now: Millis,
+    ) -> Result<Progress, ReceiveError> {
+        self.take_weights((modes, weights), None, [captured, now])
+    }
+
+    #[cfg(feature = "modes")]
+    fn take_weights(
+        &mut self,
+        (modes, weights): (&Modes<'_>, &[f32]),
+        pose: Option<RigidPose>,
+        [captured, now]: [Millis; 2],
+    ) -> Result<Progress, ReceiveError> {
+        let outcome = match surface_of(modes, weights, self.assembler.tree_checksum()) {
+            Ok(surface) => {
+                // Every row is in the table.
+                let at = |row| surface.position(row).unwrap_or(Vec3::NAN);
+                let rows = (0..modes.vertex_count()).map(at);
+                let besides = (pose, surface.position_error());
+                self.assembler.frame_at(rows, besides, [captured, now])
+            }
+            Err(refusal) => Err(self.assembler.refuse_frame(refusal, now)),
         };
         self.note(outcome.ok());
         outcome
@@ -247,13 +293,57 @@ impl<I: Index, M: Mac, R: Rows<Poses = ()>> Bus<'_, '_, I, M, Posed<R>> {
         captured: Millis,
         now: Millis,
     ) -> Result<Progress, ReceiveError> {
-        match RigidPose::new(rotation, shift) {
-            Ok(pose) => self.take(positions, Some(pose), [captured, now]),
-            Err(error) => {
-                let refused = self.assembler.refuse_frame(ReceiveError::Pose(error), now);
-                self.note(None);
-                Err(refused)
-            }
-        }
+        let pose = self.pose(rotation, shift, now)?;
+        self.take(positions, Some(pose), [captured, now])
     }
+
+    /// As [`frame_of_weights`](Self::frame_of_weights), with a pose of the whole mesh.
+    ///
+    /// # Errors
+    /// Also [`ReceiveError::Pose`] if the rotation and shift are not a [`RigidPose`].
+    #[cfg(feature = "modes")]
+    pub fn frame_of_weights_at(
+        &mut self,
+        modes: &Modes<'_>,
+        weights: &[f32],
+        (rotation, shift): (Quat, Vec3),
+        captured: Millis,
+        now: Millis,
+    ) -> Result<Progress, ReceiveError> {
+        let pose = self.pose(rotation, shift, now)?;
+        self.take_weights((modes, weights), Some(pose), [captured, now])
+    }
+
+    fn pose(
+        &mut self,
+        rotation: Quat,
+        shift: Vec3,
+        now: Millis,
+    ) -> Result<RigidPose, ReceiveError> {
+        RigidPose::new(rotation, shift).map_err(|error| {
+            let refused = self.assembler.refuse_frame(ReceiveError::Pose(error), now);
+            self.note(None);
+            refused
+        })
+    }
+}
+
+/// The surface at these weights, for a receiver of the tree with this checksum.
+#[cfg(feature = "modes")]
+fn surface_of<'a>(
+    modes: &Modes<'a>,
+    weights: &[f32],
+    tree: Option<u32>,
+) -> Result<ModalSurface<'a, MAX_MODES>, ReceiveError> {
+    // Another tree of the same mesh may have its rows in another order.
+    if tree.is_some_and(|tree| tree != modes.tree_checksum()) {
+        return Err(ReceiveError::WrongMesh { mesh_id: modes.mesh_id() });
+    }
+    modes.surface(weights).map_err(|error| match error {
+        WeightsError::Count { found: rows, .. } | WeightsError::Capacity { needed: rows, .. } => {
+            ReceiveError::RowCount { rows }
+        }
+        WeightsError::NotFinite { mode: row } => ReceiveError::NotFinite { row },
+        WeightsError::OutOfRange { mode: row, .. } => ReceiveError::TooFar { row },
+    })
 }

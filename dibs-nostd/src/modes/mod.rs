@@ -263,6 +263,12 @@ impl<'a> Modes<'a> {
         Ok(ModalSurface::new(self, weights.iter().copied()))
     }
 
+    /// The checksum of the tree that has these modes.
+    #[cfg(all(feature = "bus", feature = "control"))]
+    pub(crate) const fn tree_checksum(&self) -> u32 {
+        self.motion.tree
+    }
+
     fn modes(&self) -> impl Iterator<Item = layout::Mode> {
         self.records.as_chunks::<MODE_BYTES>().0.iter().map(layout::decode)
     }

@@ -37,6 +37,8 @@ pub(super) struct Frame {
     commit: Option<(u16, u32)>,
     /// All packets have arrived, and the digest matches.
     pub is_complete: bool,
+    /// Largest error (mm) of a position besides its encoding's.
+    pub error: f32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -249,6 +251,7 @@ impl Collector {
             arrivals: Arrivals::new(!matches!(begin.content, Content::Partial { .. })),
             commit: None,
             is_complete: false,
+            error: 0.0,
         };
         self.frame = Some(frame);
         Ok(Some(frame))
@@ -271,6 +274,13 @@ impl Collector {
         let frame = self.frame.as_mut()?;
         frame.commit = Some((2, frame.sum));
         frame.arrivals.locate(1, 0..rows).ok()
+    }
+
+    /// States the error (mm) of the current frame's positions.
+    pub fn set_error(&mut self, error: f32) {
+        if let Some(frame) = &mut self.frame {
+            frame.error = error;
+        }
     }
 
     /// Notes a frame of this process, which is its sign of life.

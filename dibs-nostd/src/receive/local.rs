@@ -31,16 +31,15 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         captured: Millis,
         now: Millis,
     ) -> Result<Progress, ReceiveError> {
-        self.frame_at(positions, None, captured, now)
+        self.frame_at(positions, (None, 0.0), [captured, now])
     }
 
-    /// The same, with a pose.
+    /// The same, with a pose, and with the largest error (mm) of a position.
     pub(crate) fn frame_at(
         &mut self,
         positions: impl ExactSizeIterator<Item = Vec3> + Clone,
-        pose: Option<RigidPose>,
-        captured: Millis,
-        now: Millis,
+        besides: (Option<RigidPose>, f32),
+        times: [Millis; 2],
     ) -> Result<Progress, ReceiveError> {
         let (limit, rows, checked) = (self.max_coordinate, positions.len(), positions.clone());
         let source = move |_: &Self| check(checked, 0, limit);
@@ -49,7 +48,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
                 slot.set(position);
             }
         };
-        self.local((Content::Whole, rows), pose, source, store, [captured, now])
+        self.local((Content::Whole, rows), besides, source, store, times)
     }
 
     /// The same, with weights of displacement modes.
@@ -70,7 +69,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
                 slot.set(Vec3::new(weight, 0.0, 0.0));
             }
         };
-        self.local((Content::Modal, weights.len()), None, source, store, [captured, now])
+        self.local((Content::Modal, weights.len()), (None, 0.0), source, store, [captured, now])
     }
 
     /// Refuses and counts a frame of this process.
@@ -91,7 +90,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     fn local(
         &mut self,
         (content, rows): (Content, usize),
-        pose: Option<RigidPose>,
+        besides: (Option<RigidPose>, f32),
         check: impl FnOnce(&Self) -> Result<(), ReceiveError>,
         store: impl FnOnce(&[Position]),
         [captured, now]: [Millis; 2],
@@ -109,7 +108,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             freshness: Freshness { age_ms, echo: Some(now.0) },
             is_posed: false,
         };
-        let outcome = self.local_rows(id, begin, pose, check, store);
+        let outcome = self.local_rows(id, begin, besides, check, store);
         let outcome = outcome.map_err(|rejection| self.refuse_local(&id, rejection));
         if outcome.is_ok() {
             self.collector.note_local();
@@ -121,7 +120,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         &mut self,
         id: FrameId,
         begin: Begin,
-        pose: Option<RigidPose>,
+        (pose, error): (Option<RigidPose>, f32),
         check: impl FnOnce(&Self) -> Result<(), ReceiveError>,
         store: impl FnOnce(&[Position]),
     ) -> Result<Progress, ReceiveError> {
@@ -135,6 +134,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         check(self)?;
         // Like a frame of one packet, with digest contributions of 0.
         self.begin_frame(id.epoch, begin, [0; 2])?;
+        self.collector.set_error(error);
         if let Some(pose) = pose {
             self.gate.place(pose);
         }

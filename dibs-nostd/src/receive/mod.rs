@@ -309,6 +309,12 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         self.collector.mesh_id()
     }
 
+    /// The checksum of the tree whose frames are accepted, if the gate has one.
+    #[cfg(all(feature = "control", feature = "modes"))]
+    pub(crate) fn tree_checksum(&self) -> Option<u32> {
+        self.gate.motion_unit().map(|unit| unit.tree)
+    }
+
     /// Name of the last published frame.
     #[must_use]
     pub fn published(&self) -> Option<FrameId> {
@@ -420,10 +426,11 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
             Ok(_) if !frame.is_complete => Ok(Advance::Idle),
             Ok(Admission::Pending) => Ok(Advance::Pending),
             Ok(Admission::Admitted(stretch)) => {
+                let error = frame.begin.encoding.error() + frame.error;
                 let label = FrameLabel {
                     epoch: frame.id.epoch,
                     received: frame.captured(),
-                    position_error: frame.begin.encoding.error() + self.gate.position_error(),
+                    position_error: error + self.gate.position_error(),
                     stretch,
                 };
                 let before = front.and_then(|front| front.motion());

@@ -4,11 +4,12 @@
 
 use dibs_build::Builder;
 use dibs_build::modes::ModalFit;
+use dibs_nostd::guard::{GuardLimits, Surface};
 use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
     Admission, Advance, Assembler, FrameExtent, Frames, Gate, IncomingSurface, Millis, Options,
-    Query, ReceiveError, Sphere, StretchError, Tree, measure_stretch,
+    Query, ReceiveError, Sphere, StretchError, Tree, TreeBytes, VertexTable, measure_stretch,
 };
 use dibs_tests::bus::reseal;
 use dibs_tests::modal::{anywhere, positions, small};
@@ -219,4 +220,72 @@ fn weights_come_by_a_call() {
     let positions = [Vec3::ZERO; 4].into_iter();
     let outcome = near.assembler.frame(positions, Millis(900), Millis(900));
     assert_eq!(outcome, Err(ReceiveError::Encoding));
+}
+
+/// A guard's bus takes weights by a call: every vertex is the modal surface's to the bit, the answer has the modes' own
+/// error, and wrong weights leave the last surface.
+#[test]
+fn a_guard_takes_weights_by_a_call() {
+    let (built, _) = small(4);
+    let plain = Builder::new().stretch(3.0).build(&trembling(320, 3, 6).0).expect("valid");
+    let tree = built.tree::<u16>().expect("valid");
+    let modes = Modes::of(&tree).expect("has modes");
+    let surface = Surface::<162>::new();
+    let limits = GuardLimits::new(1e5, Millis(1_000)).automatic();
+    let bytes = TreeBytes::<u16>::new(built.blob());
+    let (mut bus, mut guard) = surface.start::<_, 64, 96>(bytes, limits).expect("valid");
+    let tool = Sphere::new(Vec3::new(0.0, 0.0, 120.0), 3.0).expect("a tool");
+    let recorded = &built.modal_motion().expect("has modes").weights;
+    for (number, weights) in (0..).zip(recorded) {
+        let now = Millis(30 * number);
+        bus.frame_of_weights(&modes, weights, now, now).expect("recorded");
+        assert!(matches!(bus.work(u32::MAX), Ok(Advance::Published { .. })), "frame {number}");
+        let modal = modes.surface::<4>(weights).expect("recorded");
+        let frame = bus.surface().expect("published");
+        assert_eq!(positions(&frame), positions(&modal), "frame {number}");
+        assert_eq!(frame.position_error(), modes.position_error());
+        let found = guard.closest(&tool, now).tracked.expect("an answer").closest;
+        let stretch = measure_stretch(&tree, &modal).expect("within the limit");
+        let mut query = Query::<u16, 64>::new(&tree).expect("deep enough");
+        let options = Options::cold().stretch(stretch);
+        let asked = query.closest(&modal, &tool, &options).expect("sound");
+        assert!(asked.accuracy > modes.position_error() && modes.position_error() > 0.0);
+        // From the third frame on the guard extrapolates, here by no time, and rounds.
+        if number < 2 {
+            assert_eq!(found.separation, asked.separation, "frame {number}");
+            // A tracker counts rounding twice, and the modes' error once.
+            assert!(found.accuracy < asked.accuracy + 1e-3, "frame {number}");
+            assert_eq!(found.point_on_surface, asked.point_on_surface, "frame {number}");
+        }
+        assert!(found.accuracy >= asked.accuracy, "frame {number}");
+        assert!((found.separation - asked.separation).abs() < 1e-3, "frame {number}");
+    }
+    let good = &recorded[0];
+    let with = |mode: usize, weight: f32| {
+        let mut weights = good.clone();
+        weights[mode] = weight;
+        weights
+    };
+    let [_, high] = modes.range(1).expect("a mode");
+    let published = positions(&bus.surface().expect("published"));
+    let now = Millis(10_000);
+    for (weights, refusal) in [
+        (good[1..].to_vec(), ReceiveError::RowCount { rows: 3 }),
+        (with(2, f32::NAN), ReceiveError::NotFinite { row: 2 }),
+        (with(1, high.next_up()), ReceiveError::TooFar { row: 1 }),
+    ] {
+        let before = bus.counters().of(refusal.event());
+        assert_eq!(bus.frame_of_weights(&modes, &weights, now, now), Err(refusal));
+        assert_eq!(bus.counters().of(refusal.event()), before + 1);
+        assert_eq!(bus.work(u32::MAX), Ok(Advance::Idle));
+    }
+    assert_eq!(positions(&bus.surface().expect("published")), published);
+    // Another tree of the same mesh.
+    let (mesh, motion) = trembling(320, 3, 6);
+    let fit = ModalFit::new(&mesh, &motion).expect("a motion");
+    let other = plain.with_modes(&fit, 3).expect("so many");
+    let other = other.tree::<u16>().expect("valid");
+    let others = Modes::of(&other).expect("has modes");
+    let refused = bus.frame_of_weights(&others, &good[..3], now, now);
+    assert_eq!(refused, Err(ReceiveError::WrongMesh { mesh_id: others.mesh_id() }));
 }

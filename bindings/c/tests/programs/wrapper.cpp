@@ -264,6 +264,8 @@ int main(int argc, char **argv) {
     MUST(loop.init(bytes, guard_limits));
     MUST(loop.bus.receive(packets, 0));
     MUST(loop.bus.work(100'000));
+    const float weight = 0.0f;
+    EXPECT(DIBS_CODE_TREE_NO_MODES, loop.bus.weights(tree, {&weight, 1}, nullptr, 1, 1));
     dibs_answer of_loop;
     MUST(loop.guard.closest(tool, 1, of_loop));
     EXPECT(true, of_loop.age.is_published == 1 && of_loop.searched.tracked.proximity.separation == answer.searched.tracked.proximity.separation);

@@ -1,9 +1,10 @@
 //! The state shared by two threads: one reads a peer, the other sends to the receiver.
 
 use super::message;
+use super::tool::Sent;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Time between two equal statuses; and between any two.
@@ -42,7 +43,7 @@ pub enum Cause {
 impl Cause {
     const ALL: [Self; 5] = [Self::Checksum, Self::Layout, Self::Topology, Self::Frame, Self::Pose];
 
-    const fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Checksum => "checksum",
             Self::Layout => "layout",
@@ -88,6 +89,7 @@ struct State {
     report: Option<Report>,
     /// The code of the last status, and its time.
     reported: Option<(u16, Instant)>,
+    sent: Option<Arc<Sent>>,
 }
 
 impl Exchange {
@@ -206,8 +208,16 @@ impl Exchange {
         body.extend([0; 8]);
         body.extend(name.bytes().chain(std::iter::repeat(0)).take(20));
         body.extend(text.bytes().chain([0]));
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Some(message::pack("STATUS", DEVICE, now.as_secs_f64(), &body))
+        Some(message::pack("STATUS", DEVICE, now(), &body))
+    }
+
+    /// Keeps the frame that was sent last, for answers about a tool.
+    pub fn keep(&self, sent: Sent) {
+        self.state().sent = Some(Arc::new(sent));
+    }
+
+    pub fn sent(&self) -> Option<Arc<Sent>> {
+        self.state().sent.clone()
     }
 
     pub fn json(&self) -> Value {
@@ -248,6 +258,11 @@ impl Exchange {
         }
         text
     }
+}
+
+/// Seconds since 1970.
+pub fn now() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64()
 }
 
 impl State {

@@ -12,10 +12,12 @@ mod peer;
 mod pose;
 #[cfg(test)]
 mod tests;
+mod tool;
 mod topology;
 
 pub use exchange::{Exchange, Report};
 pub use peer::Address;
+pub use tool::{Sent, Tracked};
 
 use super::coordinates::SourceCoordinates;
 use super::live::Parsed;
@@ -28,9 +30,10 @@ use dibs_nostd::RigidPose;
 use exchange::Cause;
 use message::{BodyError, Header};
 use peer::{Door, Ended, Peer};
-use pose::PoseError;
+use pose::Pose;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use tool::Reading;
 use topology::Topology;
 
 /// A source of frames.
@@ -42,6 +45,10 @@ pub struct Igtl {
     device: Option<String>,
     /// If given, the device whose pose every frame gets.
     pose_device: Option<String>,
+    /// If given, the tool whose messages are answered.
+    tool: Option<Tracked>,
+    /// Why the last message of the surface was refused.
+    surface_refused: Option<Cause>,
     /// The last pose and positions.
     pose: Option<Part<RigidPose>>,
     positions: Option<Part<Vec<Vec3>>>,
@@ -72,6 +79,7 @@ impl Igtl {
     pub fn new(
         address: &Address,
         [device, pose_device]: [Option<String>; 2],
+        tool: Option<Tracked>,
         patience: Duration,
         place: SourceCoordinates,
         exchange: Arc<Exchange>,
@@ -85,6 +93,8 @@ impl Igtl {
             peer: None,
             device,
             pose_device,
+            tool,
+            surface_refused: None,
             pose: None,
             positions: None,
             place,
@@ -145,16 +155,13 @@ impl Igtl {
     /// Reads one message. `None` if it contains no frame that fits.
     fn message(&mut self, peer: &mut Peer) -> Result<Option<Parsed>, Ended> {
         let header = peer.header(&mut self.door, &self.exchange)?;
-        if let Some(kind) = self.pose_of(&header) {
-            let read =
-                self.body(peer, &header, MOST_POSES, "a message with poses", |igtl, body| {
-                    igtl.read_pose(&header, kind, body, Instant::now())
-                })?;
-            match read {
-                Ok(true) => self.exchange.posed(),
-                Ok(false) => self.exchange.passed(None),
-                Err(refusal) => self.refuse(peer, &header, refusal),
-            }
+        let kind = pose::Kind::of(&header.kind);
+        let wanted = |device: Option<&str>| {
+            device.is_some_and(|device| kind.is_some_and(|kind| kind.is_of(&header, device)))
+        };
+        let wanted = self.devices().map(wanted);
+        if let Some(kind) = kind.filter(|_| wanted.contains(&true)) {
+            self.poses(peer, &header, (kind, wanted))?;
             return Ok(None);
         }
         let other = self.device.as_ref().filter(|device| **device != header.device);
@@ -177,6 +184,7 @@ impl Igtl {
             igtl.read(&header, kind, body, Instant::now())
         })?;
         self.number += 1;
+        self.surface_refused = read.as_ref().err().map(|(cause, _)| *cause);
         match read {
             Ok(parsed) => {
                 self.exchange.accepted(header.time > 0.0);
@@ -216,40 +224,79 @@ impl Igtl {
         peer.report(&self.exchange);
     }
 
-    /// The message's type, if it may contain that device's pose.
-    fn pose_of(&self, header: &Header) -> Option<pose::Kind> {
-        let device = self.pose_device.as_ref()?;
-        let kind = pose::Kind::of(&header.kind)?;
-        (!kind.is_of_device() || header.device == *device).then_some(kind)
+    /// The devices whose poses are read: the surface's, and the tool's.
+    fn devices(&self) -> [Option<&str>; 2] {
+        [self.pose_device.as_deref(), self.tool.as_ref().map(|tool| &*tool.device)]
     }
 
-    /// Reads the pose of a message. Returns whether it contains that device's.
-    fn read_pose(
+    /// Reads a message that may have the pose of the surface, or of the tool, as `wanted` says, and answers about the latter.
+    fn poses(
+        &mut self,
+        peer: &mut Peer,
+        header: &Header,
+        (kind, wanted): (pose::Kind, [bool; 2]),
+    ) -> Result<(), Ended> {
+        let read = self.body(peer, header, MOST_POSES, "a message with poses", |igtl, body| {
+            let content = content(header, body)?;
+            let of = |device: Option<&str>| match device {
+                Some(device) => kind.pose(content, device),
+                None => Ok(None),
+            };
+            Ok(igtl.devices().map(of))
+        })?;
+        let came = Instant::now();
+        let delay = read.as_ref().map_or(Duration::ZERO, |_| self.delay.of(came, header.time));
+        let [surface, tool] = read.unwrap_or_else(|refusal| [Err(refusal.clone()), Err(refusal)]);
+        let mut taken = [Ok(false), Ok(false)];
+        if wanted[0] {
+            taken[0] = self.take_pose(header, surface, (came, delay));
+            if let Err((cause, _)) = &taken[0] {
+                self.surface_refused = Some(*cause);
+            }
+        }
+        if wanted[1] {
+            taken[1] = self.answer(peer, header, tool, (came, delay));
+        }
+        match taken {
+            [Err(refusal), _] | [_, Err(refusal)] => self.refuse(peer, header, refusal),
+            [Ok(false), Ok(false)] => self.exchange.passed(None),
+            _ => self.exchange.posed(),
+        }
+        Ok(())
+    }
+
+    /// Takes the surface's pose. Returns whether the message has it.
+    fn take_pose(
         &mut self,
         header: &Header,
-        kind: pose::Kind,
-        body: &[u8],
-        came: Instant,
+        read: Result<Option<Pose>, Refusal>,
+        (came, delay): (Instant, Duration),
     ) -> Result<bool, Refusal> {
-        let content = content(header, body)?;
-        let device = self.pose_device.as_deref().unwrap_or_default();
-        let read = kind.read(content, device).map_err(|error| match error {
-            PoseError::Layout => {
-                let why = format!("its content has {} bytes, and should have {}", content.len(), kind.size());
-                (Cause::Layout, why)
-            }
-            PoseError::NoRotation => {
-                let why =
-                    "its matrix or quaternion is no rotation, or a number is not finite: a pose neither scales nor mirrors";
-                (Cause::Pose, why.to_owned())
-            }
-        })?;
-        let Some(pose) = read else { return Ok(false) };
+        let Some(pose) = read? else { return Ok(false) };
         let placed = self.place.pose(&pose.rotation, pose.shift);
-        let pose = placed.map_err(|error| (Cause::Pose, error.to_string()))?;
-        let (time, delay) = (header.time, self.delay.of(came, header.time));
-        Part::replace(&mut self.pose, Part { value: pose, time, came, delay });
+        let value = placed.map_err(|error| (Cause::Pose, error.to_string()))?;
+        Part::replace(&mut self.pose, Part { value, time: header.time, came, delay });
         Ok(true)
+    }
+
+    /// Answers about the tool, also if its pose is refused. Returns whether the message has it.
+    fn answer(
+        &mut self,
+        peer: &mut Peer,
+        header: &Header,
+        read: Result<Option<Pose>, Refusal>,
+        (came, delay): (Instant, Duration),
+    ) -> Result<bool, Refusal> {
+        let pose = match &read {
+            Ok(None) => return Ok(false),
+            Ok(Some(pose)) => Ok(*pose),
+            Err((_, why)) => Err(format!("the tool's message: {why}")),
+        };
+        if let Some(tool) = &mut self.tool {
+            let reading = Reading { header, came, delay, pose, refused: self.surface_refused };
+            peer.tell(tool.answer(reading, self.exchange.sent(), &self.place));
+        }
+        read.map(|_| true)
     }
 
     /// Largest size of a message of this surface: 256 bytes for a point, with its attributes, and 64 for a triangle.

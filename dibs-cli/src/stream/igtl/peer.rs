@@ -182,7 +182,7 @@ pub enum Ended {
 
 pub struct Peer {
     socket: TcpStream,
-    /// Bytes of a status that the peer has not accepted yet.
+    /// Bytes of a message that the peer has not accepted yet.
     unsent: Vec<u8>,
 }
 
@@ -266,6 +266,18 @@ impl Peer {
         if self.unsent.is_empty() {
             self.unsent = exchange.status_due().unwrap_or_default();
         }
+        self.push();
+    }
+
+    /// Sends a message, unless the peer has not accepted all of the one before.
+    pub fn tell(&mut self, message: Vec<u8>) {
+        if self.unsent.is_empty() {
+            self.unsent = message;
+        }
+        self.push();
+    }
+
+    fn push(&mut self) {
         if let Ok(sent) = self.socket.write(&self.unsent) {
             self.unsent.drain(..sent);
         }

@@ -1,6 +1,8 @@
 //! The pose of a surface, from messages of the types TRANSFORM, TDATA and QTDATA.
 
-use super::message::take;
+use super::Refusal;
+use super::exchange::Cause;
+use super::message::{Header, take};
 use dibs_build::glam::{DMat3, DQuat, DVec3};
 
 /// Size of a pose as matrix and shift, and as shift and quaternion.
@@ -51,12 +53,17 @@ impl Kind {
     }
 
     /// Whether the pose is that of the message's device, and not of an element of its content.
-    pub const fn is_of_device(self) -> bool {
+    const fn is_of_device(self) -> bool {
         matches!(self, Self::Transform)
     }
 
+    /// Whether a message with this header may have that device's pose.
+    pub fn is_of(self, header: &Header, device: &str) -> bool {
+        !self.is_of_device() || header.device == device
+    }
+
     /// The right size of a content, in words.
-    pub fn size(self) -> String {
+    fn size(self) -> String {
         match self {
             Self::Transform => format!("{MATRIX}"),
             Self::Tracks => format!("{} for each instrument", BEFORE + MATRIX),
@@ -64,8 +71,23 @@ impl Kind {
         }
     }
 
-    /// The pose of a device; `None` if the content only has other devices' poses.
-    pub fn read(self, content: &[u8], device: &str) -> Result<Option<Pose>, PoseError> {
+    /// The pose of a device, or why the message is refused; `None` if the content only has other devices' poses.
+    pub fn pose(self, content: &[u8], device: &str) -> Result<Option<Pose>, Refusal> {
+        self.read(content, device).map_err(|error| match error {
+            PoseError::Layout => {
+                let size = self.size();
+                let why = format!("its content has {} bytes, and should have {size}", content.len());
+                (Cause::Layout, why)
+            }
+            PoseError::NoRotation => {
+                let why =
+                    "its matrix or quaternion is no rotation, or a number is not finite: a pose neither scales nor mirrors";
+                (Cause::Pose, why.to_owned())
+            }
+        })
+    }
+
+    fn read(self, content: &[u8], device: &str) -> Result<Option<Pose>, PoseError> {
         match self {
             Self::Transform if content.len() != MATRIX => Err(PoseError::Layout),
             Self::Transform => of_matrix(content).map(Some),

@@ -25,7 +25,11 @@ pub fn pose_message(kind: &str, device: &str, rotation: Quat, shift: Vec3) -> Ve
     // Half a turn about S leads from LPS to RAS.
     let half = Quat::from_rotation_z(std::f32::consts::PI);
     let rotation = (half * rotation * half.inverse()).normalize();
-    let shift = Vec3::new(-shift.x, -shift.y, shift.z) * 1e-3;
+    as_given(kind, device, rotation, Vec3::new(-shift.x, -shift.y, shift.z) * 1e-3)
+}
+
+/// The same, with these numbers.
+pub fn as_given(kind: &str, device: &str, rotation: Quat, shift: Vec3) -> Vec<u8> {
     let matrix = Mat3::from_quat(rotation).to_cols_array();
     let matrix: Vec<f32> = matrix.into_iter().chain(shift.to_array()).collect();
     let quaternion: Vec<f32> = shift.to_array().into_iter().chain(rotation.to_array()).collect();

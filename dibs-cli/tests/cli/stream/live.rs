@@ -186,7 +186,7 @@ fn wrong_frames_are_one_sentence() {
         (
             "--format json --unit m",
             lines(&few),
-            "frame 1: the frame has 501 vertices and the tree uses vertex 501",
+            "frame 1: the frame has 501 vertices and the tree's mesh has 502",
         ),
         ("--format json --unit m", lines(&null), "frame 1: position 1 (counted from 0), column"),
         ("--format json --unit m", lines(&token), "frame 1: position 0 (counted from 0), column"),

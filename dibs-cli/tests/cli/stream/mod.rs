@@ -12,6 +12,7 @@ mod igtl_peers;
 mod igtl_pose;
 mod igtl_record;
 mod igtl_refused;
+mod igtl_tool;
 mod live;
 #[cfg(target_os = "linux")]
 mod memory;

@@ -55,6 +55,26 @@ const POSED: &[Gives] = &[
     ),
     ("PoseError", All),
 ];
+const WEIGHTS: &[Gives] = &[(
+    "ReceiveError",
+    Only(&["RowCount", "NotFinite", "TooFar", "TooOld", "Earlier", "Busy", "WrongMesh"]),
+)];
+const POSED_WEIGHTS: &[Gives] = &[
+    (
+        "ReceiveError",
+        Only(&[
+            "RowCount",
+            "NotFinite",
+            "TooFar",
+            "TooOld",
+            "Earlier",
+            "Busy",
+            "WrongMesh",
+            "Pose",
+        ]),
+    ),
+    ("PoseError", All),
+];
 const WORK: &[Gives] =
     &[("ReceiveError", Only(&["Stretch"])), ("StretchError", But(&["NoMetric", "VertexCount"]))];
 /// For the surface, the bus and the tree.
@@ -129,6 +149,19 @@ pub const CALLS: &[Call] = &[
         LOCAL,
     ),
     call("Bus::frame_at", "As `frame`, and numbers that are no rigid pose.", POSED, LOCAL),
+    call(
+        "Bus::frame_of_weights",
+        "As `frame`, of another number of weights than modes, a weight that is not finite or out of its range, or another \
+         tree's modes.",
+        WEIGHTS,
+        LOCAL,
+    ),
+    call(
+        "Bus::frame_of_weights_at",
+        "As `frame_of_weights`, and numbers that are no rigid pose.",
+        POSED_WEIGHTS,
+        LOCAL,
+    ),
     call(
         "Bus::work",
         "The surface is stretched, shrunk, inverted, inside out or too fast. The tree's bytes changed: found by the scrub, \
