@@ -70,7 +70,7 @@ class Nodes(unittest.TestCase):
         truth = tree.query(SPHERE, surface=moved)
         low, high = answer.closest["interval"]
         self.assertTrue(low <= truth["separation"] <= high)
-        for wrong, why in [(moved * [1, 1, -1], "no stretch limit admits"), (moved * 1.5, "stretched by")]:
+        for wrong, why in [(moved * [1, 1, -1], "inverted or flat"), (moved * 1.5, "stretched by")]:
             with self.assertRaisesRegex(ValueError, why):
                 Loop(tree, wrong).send()
             # After a good frame they come too fast, and the good one stays.

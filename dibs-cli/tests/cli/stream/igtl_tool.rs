@@ -216,6 +216,11 @@ fn an_old_answer_is_never_a_new_one() {
         peer.send(&[frame(2)]);
         let frozen = said(peer, &[pose(3_000)]);
         assert!(frozen.starts_with("the tool's pose is "), "{frozen}");
+        // The next frame would replace this one if it were not sent yet, and the bridge would wait for a third.
+        peer.until(
+            |number| vec![pose(4_000 + number)],
+            |said| said.contains(" mm, outside, surface "),
+        );
         peer.send(&[frame(3)]);
     });
     let notes = String::from_utf8_lossy(&output.stderr);
