@@ -44,9 +44,9 @@ impl SurfaceRows {
         }
     }
 
-    /// The sentence for a frame that [`stretch`](Self::stretch) refuses: what is wrong with it and `remedy`, which allows
-    /// more stretch. No limit admits an element that is turned inside out, so its nodes are named instead, by the numbers
-    /// of the volume's file.
+    /// The message for a frame that [`stretch`](Self::stretch) refuses: the error, and `remedy`, the user's way to allow
+    /// more stretch. No limit admits an inverted element: there the message names its nodes instead, by their numbers in
+    /// the volume's file.
     #[must_use]
     pub fn refusal<I: Index>(tree: &Tree<'_, I>, error: StretchError, remedy: &str) -> String {
         let StretchError::Inverted { element } = error else { return format!("{error}; {remedy}") };

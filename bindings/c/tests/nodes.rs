@@ -1,4 +1,4 @@
-//! Queries in C on a surface that nodes carry: the same bits as in Rust, and what is refused.
+//! Queries in C on a surface that nodes carry: the same bits as in Rust, and the refusal of bad input.
 
 // Requirement: P-06
 

@@ -1,4 +1,4 @@
-//! Sweeps between ticks in C: the same bits as in Rust, and what is refused.
+//! Sweeps between ticks in C: the same bits as in Rust, and the refusal of bad input.
 
 // Requirement: P-06
 

@@ -1,4 +1,4 @@
-//! Frames of weights in C: the bits of Rust's modal surface and of its answers, and what is refused.
+//! Frames of weights in C: the bits of Rust's modal surface and of its answers, and the refusal of wrong ones.
 
 // Requirements: F-06, P-06
 

@@ -187,10 +187,8 @@ class Guard(Remade):
         `pose` is the rigid pose of the whole mesh, a rotation (a quaternion x, y, z, w of length 1) and a shift (mm):
         its point `p` is at `rotation p + shift`. Tools and answers are then in world coordinates. Without a pose the
         mesh is where its file has it."""
-        now = _now(now)
-        when = now if captured is None else _arrays.whole("captured", captured, 0, _WRAP - 1)
-        placed = None if pose is None else _arrays.pose(pose)
-        self._native.frame(_arrays.points("positions", positions).tobytes(), placed, when, now)
+        place_and_times = _place_and_times(pose, captured, now)
+        self._native.frame(_arrays.points("positions", positions).tobytes(), *place_and_times)
 
     def frame_of_weights(
         self,
@@ -202,13 +200,11 @@ class Guard(Remade):
     ) -> None:
         """The same as `frame`, by the weight of each of the displacement modes that the tree was built with (`dibs build
         --motion MOTION --modes N`). The modes' own error is part of each answer's accuracy."""
-        now = _now(now)
-        when = now if captured is None else _arrays.whole("captured", captured, 0, _WRAP - 1)
-        placed = None if pose is None else _arrays.pose(pose)
+        place_and_times = _place_and_times(pose, captured, now)
         array = _arrays.numbers("weights", weights)
         if array.ndim != 1:
             raise ValueError(f"weights: the shape is {array.shape}; give one number for each mode")
-        self._native.weights(_arrays.finite("weights", array).tobytes(), placed, when, now)
+        self._native.weights(_arrays.finite("weights", array).tobytes(), *place_and_times)
 
     def work(self, most: int = 1_000) -> Advance:
         """Checks at most this many rows and triangles of the arriving frame, and publishes it once it is complete and
@@ -276,6 +272,15 @@ def _now(value: Any) -> int:
         return operator.index(value) % _WRAP
     except TypeError:
         raise TypeError(f"now: whole milliseconds are needed, not {value!r}") from None
+
+
+def _place_and_times(
+    pose: Optional[tuple[npt.ArrayLike, npt.ArrayLike]], captured: Optional[int], now: int
+) -> tuple[Optional[tuple[list[float], list[float]]], int, int]:
+    """A frame's pose, its time of capture, by default now, and the present time."""
+    now = _now(now)
+    captured = now if captured is None else _arrays.whole("captured", captured, 0, _WRAP - 1)
+    return None if pose is None else _arrays.pose(pose), captured, now
 
 
 def _bytes(name: str, value: Any) -> bytes:

@@ -37,7 +37,7 @@ class Trackers(unittest.TestCase):
             if truth["side"] == dibs.Side.OUTSIDE:
                 self.assertEqual(len(found.contacts.found), len(listed.found))
             contacts += len(listed.found)
-            cut = limited.closest(shaft(tick), surface, instructions=10_000)
+            cut = limited.closest(shaft(tick), surface, instructions=20_000)
             self.assertTrue(cut.closest["interval"][0] <= high and cut.closest["interval"][1] >= low, tick)
             if tick > 100:
                 self.assertNotEqual(cut.closest["side"], dibs.Side.UNDEFINED)

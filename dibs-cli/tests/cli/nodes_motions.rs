@@ -1,4 +1,4 @@
-//! The `dibs` program and motions of nodes: in each form of a file, and what it says about frames that do not fit.
+//! The `dibs` program and motions of nodes, in each file format, and its errors for frames that do not fit the tree.
 
 // Requirements: F-07, P-08
 

@@ -34,7 +34,7 @@ pub struct SweepAnswer {
 /// If the mesh also turns and shifts as a whole, give the tools in mesh coordinates, each by its own pose
 /// ([`RigidPose::apply_inverse`](crate::RigidPose::apply_inverse)): so the angle counts times its lever, as motion of the
 /// tool. There a point of the tool follows an arc. While the mesh turns by `angle` about a centre that moves in a straight
-/// line, the arc leaves its chord by at most `angle * (angle * lever + 2 * shift) / 8`, with the largest distance of the
+/// line, the arc is off its chord by at most `angle * (angle * lever + 2 * shift) / 8`, with the largest distance of the
 /// tool's ends from the centre as `lever` and their largest motion relative to it as `shift`. Add that to the margin.
 /// ([`Guard::admit`](crate::guard::Guard::admit) of frames with poses needs none of this.)
 ///

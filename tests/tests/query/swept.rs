@@ -76,7 +76,7 @@ impl Turning {
         self.first * (point - self.centre) + self.ways[0]
     }
 
-    /// The bound of `Sweep`'s documentation on what the way of a point leaves its chord by.
+    /// The bound in `Sweep`'s documentation on the distance of a point's path from its chord.
     fn arc(&self, ways: &[[DVec3; 2]]) -> f64 {
         let (mut lever, mut shift, angle) = (0.0_f64, 0.0_f64, self.by.length());
         for &[from, to] in ways {
@@ -280,7 +280,7 @@ fn a_mesh_that_turns_is_swept_by_its_lever() {
     sweep_vertices(32, true);
 }
 
-/// Climbs towards a point whose way in mesh coordinates leaves its chord by more than stated.
+/// Climbs towards a point whose path in mesh coordinates is farther from its chord than stated.
 #[test]
 fn an_arc_leaves_its_chord_by_less_than_stated() {
     let mut rng = Rng::with_seed(33);
