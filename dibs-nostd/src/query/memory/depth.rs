@@ -86,6 +86,11 @@ impl<const STACK: usize> KnownDepth<STACK> {
         self.waiting.clear();
     }
 
+    /// Whether the last tick left points of the axis to go on from.
+    pub fn is_known(&self) -> bool {
+        self.state.points.known().is_some()
+    }
+
     /// The last depth at a reading, with the certain separation at that time.
     pub fn at(&mut self, clock: MotionClock, past: Option<Certain>) -> KnownDepthMut<'_> {
         KnownDepthMut { state: &mut self.state, waiting: &mut self.waiting, clock, past }

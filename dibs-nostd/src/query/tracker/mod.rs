@@ -263,7 +263,9 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let has_depth = options.is_signed && tool.axis_length() > 0.0 && self.tree.is_closed();
         let past = if has_depth { memory.separation.now(memory.clock) } else { None };
         let budget = match past {
-            Some(past) if purpose != Purpose::Ahead => share_of_pair(options.budget, &past),
+            Some(past) if purpose != Purpose::Ahead => {
+                share_of_pair(options.budget, &past, memory.depth.is_known())
+            }
             _ => options.budget,
         };
         let first = self.triangle.or(options.first(None));
@@ -330,11 +332,13 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     }
 }
 
-/// The closest pair's part of a tick's budget: the rest is for the depth of an axis that may be inside.
-fn share_of_pair(budget: Budget, past: &Certain) -> Budget {
+/// The closest pair's part of a tick's budget: the rest is for the depth of an axis that may be inside. Where no depth is
+/// known and the last tick did not find the axis inside, the closest pair comes first, because a depth begins from it.
+fn share_of_pair(budget: Budget, past: &Certain, is_depth_known: bool) -> Budget {
+    let was_inside = matches!(past.side, Side::Inside | Side::Crossing);
     if past.upper < 0.0 {
         Budget::new(budget.tests() / 8 * 3)
-    } else if past.lower < 0.0 {
+    } else if past.lower < 0.0 && (was_inside || is_depth_known) {
         Budget::new(budget.tests() / 2)
     } else {
         budget

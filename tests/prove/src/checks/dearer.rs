@@ -1,5 +1,5 @@
-//! A tracker's ticks within 60,000 instructions where they are dearer: at twice the speed, on 40,000 triangles, and on a
-//! human heart.
+//! A tracker's ticks within 60,000 instructions where they are dearer: at twice the speed, on 40,000 triangles, with a
+//! shaft through the organ, and on a human heart.
 
 // Requirement: T-02
 
@@ -20,20 +20,24 @@ pub const CHECK: Check = Check {
     promises: &[
         wrong(
             "dearer.wrong",
-            "of {dearer.ticks} ticks at twice the speed and of as many on 40,000 triangles",
+            "of {dearer.ticks} ticks at twice the speed, of as many on 40,000 triangles, and of as many with a shaft through the organ",
         ),
         note("dearer.ticks"),
         damped("dearer.damped", "of {dearer.near} ticks within 5 mm"),
         note("dearer.near"),
-        width(
-            "dearer.fast.95",
-            "At twice the instrument's speed, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
-            "mm; 99 %: {dearer.fast.99}, largest {dearer.fast.largest}; pair off the deepest and turned: {dearer.fast.turned} %",
-            Bound::Informs,
-        ),
+        Promise {
+            limits: GOAL,
+            ..width(
+                "dearer.fast.95",
+                "At twice the instrument's speed, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
+                "mm; 99 %: {dearer.fast.99}, largest {dearer.fast.largest}; in or crossing, 95 %: {dearer.fast.inner}; pair off the deepest and turned: {dearer.fast.turned} %",
+                Bound::Informs,
+            )
+        },
         note("dearer.fast.99"),
         note("dearer.fast.largest"),
         note("dearer.fast.turned"),
+        note("dearer.fast.inner"),
         largest(
             "dearer.fast.instructions",
             "On the board the largest of these ticks takes",
@@ -43,15 +47,19 @@ pub const CHECK: Check = Check {
         note("dearer.fast.mean"),
         note("dearer.fast.tests"),
         note("dearer.fast.spent"),
-        width(
-            "dearer.large.95",
-            "On a heart of 40,000 triangles, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
-            "mm; 99 %: {dearer.large.99}, largest {dearer.large.largest}; pair off the deepest and turned: {dearer.large.turned} %",
-            Bound::Informs,
-        ),
+        Promise {
+            limits: GOAL,
+            ..width(
+                "dearer.large.95",
+                "On a heart of 40,000 triangles, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
+                "mm; 99 %: {dearer.large.99}, largest {dearer.large.largest}; in or crossing, 95 %: {dearer.large.inner}; pair off the deepest and turned: {dearer.large.turned} %",
+                Bound::Informs,
+            )
+        },
         note("dearer.large.99"),
         note("dearer.large.largest"),
         note("dearer.large.turned"),
+        note("dearer.large.inner"),
         largest(
             "dearer.large.instructions",
             "On the board the largest of these ticks takes",
@@ -61,6 +69,28 @@ pub const CHECK: Check = Check {
         note("dearer.large.mean"),
         note("dearer.large.tests"),
         note("dearer.large.spent"),
+        Promise {
+            limits: GOAL,
+            ..width(
+                "dearer.through.95",
+                "A shaft of 120 mm through a whole heart, then one of 6 mm wholly inside its wall, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
+                "mm; 99 %: {dearer.through.99}, largest {dearer.through.largest}; in or crossing, 95 %: {dearer.through.inner}; pair off the deepest and turned: {dearer.through.turned} %",
+                Bound::Informs,
+            )
+        },
+        note("dearer.through.99"),
+        note("dearer.through.largest"),
+        note("dearer.through.turned"),
+        note("dearer.through.inner"),
+        largest(
+            "dearer.through.instructions",
+            "On the board the largest of these ticks takes",
+            "instructions with {dearer.through.tests} tests; the mean one {dearer.through.mean}, the median of those that use the budget up {dearer.through.spent}",
+            60_000.0,
+        ),
+        note("dearer.through.mean"),
+        note("dearer.through.tests"),
+        note("dearer.through.spent"),
     ],
 };
 
@@ -72,15 +102,19 @@ pub const OF_HUMAN: Check = Check {
         note("dearer.human.ticks"),
         damped("dearer.human.damped", "of {dearer.human.near} ticks within 5 mm of a human heart"),
         note("dearer.human.near"),
-        width(
-            "dearer.human.95",
-            "On a human heart, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
-            "mm; 99 %: {dearer.human.99}, largest {dearer.human.largest}; pair off the deepest and turned: {dearer.human.turned} %",
-            Bound::Informs,
-        ),
+        Promise {
+            limits: GOAL,
+            ..width(
+                "dearer.human.95",
+                "On a human heart, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
+                "mm; 99 %: {dearer.human.99}, largest {dearer.human.largest}; in or crossing, 95 %: {dearer.human.inner}; pair off the deepest and turned: {dearer.human.turned} %",
+                Bound::Informs,
+            )
+        },
         note("dearer.human.99"),
         note("dearer.human.largest"),
         note("dearer.human.turned"),
+        note("dearer.human.inner"),
         largest(
             "dearer.human.instructions",
             "On the board the largest of these ticks takes",
@@ -92,6 +126,10 @@ pub const OF_HUMAN: Check = Check {
         note("dearer.human.spent"),
     ],
 };
+
+/// What a dearer tick was meant to reach.
+const GOAL: &str = "The goal at 60,000 was 0.35 mm at 95 %: not reached. The motion of a tick, or the triangles near the axis, need more tests \
+     than the budget has.";
 
 const fn wrong(id: &'static str, unit: &'static str) -> Promise {
     Promise {

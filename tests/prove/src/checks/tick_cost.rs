@@ -59,14 +59,17 @@ type Sample = (u32, u32);
 
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let [usual, ..] = USUAL;
-    let [fast, large] = DEARER;
+    let [fast, large, through] = DEARER;
     let mut names = vec![
         "a generated heart of 10,272 triangles",
         "the same at twice the speed",
         "one of 40,000",
+        "a shaft through the first",
     ];
-    let mut scenes =
-        [usual, fast, large].map(|row| row.scene()).into_iter().collect::<Result<Vec<_>>>()?;
+    let mut scenes = [usual, fast, large, through]
+        .map(|row| row.scene())
+        .into_iter()
+        .collect::<Result<Vec<_>>>()?;
     scenes.push(HUMAN.scene()?);
     if scenes.iter().all(Option::is_some) {
         names.push("a human heart of 10,272");

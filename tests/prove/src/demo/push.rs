@@ -21,7 +21,8 @@ pub struct Pushed {
     pub checked: usize,
     /// Checked ticks within the wall's margin.
     pub pushing: usize,
-    /// Checked ticks whose search a budget ended, so that they push along the last tick's direction.
+    /// Checked ticks whose search a budget ended, so that they push along the last tick's direction, or from the last
+    /// tick's pair where it is now.
     pub kept: usize,
     /// Ticks with a wrong force, or a direction that is not the pair's; and the first of them.
     pub wrong: usize,
@@ -40,7 +41,8 @@ impl Pushed {
             let off = (Vec3::from(tick.force).as_dvec3() - expected.force).length();
             let is_pair = expected.turned * f64::from(MAX_FORCE) <= TOLERANCE
                 && expected.farther <= accuracy_of(tick);
-            let is_kept = !is_pair && is_cut(tick) && tick.direction == before.direction;
+            let is_last = tick.direction == before.direction || expected.is_last_pair;
+            let is_kept = !is_pair && is_cut(tick) && is_last;
             pushed.kept += usize::from(is_kept);
             // NaN counts as wrong.
             let is_right = off <= TOLERANCE && (is_pair || is_kept);
@@ -66,6 +68,8 @@ struct Expected {
     force: DVec3,
     /// Angle (radians) between the recorded direction and that of the recorded points.
     turned: f64,
+    /// Whether the points are those of the last tick's triangle and axis parameter, now.
+    is_last_pair: bool,
     /// Distance (mm) of the axis' recorded point minus that of its nearest point. If the axis is parallel to the
     /// surface, many points are nearest within rounding, and each has its own direction.
     farther: f64,
@@ -98,9 +102,13 @@ impl Expected {
         let depth = f64::from(MARGIN) - separation;
         let force = f64::from(STIFFNESS) * depth - f64::from(DAMPING) * speed;
         let size = if depth > 0.0 { force.clamp(0.0, f64::from(MAX_FORCE)) } else { 0.0 };
+        let turned = (direction - away.normalize()).length();
+        let is_same =
+            tick.triangle == before.triangle && tick.axis_parameter == before.axis_parameter;
         Some(Self {
             force: direction * size,
-            turned: (direction - away.normalize()).length(),
+            turned,
+            is_last_pair: is_same && turned * f64::from(MAX_FORCE) <= TOLERANCE,
             farther: away.length() - distance,
         })
     }

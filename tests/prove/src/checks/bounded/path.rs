@@ -1,4 +1,5 @@
-//! An instrument that hovers over a surface, touches it, passes through its wall, lies along it and moves fast.
+//! An instrument that hovers over a surface, touches it, passes through its wall, lies along it and moves fast; and one
+//! that is pushed through a whole organ, then a short one within its wall.
 
 use dibs_nostd::Capsule;
 use glam::Vec3;
@@ -20,7 +21,10 @@ enum Phase {
 const PHASES: [Phase; 5] =
     [Phase::Hovers, Phase::Touches, Phase::Passes, Phase::LiesAlong, Phase::Hurries];
 
-/// The poses of a path around a point inside the surface, with this many ticks, at a multiple of the usual speed.
+/// The radius and length (mm) of an instrument that fits in a heart's wall.
+const SHORT: [f32; 2] = [1.0, 6.0];
+
+/// The poses of a path around a point that the surface surrounds, with this many ticks, at a multiple of the usual speed.
 pub fn path(corners: &[[Vec3; 3]], (middle, faster): (Vec3, f32), ticks: usize) -> Vec<Capsule> {
     let (mut looked, mut wall) = (Vec3::ZERO, 0.0);
     let poses = (0..ticks).map(|tick| {
@@ -30,7 +34,7 @@ pub fn path(corners: &[[Vec3; 3]], (middle, faster): (Vec3, f32), ticks: usize) 
         let (around, up) = (speed * time, 0.7 + 0.4 * (0.37 * speed * time).sin());
         let out = Vec3::new(around.cos() * up.cos(), around.sin() * up.cos(), up.sin());
         if out.distance(looked) > 0.003 {
-            (looked, wall) = (out, farthest(corners, middle, out));
+            (looked, wall) = (out, last_walls(corners, middle, out)[1]);
         }
         let height = match phase {
             Phase::Hovers => 5.5 + 3.0 * (2.1 * time).sin(),
@@ -50,8 +54,31 @@ pub fn path(corners: &[[Vec3; 3]], (middle, faster): (Vec3, f32), ticks: usize) 
     poses.collect()
 }
 
-/// The farthest intersection of a ray with a surface: its distance from the ray's start.
-fn farthest(corners: &[[Vec3; 3]], from: Vec3, along: Vec3) -> f32 {
+/// The poses of a shaft through everything around a point, for half of the path, and of a short instrument wholly inside
+/// the outermost wall, for the other half.
+pub fn through(corners: &[[Vec3; 3]], middle: Vec3, ticks: usize) -> Vec<Capsule> {
+    let (mut looked, mut walls) = (Vec3::ZERO, [0.0; 2]);
+    let poses = (0..ticks).map(|tick| {
+        let time = tick as f32 * 0.001;
+        let (around, up) = (0.5 * time, 0.7 + 0.4 * (0.2 * time).sin());
+        let out = Vec3::new(around.cos() * up.cos(), around.sin() * up.cos(), up.sin());
+        if out.distance(looked) > 0.003 {
+            (looked, walls) = (out, last_walls(corners, middle, out));
+        }
+        if tick < ticks / 2 {
+            let tip = middle + out * (walls[1] + 8.0 + 6.0 * (1.3 * time).sin());
+            return Capsule::new(tip, tip - out * LENGTH, RADIUS).expect("finite");
+        }
+        let [radius, length] = SHORT;
+        let centre = middle + out * (walls[0].midpoint(walls[1]) + (1.7 * time).sin());
+        let half = out.any_orthonormal_vector() * length / 2.0;
+        Capsule::new(centre - half, centre + half, radius).expect("finite")
+    });
+    poses.collect()
+}
+
+/// The last two intersections of a ray with a surface, by their distances from the ray's start.
+fn last_walls(corners: &[[Vec3; 3]], from: Vec3, along: Vec3) -> [f32; 2] {
     let crossings = corners.iter().filter_map(|&[a, b, c]| {
         // Möller and Trumbore (1997).
         let (ab, ac) = (b - a, c - a);
@@ -63,5 +90,10 @@ fn farthest(corners: &[[Vec3; 3]], from: Vec3, along: Vec3) -> f32 {
         let far = ac.dot(away.cross(ab)) / volume;
         (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then_some(far)
     });
-    crossings.fold(0.0, f32::max)
+    crossings.fold(
+        [0.0; 2],
+        |[before, last], far| {
+            if far > last { [last, far] } else { [f32::max(before, far), last] }
+        },
+    )
 }

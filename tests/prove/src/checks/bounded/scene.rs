@@ -10,7 +10,7 @@ use dibs_nostd::{
 use glam::Vec3;
 use probe::track::tick;
 
-use super::path::path;
+use super::path;
 use crate::data::real;
 use crate::probe::ticks::{Script, Tick, read};
 use crate::probe::{COUNTING, board, build_for_board, run_on_board};
@@ -18,7 +18,7 @@ use crate::probe::{COUNTING, board, build_for_board, run_on_board};
 /// Ticks for each frame of the surface's motion: 25 frames a second.
 const TICKS_A_FRAME: usize = 40;
 
-/// A point inside the generated heart.
+/// A point in a ventricle of the generated heart.
 const MIDDLE: Vec3 = Vec3::new(12.0, -4.0, 38.0);
 
 /// A tree, its surface's frames with their stretches, and the poses of a path.
@@ -49,7 +49,13 @@ impl Scene {
     /// A generated heart of this many triangles, and a path at a multiple of the usual speed.
     pub fn heart(triangles: u32, faster: f32, ticks: usize) -> Result<Self> {
         let generate::MovingMesh { mesh, motion } = generate::heart(triangles)?;
-        Self::of(&mesh, &motion, 1.5, (MIDDLE, faster), ticks)
+        Self::of(&mesh, &motion, 1.5, |corners| path::path(corners, (MIDDLE, faster), ticks))
+    }
+
+    /// A generated heart, and an instrument through it, then one inside.
+    pub fn through_heart(ticks: usize) -> Result<Option<Self>> {
+        let generate::MovingMesh { mesh, motion } = generate::heart(10_272)?;
+        Self::of(&mesh, &motion, 1.5, |corners| path::through(corners, MIDDLE, ticks)).map(Some)
     }
 
     /// A human heart, if it is beside the repository. A triangle of it is stretched by 1.522.
@@ -58,22 +64,21 @@ impl Scene {
         let mesh = dibs_build::read(folder.join("heart_10272.ply"))?.mesh;
         let motion = Motion::read_pc2(folder.join("heart_10272.pc2"))?;
         let middle = mesh.positions.iter().sum::<Vec3>() / mesh.positions.len() as f32;
-        Self::of(&mesh, &motion, 4.0, (middle, 1.0), ticks).map(Some)
+        Self::of(&mesh, &motion, 4.0, |corners| path::path(corners, (middle, 1.0), ticks)).map(Some)
     }
 
-    /// A moving surface within this stretch, and a path around a point inside it.
+    /// A moving surface within this stretch, and a path around its first frame's triangles.
     fn of(
         mesh: &Mesh,
         Motion { frames, .. }: &Motion,
         stretch: f32,
-        around: (Vec3, f32),
-        ticks: usize,
+        path: impl FnOnce(&[[Vec3; 3]]) -> Vec<Capsule>,
     ) -> Result<Self> {
         let tree = Builder::new().stretch(stretch).build(mesh)?;
         let view = tree.tree::<u16>()?;
         let corners: Vec<[Vec3; 3]> =
             mesh.triangles.iter().map(|rows| rows.map(|row| frames[0][row as usize])).collect();
-        let path = path(&corners, around, ticks);
+        let path = path(&corners);
         let frames = frames.iter().map(|frame| {
             let rows = tree.to_rows(frame);
             let stretch = measure_stretch(&view, rows.as_slice())?;

@@ -6,10 +6,16 @@ use dibs_nostd::{Budget, Capsule, Options, Proximity, Query, Sphere, SurfaceBlen
 use glam::Vec3;
 use probe::track::{OPENED, STACK};
 
-use super::path::RADIUS;
+use super::rows::DEAREST;
 use super::scene::{Scene, Truth};
 use super::{MARGIN, Settling};
 use crate::harness::figures::Figures;
+
+/// The default tolerance of a depth, as a fraction of the axis' length.
+const TOLERANCE: f32 = 1.0 / 512.0;
+
+/// The least default tolerance, in units of the accuracy.
+const LEAST_TOLERANCE: f32 = 32.0;
 
 /// Results of the ticks with one budget.
 #[derive(Default)]
@@ -17,23 +23,38 @@ pub struct Tally {
     pub wrong: usize,
     pub damped: usize,
     turned: usize,
+    /// Ticks that left a part of the budget, and an interval wider than a depth's tolerance.
+    pub idle: usize,
     /// Widths of the intervals near the wall, in order.
     pub widths: Vec<f32>,
+    /// Those of an axis that crosses the surface or is inside.
+    inner: Vec<f32>,
     /// Work of each tick, in node tests.
     pub work: Vec<u32>,
 }
 
 impl Tally {
+    /// The width that this part of the intervals near the wall does not exceed.
+    pub fn width(&self, part: f64) -> f64 {
+        width(&self.widths, part)
+    }
+
     /// Notes the widths, and how often the pair was off the deepest, under names that start with `name`.
     pub fn note(&self, name: &str, figures: &mut Figures) {
-        let last = self.widths.len().saturating_sub(1) as f64;
         for (end, part) in [("95", 0.95), ("99", 0.99), ("largest", 1.0)] {
-            let width = self.widths.get((last * part) as usize).copied().unwrap_or_default();
-            figures.note(&format!("{name}.{end}"), (f64::from(width) * 100.0).round() / 100.0);
+            figures.note(&format!("{name}.{end}"), self.width(part));
         }
+        figures.note(&format!("{name}.inner"), width(&self.inner, 0.95));
         let turned = self.turned as f64 / self.widths.len().max(1) as f64 * 100.0;
         figures.note(&format!("{name}.turned"), (turned * 100.0).round() / 100.0);
     }
+}
+
+/// The width that this part of the intervals does not exceed, to a hundredth of a millimetre.
+fn width(widths: &[f32], part: f64) -> f64 {
+    let last = widths.len().saturating_sub(1) as f64;
+    let width = widths.get((last * part) as usize).copied().unwrap_or_default();
+    (f64::from(width) * 100.0).round() / 100.0
 }
 
 /// Runs a tracker over the path within a budget.
@@ -56,7 +77,15 @@ pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
         if truth.lower >= MARGIN || !is_settled {
             return;
         }
-        tally.widths.push(found.separation - found.lower);
+        let width = found.separation - found.lower;
+        tally.widths.push(width);
+        if truth.upper < -tool.radius() {
+            tally.inner.push(width);
+        }
+        let tolerance = (TOLERANCE * tool.axis_length()).max(LEAST_TOLERANCE * found.accuracy);
+        let is_idle =
+            width > tolerance + 2.0 * found.accuracy && found.work() + DEAREST <= budget.tests();
+        tally.idle += usize::from(is_idle);
         let force = wall.force(&Ok(found), Vec3::ZERO);
         let is_damped = matches!(force.state, ConstraintState::Safe(_));
         tally.damped += usize::from(is_damped);
@@ -65,6 +94,7 @@ pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
             usize::from(is_turned && !is_deepest(&mut point, surface, tool, &found, truth));
     });
     tally.widths.sort_by(f32::total_cmp);
+    tally.inner.sort_by(f32::total_cmp);
     tally
 }
 
@@ -79,6 +109,6 @@ fn is_deepest(
     let at = tool.axis_point(found.axis_parameter);
     let sphere = Sphere::new(at, 0.0).expect("finite");
     let own = point.closest(surface, &sphere, &Options::new()).expect("an answer");
-    own.separation <= truth.upper + RADIUS + 0.5
+    own.separation <= truth.upper + tool.radius() + 0.5
         && found.point_on_surface.distance(at) <= own.separation.abs() + 0.5
 }
