@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
-use dibs_nostd::Budget;
+use dibs_nostd::{Budget, Cost};
 use probe::track::tick;
 use rayon::prelude::*;
 use xtask::workspace;
@@ -81,8 +81,11 @@ impl Row {
         (self.scene)(TICKS)
     }
 
-    /// The budget that was measured to fit.
+    /// The budget that was measured to fit; with contacts that of the cost model.
     pub fn budget(&self) -> Result<Budget> {
+        if self.bits & tick::CONTACTS != 0 {
+            return Ok(Budget::for_instructions(self.most, &Cost::M7_TICK));
+        }
         let budget = TESTS.iter().find(|(name, _)| *name == self.name);
         let (_, tests) = budget.with_context(|| format!("{}: no budget", self.name))?;
         Ok(Budget::new(*tests))
@@ -127,7 +130,7 @@ impl Row {
 
 /// Measures again the budgets of the rows whose names contain `only`, and writes all to their file.
 pub fn fit(only: Option<&str>) -> Result<()> {
-    let rows: Vec<Row> = USUAL.into_iter().chain(LISTED).chain(DEARER).chain([HUMAN]).collect();
+    let rows: Vec<Row> = USUAL.into_iter().chain(DEARER).chain([HUMAN]).collect();
     let wanted = |row: &Row| only.is_none_or(|only| row.name.contains(only));
     if !rows.iter().any(wanted) {
         return Ok(());
