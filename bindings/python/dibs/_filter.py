@@ -75,10 +75,9 @@ class Tracker(Remade):
         """The closest pair of this tick, on the present surface.
 
         `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. `instructions` limits the
-        tick's work (pair, side, depth and contacts together) in instructions of a Cortex-M7, by a cost model that is
-        fitted to ticks without contacts; a limit below its constant part leaves no test. If the limit ends the search,
-        the interval is the last tick's, widened by the motion since, and the next tick continues. With a `margin` (mm)
-        the contacts are listed.
+        tick's work (pair, side, depth and contacts together) in instructions of a Cortex-M7, by a fitted cost model; a
+        limit below its constant part leaves no test. If the limit ends the search, the interval is the last tick's,
+        widened by the motion since, and the next tick continues. With a `margin` (mm) the contacts are listed.
         """
         numbers = tool_of(tool)
         margin = None if margin is None else _at_least("margin", margin, 0)

@@ -198,7 +198,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
                     let Some(tool) = tools.get(number) else { return Ok(()) };
                     let Query { tree, stack, .. } = query;
                     let pair = Pair { tree, vertices: *vertices, tool, closest, surface, number };
-                    let made = contacts.add(&pair, stack, &scene.options)?;
+                    let made = contacts.add(&pair, stack, &scene.options.unpriced())?;
                     scene.options = scene.options.after(made);
                     Ok(())
                 },

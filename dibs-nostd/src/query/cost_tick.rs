@@ -3,6 +3,6 @@
 use super::Cost;
 
 impl Cost {
-    /// A [`Tracker`](crate::Tracker)'s tick within a budget, on a Cortex-M7, without contacts.
+    /// A [`Tracker`](crate::Tracker)'s tick within a budget, with contacts or without, on a Cortex-M7.
     pub const M7_TICK: Self = Self { base: 10753, node_test: 115, triangle_test: 920 };
 }

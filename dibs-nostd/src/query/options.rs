@@ -9,8 +9,8 @@ use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 /// A node test is that of a sphere, or of the plane of a leaf or triangle. An exact triangle test counts as
 /// [`TRIANGLE`](Self::TRIANGLE) node tests. The tests of the roots' spheres and of a warm start's triangle are not
 /// counted. The depth of an axis that crosses or is inside counts its work outside of searches as node tests of equal
-/// time. A tracker's tick within a budget counts all of its work so, but a constant part and a comparison for each
-/// opened node; without a budget it counts tests alone.
+/// time. A tracker's tick within a budget counts all of its work so, its contacts' too, but a constant part and a
+/// comparison for each opened node; without a budget it counts tests alone.
 ///
 /// Every answer's interval holds the true separation. For the same query a larger budget never lowers the lower end,
 /// and raises the upper end by no more than the accuracy. From tick to tick only the upper end keeps this rule, if the

@@ -5,8 +5,8 @@
 use dibs_build::{Builder, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Contact, Contacts, MovingSurface, Odometer, Options, Query, QueryError, Sphere, Tool,
-    Tracker,
+    Budget, Capsule, Contact, Contacts, MovingSurface, Odometer, Options, Proximity, Query,
+    QueryError, Side, Sphere, Tool, Tracker,
 };
 use fastrand::Rng;
 use glam::Vec3;
@@ -270,4 +270,55 @@ fn a_jump_far_away_starts_the_range_anew() {
         }
     }
     assert!(compared > 60, "{compared}");
+}
+
+/// The closest pair takes what it needs of a budget, and the list the rest: it pays for its start, too.
+#[test]
+fn a_tick_with_contacts_takes_no_more_than_its_budget() {
+    const START: u32 = 80;
+    let mesh = generate::heart(1_280).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let surface = Odometer::new(&tree).start(rows.as_slice());
+    let (mut without, mut started, mut complete) = (0, 0, 0);
+    for row in (0..rows.len()).step_by(41) {
+        let tip = rows[row] * 1.05;
+        let tool = Capsule::new(tip, tip + rows[row] + Vec3::X * 20.0, 1.0).expect("valid");
+        let first = |budget| {
+            let mut tracker = Tracked::with_range(&tree).expect("deep enough");
+            let mut list = Contacts::<8>::new();
+            let options = Options::cold().budget(budget);
+            let pair = tracker.closest(&surface, &tool, &options).expect("an answer").closest;
+            let mut tracker = Tracked::with_range(&tree).expect("deep enough");
+            let found = tracker.contacts(&surface, &tool, MARGIN, &options, &mut list);
+            (pair, found.expect("an answer").closest, list)
+        };
+        let [unlimited, whole] = [Budget::UNLIMITED, Budget::new(1_000_000)].map(first);
+        let separations =
+            |list: &Contacts<8>| list.iter().map(|at| at.separation).collect::<Vec<_>>();
+        assert_eq!(separations(&whole.2), separations(&unlimited.2));
+        assert!(!whole.2.is_empty() && whole.2.bound() == unlimited.2.bound());
+        // The list's work counts, too.
+        let extra = |one: &Proximity, other: &Proximity| one.node_tests - other.node_tests;
+        let [of_pair, of_both] = [extra(&whole.0, &unlimited.0), extra(&whole.1, &unlimited.1)];
+        assert!(of_both > of_pair + START, "{of_both} {of_pair}");
+        for tests in (0..whole.1.work() + 20).step_by(7) {
+            let (pair, found, list) = first(Budget::new(tests));
+            assert!(found.work() <= tests + 1 + Budget::TRIANGLE, "{tests} {found:?}");
+            assert_eq!(found.interval(), pair.interval(), "{tests}");
+            let is_known = !matches!(pair.side, Side::Undefined(_));
+            assert_eq!(list.within(MARGIN).is_ok(), is_known, "{tests} {pair:?} {list:?}");
+            without += u32::from(!is_known);
+            started += u32::from(found.work() >= pair.work() + START);
+            complete += u32::from(list.within(MARGIN).is_ok_and(|list| list.is_complete()));
+            // Without the start of its search a list has the closest pair alone.
+            let is_started = found.work() > pair.work();
+            assert!(is_started || list.len() <= 1 && list.bound() < MARGIN, "{list:?}");
+        }
+    }
+    println!(
+        "{without} ticks without a list, {started} with more than the pair, {complete} complete"
+    );
+    assert!(without > 50 && started > 200 && complete > 20, "{without} {started} {complete}");
 }

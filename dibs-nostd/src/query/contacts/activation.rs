@@ -12,8 +12,10 @@
 use super::add::Pair;
 use super::basins::{Basins, Near};
 use crate::math::sqrt::sqrt;
+use crate::query::made::Tests;
+use crate::query::prices::ACTIVATION;
 use crate::unavailable::QueryError;
-use crate::{Index, Tool, Tree, VertexTable};
+use crate::{Budget, Index, Tool, Tree, VertexTable};
 
 /// A contact has activation 0 up to a ridge of this fraction of its distance, and 1 from twice that on.
 const RIDGE: f32 = 1.0 / 128.0;
@@ -42,13 +44,28 @@ pub(super) struct Looking<'p, 'a, I, V: ?Sized, T> {
     /// Heights beyond this do not matter.
     pub limit: f32,
     pub accuracy: f32,
-    /// Tests left.
+    /// Node tests left.
     pub left: u32,
+    pub made: Tests,
+    /// Whether [work besides tests](crate::query::prices) counts.
+    pub is_priced: bool,
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Looking<'_, '_, I, V, T> {
+    /// Pays for a triangle's test; `None` if the budget ran out.
     fn pay(&mut self) -> Option<()> {
-        self.left = self.left.checked_sub(1)?;
+        self.left = self.left.checked_sub(Budget::TRIANGLE)?;
+        self.made.triangle_tests = self.made.triangle_tests.saturating_add(1);
+        Some(())
+    }
+
+    /// Pays for work besides tests, if it has a price; `None` if the budget does not cover it.
+    #[inline(always)]
+    pub fn pay_for(&mut self, price: u32) -> Option<()> {
+        if self.is_priced {
+            self.left = self.left.checked_sub(price)?;
+            self.made.node_tests = self.made.node_tests.saturating_add(price);
+        }
         Some(())
     }
 
@@ -84,6 +101,7 @@ impl<const N: usize> Basins<N> {
         else {
             return Ok(1.0);
         };
+        let Some(()) = look.pay_for(ACTIVATION) else { return Ok(1.0) };
         let none = least_ridge(own, ridges);
         let full = 2.0 * none;
         let mut least = full;

@@ -14,7 +14,7 @@ use crate::query::side::{self, OnAxis, Side};
 use crate::query::{NoSide, Options, Proximity};
 use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
-use crate::{Budget, Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
+use crate::{Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 
 /// Ridges above a contact are examined up to this fraction of the margin: the largest for an activation of 1.
 const RIDGE: f32 = 1.0 / 64.0;
@@ -122,8 +122,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if let Some(contact) = own.filter(|_| is_crossing) {
             found.insert(contact);
         }
-        let left = options.after(made).budget.tests() / Budget::TRIANGLE;
-        let mut look = Looking { pair, limit: limit + ridge, accuracy, left };
+        let left = options.after(made).budget.tests();
+        let (limit_above, is_priced) = (limit + ridge, options.is_priced);
+        let mut look =
+            Looking { pair, limit: limit_above, accuracy, left, made: Tests::NONE, is_priced };
         let (mut least, mut meets) = (f32::INFINITY, 0_u32);
         let is_left_out = |row| !is_of(TriangleRow(row));
         let ridges = (0.5 * RIDGE * margin, 2.0 * accuracy);
@@ -161,7 +163,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
                     basins.activation(tree, row, ridges, is_left_out, &mut look)?;
             }
         }
-        made.triangle_tests = made.triangle_tests.saturating_add(left - look.left);
+        made = made.and(look.made);
         let is_met = is_crossing || closest.is_at_surface();
         let is_known = is_side_searched && (is_met || !closest.is_cut_short());
         // The closest pair is certain then, even if the search was cut short.

@@ -21,6 +21,7 @@ use glam::Vec3;
 
 use super::activation::{self, Looking};
 use crate::math::sqrt::sqrt;
+use crate::query::prices::{EDGE, ENTRY, VALLEY};
 use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
@@ -188,17 +189,26 @@ impl<const N: usize> Basins<N> {
             self.enter(entry);
         }
         let mut missing = None;
+        let mut miss = |square: f32| {
+            if missing.is_none_or(|least| square < least) {
+                missing = Some(square);
+            }
+        };
         for entry in 0..low {
             match self.flood(tree, entry as u16, ridges, &is_left_out, look)? {
                 Flood::Ended(lowest, beside) => {
-                    visit(lowest)?;
-                    if let Some(beside) = beside {
-                        visit(beside)?;
+                    for valley in [Some(lowest), beside].into_iter().flatten() {
+                        match look.pay_for(VALLEY) {
+                            Some(()) => visit(valley)?,
+                            None => miss(valley.square),
+                        }
                     }
                 }
                 Flood::Joined => (),
                 Flood::CutShort => {
-                    missing = missing.or(self.near.get(entry).map(|key| key.square()));
+                    if let Some(key) = self.near.get(entry) {
+                        miss(key.square());
+                    }
                 }
             }
         }
@@ -236,12 +246,24 @@ impl<const N: usize> Basins<N> {
             let Some(&entry) = self.reached.get(*at).filter(|_| *at < count) else { break };
             *at += 1;
             let Some(&from) = self.near.get(usize::from(entry)) else { break };
+            let Some(()) = look.pay_for(ENTRY) else {
+                if rises {
+                    break;
+                }
+                return Ok(Flood::CutShort);
+            };
             for edge in 0..3 {
                 let is_over = from.place.is_on(edge);
                 let is_level = is_over && sqrt(from.square()) <= height + error;
                 if !(rises || is_level) {
                     continue;
                 }
+                let Some(()) = look.pay_for(EDGE) else {
+                    if is_level {
+                        return Ok(Flood::CutShort);
+                    }
+                    continue;
+                };
                 let Some(across) = tree.row_across(from.row, edge) else { continue };
                 if is_left_out(across) {
                     continue;

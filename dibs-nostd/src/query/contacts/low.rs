@@ -34,7 +34,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             let mut low = Low::new(basins, limit, pair);
             let search = over_range(pair, stack, options)?;
             let visit = |row, at: &AxisPair| low.add(row, at);
-            let (beyond, tests) = search.each_low(limit, (ridge, options.part), visit)?;
+            let (beyond, tests) = search.each_low(limit, (ridge, options), visit)?;
             Ok(Found { complete: low.complete, beyond, tests })
         })
     }
@@ -52,7 +52,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             let search = over_range(pair, stack, options)?;
             let visit = |row, at: &AxisPair| low.add(row, at);
             let (beyond, tests) =
-                search.each_low_from(&mut front, limit, (ridge, options.part), visit)?;
+                search.each_low_from(&mut front, limit, (ridge, options), visit)?;
             front.keep(beyond == f32::INFINITY);
             Ok(Found { complete: low.complete, beyond, tests })
         })

@@ -356,7 +356,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<Proximity, QueryError> {
         let closest = self.closest(vertices, tool, options)?;
-        let options = options.after(closest.tests());
+        let options = options.after(closest.tests()).unpriced();
         let pair =
             Pair { tree: &self.tree, vertices, tool, closest: &closest, surface: 0, number: 0 };
         contacts.add(&pair, &mut self.stack, &options)?;

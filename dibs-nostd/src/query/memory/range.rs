@@ -87,6 +87,11 @@ impl RangeFrontMut<'_> {
         self.state.count == 0
     }
 
+    /// Number of opened nodes.
+    pub const fn opened(&self) -> u32 {
+        self.state.count as u32
+    }
+
     /// Opens a node; `None` if there is no free slot.
     pub fn open(&mut self, link: u32, deadline: Deadline) -> Option<()> {
         let opened = Opened { link, deadline, opened: 0, near: 0 };

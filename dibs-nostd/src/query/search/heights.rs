@@ -7,6 +7,8 @@ use glam::Vec3;
 use heapless::Vec;
 
 use super::Search;
+use crate::query::Options;
+use crate::query::prices::{LEAF, SEEN};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 
@@ -89,14 +91,22 @@ impl CacheSlot {
 pub(super) struct Heights {
     /// Only triangles with this label are considered.
     part: Option<u8>,
+    /// Whether the search's [work besides tests](crate::query::prices) counts.
+    pub is_priced: bool,
     places: [Vertex; SLOTS],
     /// Vertices evicted while a triangle represented them: at most one for each corner of a triangle.
     lost: Vec<Vertex, 3>,
 }
 
 impl Heights {
-    pub const fn new(part: Option<u8>) -> Self {
-        Self { part, places: [Vertex::UNSEEN; SLOTS], lost: Vec::new() }
+    pub const fn new(&Options { part, is_priced, .. }: &Options) -> Self {
+        Self { part, is_priced, places: [Vertex::UNSEEN; SLOTS], lost: Vec::new() }
+    }
+
+    /// The price of a leaf's triangles, in node tests.
+    #[inline(always)]
+    pub const fn price_of(&self, triangles: u32) -> u32 {
+        if self.is_priced { LEAF + (1 + SEEN) * triangles } else { triangles }
     }
 
     /// Whether triangles are left out.

@@ -14,6 +14,7 @@ use glam::Vec3;
 
 use super::Search;
 use super::heights::{CacheSlot, Heights, Vertex};
+use crate::query::prices::{FACING, ON_EDGE, STANDING};
 use crate::tool::{AxisPair, SLIVER, Tool};
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
@@ -105,6 +106,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
         let Some(triangle) = vertex.standing() else { return Ok(true) };
+        if self.pay(heights.is_priced, STANDING).is_none() {
+            return Ok(false);
+        }
         match self.is_lowest(triangle, vertex, heights)? {
             None => Ok(false),
             Some(false) => Ok(true),
@@ -178,7 +182,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if !self.tree.is_closed() || heights.is_of_part() {
             return Ok(Some(true));
         }
-        if self.meter.node().is_none() {
+        let price = if heights.is_priced { 1 + FACING } else { 1 };
+        if self.meter.nodes(price).is_none() {
             return Ok(None);
         }
         Ok(Some(!self.is_inside(&self.corners(triangle)?)))
@@ -271,8 +276,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 return Ok(None);
             }
             let (_, beyond) = self.corner(row, before(other), heights)?;
-            if beyond < low && self.is_lowest_on(edge, &self.corners(triangle)?) {
-                return Ok(Some(false));
+            if beyond < low {
+                if self.pay(heights.is_priced, ON_EDGE).is_none() {
+                    return Ok(None);
+                }
+                if self.is_lowest_on(edge, &self.corners(triangle)?) {
+                    return Ok(Some(false));
+                }
             }
         }
         self.is_outside(triangle, heights)

@@ -7,6 +7,7 @@ use super::node::RANGE;
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
 use crate::query::made::Tests;
+use crate::query::prices::{CHILD, LIST};
 use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
@@ -30,10 +31,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// In a sound tree it tests each node's sphere once. It reads each triangle once, the vertex beyond one of its
     /// edges, and its side, and tests it exactly at most twice. Each triangle represents at most one vertex, around
     /// which at most [`MAX_RING`] triangles are visited once. So this bound is never reached; if corrupt bytes form a
-    /// loop, it ends the search.
+    /// loop, it ends the search. Prices at most double it.
     pub fn over_range(mut self, options: &Options) -> Self {
         let header = self.tree.header();
-        let most = 3 + MAX_RING + 2 * Budget::TRIANGLE;
+        let most = 2 * (3 + MAX_RING + 2 * Budget::TRIANGLE);
         let most = header.triangles.saturating_mul(most).saturating_add(header.nodes);
         self.meter = Meter::new(options.budget.at_most(most));
         self
@@ -41,15 +42,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     /// Visits, with its pair, every triangle within `limit` of the axis that may be a local minimum, ignoring ridges up
     /// to `ridge`. A visit returns the next limit. Returns a lower bound on the distance of unvisited triangles; the
-    /// tests made are in `budget`. With a label, only that `part` of the surface is visited.
+    /// tests made are in `budget`. With a label in the options, only that part of the surface is visited.
     pub fn each_low(
         mut self,
         limit: f32,
-        (ridge, part): (f32, Option<u8>),
+        (ridge, options): (f32, &Options),
         mut visit: impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<(f32, Tests), QueryError> {
         self.set_limit(limit);
-        let mut heights = Heights::new(part);
+        if self.pay(options.is_priced, LIST).is_none() {
+            return Ok((0.0, self.meter.made()));
+        }
+        let mut heights = Heights::new(options);
         let least = match self.visit_waiting(ridge, &mut heights, &mut visit)? {
             Some(waiting) => {
                 let standing = least_standing(&heights, ridge);
@@ -75,7 +79,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             }
             nearest
         };
-        let (beyond, tests) = self.each_low(limit, (0.0, Some(label)), visit)?;
+        let (beyond, tests) =
+            self.each_low(limit, (0.0, &Options::new().contacts_of(label)), visit)?;
         // A triangle that stands for its lowest corner may be lower by the rounding of its tilt.
         let square = beyond * beyond - tilt;
         // A bound below zero is none, and neither is one that is not a number.
@@ -100,7 +105,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             }
             let link = Link::decode(link);
             let (Link::Children { count, .. } | Link::Leaf { count, .. }) = link;
-            let is_done = self.meter.nodes(count).is_some()
+            let price = match link {
+                Link::Children { .. } if heights.is_priced => (1 + CHILD) * count,
+                Link::Children { .. } => count,
+                Link::Leaf { .. } => heights.price_of(count),
+            };
+            let is_done = self.meter.nodes(price).is_some()
                 && match link {
                     Link::Children { first, count } => {
                         self.expand::<RANGE>(lower, first, count, 0.0)?;
@@ -131,6 +141,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             }
         }
         Ok(true)
+    }
+
+    /// Pays for work besides tests, if it has a price. `None` if the budget does not cover it.
+    #[inline(always)]
+    pub(super) fn pay(&mut self, is_priced: bool, price: u32) -> Option<()> {
+        if is_priced { self.meter.nodes(price) } else { Some(()) }
     }
 
     pub(super) fn set_limit(&mut self, limit: f32) {

@@ -7,8 +7,11 @@ use super::heights::Heights;
 use super::near::least_standing;
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
+use crate::query::Options;
 use crate::query::made::Tests;
+use crate::query::memory::clock::Deadline;
 use crate::query::memory::range::{Opened, RangeFrontMut};
+use crate::query::prices::{CHILD_PLANE, LIST, PASSED, VISIT};
 use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
@@ -21,15 +24,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         mut self,
         front: &mut RangeFrontMut<'_>,
         limit: f32,
-        (ridge, part): (f32, Option<u8>),
+        (ridge, options): (f32, &Options),
         mut visit: impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<(f32, Tests), QueryError> {
         self.set_limit(limit);
         if front.is_empty() && front.start(self.tree.roots()).is_none() {
-            return self.each_low(limit, (ridge, part), visit);
+            return self.each_low(limit, (ridge, options), visit);
         }
         self.waiting = 0;
-        let mut heights = Heights::new(part);
+        if self.pay(options.is_priced, LIST + front.opened() / PASSED).is_none() {
+            return Ok((0.0, self.meter.made()));
+        }
+        let mut heights = Heights::new(options);
         let mut threshold = front.clock.within(self.cutoff + self.coordinate_slack);
         let mut at = 0;
         while let Some(node) = front.node(at) {
@@ -38,7 +44,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 at += 1;
                 continue;
             }
-            let is_done = (!is_due || self.look_farther(front, at, node)?)
+            let is_done = (!is_due || self.look_farther(front, at, node, heights.is_priced)?)
                 && self.visit_waiting(ridge, &mut heights, &mut visit)?.is_none()
                 && self.visit_near(front, at, ridge, &mut heights, &mut visit)?;
             if !is_done {
@@ -64,6 +70,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         front: &mut RangeFrontMut<'_>,
         at: usize,
         node: Opened,
+        is_priced: bool,
     ) -> Result<bool, QueryError> {
         let (clock, tree) = (front.clock, self.tree);
         let margin = self.slack + self.coordinate_slack;
@@ -73,6 +80,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             return Err(QueryError::Corrupt { row: 0 });
         };
         let corrupt = QueryError::Corrupt { row: first };
+        if self.pay(is_priced, VISIT).is_none() {
+            return Ok(false);
+        }
         let mut first_due = clock.never();
         for (slot, child) in tree.records(first, count).ok_or(corrupt)?.enumerate() {
             let bit = 1 << slot;
@@ -100,6 +110,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                         }
                         let subtree = Waiting { lower: own, link: child.link };
                         self.push(0, subtree).ok_or(corrupt)?;
+                    }
+                    // Without a test of its plane it counts as near.
+                    Link::Leaf { .. } if self.pay(is_priced, 1 + CHILD_PLANE).is_none() => {
+                        near |= bit;
+                        continue;
                     }
                     Link::Leaf { first, count } => {
                         let plane = self.plane_across(normal, position, distance);
@@ -145,7 +160,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let Link::Leaf { first, count } = Link::decode(child.link) else {
                 return Err(corrupt);
             };
-            if self.meter.nodes(count).is_none() {
+            if self.meter.nodes(heights.price_of(count)).is_none() {
                 return Ok(false);
             }
             let Some(low) = self.visit_low(first, count, ridge, heights, visit)? else {
@@ -166,22 +181,31 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     #[cold]
     fn least_from(&self, front: &RangeFrontMut<'_>, from: usize) -> Result<f32, QueryError> {
         let mut least = f32::INFINITY;
-        let mut add = |bound: f32| {
+        let mut first_due: Option<Deadline> = None;
+        let add = |least: &mut f32, bound: f32| {
             // NaN or below zero: no bound.
             let bound = if bound > 0.0 { bound } else { 0.0 };
-            if bound < least {
-                least = bound;
+            if bound < *least {
+                *least = bound;
             }
         };
         for node in front.rest(from) {
-            add(front.clock.left(node.deadline));
+            if first_due.is_none_or(|due| node.deadline.is_before(due)) {
+                first_due = Some(node.deadline);
+            }
+            if node.near == 0 {
+                continue;
+            }
             let Link::Children { first, count } = Link::decode(node.link) else { continue };
             let corrupt = QueryError::Corrupt { row: first };
             let children = self.tree.records(first, count).ok_or(corrupt)?;
             for (_, child) in children.enumerate().filter(|(slot, _)| node.near >> slot & 1 == 1) {
                 let distance = sqrt(self.tool.axis_distance_squared(self.position(child.pin)?));
-                add(distance - child.radius_code as f32 * self.radius_scale);
+                add(&mut least, distance - child.radius_code as f32 * self.radius_scale);
             }
+        }
+        if let Some(due) = first_due {
+            add(&mut least, front.clock.left(due));
         }
         Ok(least)
     }

@@ -18,7 +18,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     /// which searches near parts first.
     ///
     /// Cost: that of [`closest`](Self::closest), a few instructions for each opened node, and a query's comparisons of
-    /// the triangles within the margin.
+    /// the triangles within the margin. Of a budget the closest pair takes what it needs, and the list the rest: where
+    /// that does not cover the start of its search, the closest pair is its only contact.
     ///
     /// # Errors
     /// Same as [`Query::contacts`](crate::Query::contacts).
@@ -42,8 +43,6 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         options: &Options,
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<TrackerAnswer, QueryError> {
-        // A list's own work has no price, so one price for pair and list would leave too few tests for either.
-        let options = &options.unpriced();
         let mut tracked = self.within(surface, tool, options, f32::INFINITY, Purpose::Contacts)?;
         let is_cut = tracked.is_kept || tracked.closest.side == Side::Undefined(NoSide::CutShort);
         let mut closest = tracked.closest;

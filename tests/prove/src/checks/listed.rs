@@ -52,8 +52,8 @@ pub const CHECK: Check = Check {
         note("listed.40k.spent"),
         without(
             "listed.60k.without",
-            "Ticks within 60,000 instructions at which a proxy has no list of contacts",
-            Bound::Informs,
+            "Within 60,000 instructions a proxy is never without its list of contacts",
+            Bound::Is(0.0),
         ),
         complete(
             "listed.60k.complete",
@@ -69,11 +69,7 @@ pub const CHECK: Check = Check {
         note("listed.60k.mean"),
         note("listed.60k.tests"),
         note("listed.60k.spent"),
-        without(
-            "listed.100k.without",
-            "Within 100,000 instructions a proxy is never without its list of contacts",
-            Bound::Is(0.0),
-        ),
+        without("listed.100k.without", "The same within 100,000 instructions", Bound::Is(0.0)),
         complete(
             "listed.100k.complete",
             "The list is complete to 5 mm",
@@ -95,7 +91,7 @@ pub const CHECK: Check = Check {
 const fn without(id: &'static str, says: &'static str, bound: Bound) -> Promise {
     let (unit, limits) = (
         "of {listed.near} ticks within 5 mm",
-        "After 100 ticks, and after 100 from each leap. Without a list the budget ended before the deepest contact was known.",
+        "Budgets by `Cost::M7_TICK`. After 100 ticks, and after 100 from each leap. Without a list the budget ended before the deepest contact was known.",
     );
     Promise { id, says, criterion: TIMING, bound, unit, limits }
 }

@@ -8,6 +8,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 use dibs_nostd::{Budget, Cost};
+use probe::track::tick;
 use rayon::prelude::*;
 use xtask::process::run;
 use xtask::steps::Outcome;
@@ -33,7 +34,8 @@ pub const CHECK: Check = Check {
             unit: "of {tick.ticks} ticks on the emulated Cortex-M7, within 20,000, 40,000, 60,000, 100,000 and 400,000 \
                    instructions: {tick.surfaces}",
             limits: "Not a proof: a line above the measured ticks of the first surface's path, with a margin of 15 %; the others are \
-                     not in the fit. A capsule; closest pair, side and depth, without contacts; instructions, not cycles.",
+                     not in the fit. A capsule; closest pair, side and depth, and the same with the contacts within 5 mm; instructions, \
+                     not cycles.",
         },
         Promise {
             id: "tick.largest-share",
@@ -53,6 +55,9 @@ const MARGIN: u32 = 15;
 
 /// The instructions for which budgets are made.
 const DEADLINES: [u32; 5] = [20_000, 40_000, 60_000, 100_000, 400_000];
+
+/// What a tick finds besides the closest pair: nothing, or all contacts.
+const KINDS: [u32; 2] = [0, tick::CONTACTS];
 
 /// A tick's tests, less the root's, which the base includes; and its instructions.
 type Sample = (u32, u32);
@@ -77,10 +82,15 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         println!("skipped: the real heart is not beside the repository");
     }
     let cost = Cost::M7_TICK;
-    let cases: Vec<_> =
-        scenes.iter().flatten().flat_map(|scene| DEADLINES.map(|most| (scene, most))).collect();
-    let shares = cases.par_iter().map(|&(scene, most)| {
-        let ticks = on_board(scene, 0, Budget::for_instructions(most, &cost))?;
+    let deadlines = KINDS.iter().flat_map(|&bits| DEADLINES.map(|most| (bits, most)));
+    let deadlines: Vec<_> = deadlines.collect();
+    let cases: Vec<_> = scenes
+        .iter()
+        .flatten()
+        .flat_map(|scene| deadlines.iter().map(move |&(bits, most)| (scene, bits, most)))
+        .collect();
+    let shares = cases.par_iter().map(|&(scene, bits, most)| {
+        let ticks = on_board(scene, bits, Budget::for_instructions(most, &cost))?;
         let shares = ticks.iter().map(|tick| f64::from(tick.instructions) / f64::from(most));
         Ok(shares.collect::<Vec<f64>>())
     });
@@ -100,8 +110,10 @@ pub fn fit() -> Result<()> {
     let [usual, ..] = USUAL;
     let scene = usual.scene()?.context("a generated scene")?;
     let budgets = USUAL.iter().map(Row::budget).collect::<Result<Vec<_>>>()?;
-    let samples = budgets.par_iter().map(|&budget| {
-        let ticks = on_board(&scene, 0, budget)?;
+    let cases: Vec<_> =
+        KINDS.iter().flat_map(|&bits| budgets.iter().map(move |&budget| (bits, budget))).collect();
+    let samples = cases.par_iter().map(|&(bits, budget)| {
+        let ticks = on_board(&scene, bits, budget)?;
         Ok(ticks
             .iter()
             .map(|tick| (tick.work().saturating_sub(1), tick.instructions))
@@ -121,7 +133,7 @@ pub fn fit() -> Result<()> {
 use super::Cost;
 
 impl Cost {{
-    /// A [`Tracker`](crate::Tracker)'s tick within a budget, on a Cortex-M7, without contacts.
+    /// A [`Tracker`](crate::Tracker)'s tick within a budget, with contacts or without, on a Cortex-M7.
     pub const M7_TICK: Self = Self {{ base: {base}, node_test: {test}, triangle_test: {triangle} }};
 }}
 "

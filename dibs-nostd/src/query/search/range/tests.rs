@@ -112,7 +112,8 @@ fn no_bound_of_a_range_exceeds_the_distance() {
                 kept += usize::from(!moved.is_empty());
                 let visit = |_, _: &_| LIMIT;
                 let search = search.expect("valid");
-                let (beyond, _) = search.each_low_from(&mut moved, LIMIT, (RIDGE, None), visit)?;
+                let (beyond, _) =
+                    search.each_low_from(&mut moved, LIMIT, (RIDGE, options), visit)?;
                 let is_whole = beyond == f32::INFINITY;
                 moved.keep(is_whole);
                 Ok::<_, QueryError>(is_whole)
@@ -172,7 +173,7 @@ fn a_node_that_no_search_reaches_stays_due() {
             LIMIT
         };
         let search = search.expect("valid");
-        let found = search.each_low_from(&mut front, LIMIT, (RIDGE, None), visit);
+        let found = search.each_low_from(&mut front, LIMIT, (RIDGE, &options), visit);
         front.keep(found.expect("an answer").0 == f32::INFINITY);
     }
     assert!(visited > 0, "{:?}", memory.clock);
