@@ -114,7 +114,9 @@ fn compare<S: MovingSurface, T: Tool, const NEAR: usize>(
     let mut whole = Contacts::<64, 2048>::new();
     let expected = query.contacts(surface, tool, MARGIN, &Options::cold(), &mut whole);
     expected.expect("an answer");
-    tracker.contacts(surface, tool, MARGIN, options, list).expect("an answer");
+    let tracked = tracker.contacts(surface, tool, MARGIN, options, list).expect("an answer");
+    let certain = tracked.closest.interval().lower;
+    assert!(list.bound() >= certain.min(MARGIN), "{} {tracked:?}", list.bound());
     let bound = list.bound() - 2.0 * list.accuracy();
     *compared += whole.iter().filter(|one| one.separation < bound).count();
     *wrong += missing(whole.iter(), &list.iter(), bound, false)

@@ -57,6 +57,14 @@ impl<const N: usize> List<N> {
         }
     }
 
+    /// No contact has a separation below `least`.
+    pub fn raise_bound(&mut self, least: f32) {
+        let least = if least < self.margin { least } else { self.margin };
+        if least > self.bound {
+            self.bound = least;
+        }
+    }
+
     /// Inserts a contact in order, and drops the farthest if there is no room.
     pub fn insert(&mut self, contact: Contact) {
         if self.list.is_full() {

@@ -297,6 +297,11 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
     }
 
+    /// No contact has a separation below `least`.
+    pub(super) fn raise_bound(&mut self, least: f32) {
+        self.found.raise_bound(least);
+    }
+
     /// Widens the accuracy by a further error (mm) of the surface, and lowers the bound by the total difference between
     /// the true surface and the searched one.
     #[cfg(all(feature = "bus", feature = "control"))]

@@ -71,6 +71,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if tracked.is_kept && !is_cut {
             contacts.resolve_side(&tracked.closest);
         }
+        contacts.raise_bound(tracked.closest.interval().lower);
         Ok(tracked)
     }
 }
