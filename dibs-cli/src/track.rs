@@ -32,9 +32,10 @@ A frame arrives when its time has come; the motion is played over and over. Betw
 of the last frame (held), on its way there from the one before (interpolated: late by a frame), or beyond it as
 it moved before (extrapolated). One line a tick on standard output, and what it took on standard error.
 
-Where a budget ends, is_cut is true and the certified interval is wider: it is that of the last ticks, less what has moved
-since. is_kept says that the side is the last tick's. contacts_bound says how far the list of contacts is complete; it is
-null where nothing is certain. A budget counts by the fit of a tracker's ticks; the list of contacts takes more.")]
+Where a budget ends the search for the closest pair, is_cut is true and the certified interval is wider: it is that of the
+last ticks, less what has moved since. is_kept says that the side is the last tick's. is_cut says nothing of the list of
+contacts: contacts_bound says how far that is complete, and is below the margin where the budget ended it; it is null where
+nothing is certain. A budget counts by the fit of a tracker's ticks; the list of contacts takes more.")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::oracle::{Instrument, OraclePair, closest_pair, exhaustive};
+use crate::oracle::{Instrument, OraclePair, closest_pair, exhaustive, least_distance};
 
 /// The winding number of a surface around a point: 1 inside a closed surface that faces outwards, 0 outside.
 ///
@@ -190,4 +190,50 @@ pub fn signed_separation<P: Copy + Into<DVec3>>(
         Some(true) => (-distance - radius, -distance - radius),
         None => (most, distance - radius),
     }
+}
+
+/// Most points at which [`bounded_separation`] takes a depth.
+const DEPTHS: usize = 100;
+
+/// An interval that contains the signed separation of any tool from a closed surface, at most `tolerance` wide where a
+/// hundred points of the axis suffice for that. `None` where the surface intersects itself.
+#[must_use]
+pub fn bounded_separation<P: Copy + Into<DVec3>>(
+    positions: &[P],
+    triangles: &[[u32; 3]],
+    tool: &Instrument,
+    tolerance: f64,
+) -> Option<(f64, f64)> {
+    let radius = f64::from(tool.radius);
+    let (start, end) = (tool.start.as_dvec3(), tool.end.as_dvec3());
+    let length = start.distance(end);
+    let pair = exhaustive(positions, triangles, tool)?;
+    if pair.axis_distance > 1e-6 && !is_inside(positions, triangles, pair.on_axis)? {
+        let apart = pair.axis_distance - radius;
+        return Some((apart, apart));
+    }
+    let signed = |t: f64| {
+        let at = start.lerp(end, t);
+        let corners = triangles.iter().map(|t| t.map(|v| positions[v as usize].into()));
+        let distance = least_distance(at, at, corners);
+        is_inside(positions, triangles, at).map(|inside| if inside { -distance } else { distance })
+    };
+    // A signed distance changes by at most the length along the axis: the part with the least bound is halved.
+    let bound = |[from, to]: [(f64, f64); 2]| (from.1 + to.1 - (to.0 - from.0) * length) / 2.0;
+    let mut parts = vec![[(0.0, signed(0.0)?), (1.0, signed(1.0)?)]];
+    let mut least = parts[0][0].1.min(parts[0][1].1);
+    for _ in 0..DEPTHS {
+        let lowest =
+            (0..parts.len()).min_by(|&a, &b| bound(parts[a]).total_cmp(&bound(parts[b])))?;
+        if bound(parts[lowest]) > least - tolerance {
+            break;
+        }
+        let [from, to] = parts.swap_remove(lowest);
+        let t = (from.0 + to.0) / 2.0;
+        let middle = (t, signed(t)?);
+        least = least.min(middle.1);
+        parts.extend([[from, middle], [middle, to]]);
+    }
+    let low = parts.into_iter().map(bound).fold(least, f64::min);
+    Some((low - radius, least - radius))
 }

@@ -2466,8 +2466,8 @@ dibs_filter dibs_filter_of(float stand_off, float speed);
  * its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
  * its tracker continues in the next tick.
  *
- * Cost: at most the filter's instructions for the queries, and for each motion that is tried usually 1,000, at most
- * 40,000.
+ * Cost: at most the filter's instructions for the queries, as estimated by a fit to plain queries (deep in the tissue,
+ * ticks measured up to twice as many), and for each motion that is tried usually 1,000, at most 40,000.
  *
  * @param filter       The filter.
  * @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.

@@ -41,13 +41,17 @@ fn a_budget_widens_the_interval_and_says_so() {
     for budget in [20_000, 60_000, 2_000_000] {
         let ticks = lines(folder, &format!("--budget {budget} --contacts 6"));
         assert_eq!(ticks.len(), whole.len());
-        let mut cut = 0;
+        let (mut cut, mut late) = (0, 0);
         for (tick, (line, exact)) in ticks.iter().zip(&whole).enumerate() {
             // The exact separation is within [lower, separation] of its own, and both intervals hold the truth.
             let truth = [0, 1].map(|end| exact["interval"][end].as_f64().unwrap());
             let least = line["interval"][0].as_f64().unwrap_or(f64::NEG_INFINITY);
             let most = line["interval"][1].as_f64().unwrap();
             assert!(least <= truth[1] && most >= truth[0], "{line} {exact}");
+            // A start says that it is one, and which of its ticks are cut.
+            assert_eq!(line["fallback"] == "start", tick == 0, "{line}");
+            assert!(line["side"] != "undefined" || line["is_cut"] == true, "{line}");
+            late += u32::from(line["side"] == "undefined");
             // After the first ticks no side is lost: a constraint always has something to act on.
             if tick >= 100 {
                 assert_ne!(line["side"], "undefined", "{line}");
@@ -73,6 +77,7 @@ fn a_budget_widens_the_interval_and_says_so() {
                 bound <= 6.0 && listed.iter().all(|contact| number(contact, "separation") <= 6.0)
             );
         }
+        assert!(late > 1 || budget > 20_000, "a start within {budget} has its side at once");
         assert!(cut <= cut_before && (budget > 20_000 || cut > 20), "{cut} at {budget}");
         cut_before = cut;
     }

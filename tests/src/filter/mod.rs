@@ -2,6 +2,7 @@
 
 mod asked;
 mod glide;
+mod medial;
 mod truth;
 mod walk;
 mod world;

@@ -9,6 +9,7 @@ use dibs_nostd::{Capsule, Cost, MovingSurface, Odometer, Tracker};
 use fastrand::Rng;
 use glam::Vec3;
 
+use super::medial::medial_centre;
 use super::truth::Truth;
 use super::{Asked, Course, Listener, Scene, Settings};
 use crate::deform::unit;
@@ -44,6 +45,8 @@ pub struct Episode {
     pub climbs: bool,
     /// Time constant of the approach (s).
     pub approach: f32,
+    /// Whether the commands lead to the medial axis, where the closest point jumps.
+    pub is_medial: bool,
 }
 
 impl Episode {
@@ -61,6 +64,8 @@ impl Episode {
             instructions: rng.choice([30_000, 60_000, 200_000, 200_000]).expect("four"),
             climbs: rng.u32(..8) == 0,
             approach: rng.choice([0.0, 0.0, 0.005, 0.05]).expect("four"),
+            // The next number is only looked at, which leaves all other walks as they are.
+            is_medial: rng.clone().u32(..8) == 0,
         }
     }
 }
@@ -82,6 +87,8 @@ pub struct Tally {
     pub cries: u64,
     /// Ticks near the surface.
     pub near: u64,
+    /// Ticks with the tip at the medial axis, within 0.1 mm.
+    pub medial: u64,
     /// Ticks near a label whose stand-off leaves less room than that of the whole surface.
     pub near_label: u64,
     /// Most instructions of a tick.
@@ -106,6 +113,7 @@ impl AddAssign for Tally {
         self.unsafe_ticks += other.unsafe_ticks;
         self.below += other.below;
         self.near += other.near;
+        self.medial += other.medial;
         self.near_label += other.near_label;
         self.cries += other.cries;
         self.most_instructions = self.most_instructions.max(other.most_instructions);
@@ -195,6 +203,7 @@ pub fn walk_by_label<const LABELS: usize>(
         && episode.instructions >= 200_000;
     let mut was_unsafe = true;
     let (mut goal, mut spin, mut until) = (Vec3::ZERO, Vec3::ZERO, 0);
+    let (mut aims, mut medial) = (Rng::with_seed(!seed), None);
     for tick in 0..episode.ticks {
         let start = f64::from(tick) * episode.period;
         // Frames are captured at every tick, and delivered late.
@@ -235,11 +244,21 @@ pub fn walk_by_label<const LABELS: usize>(
                 _ => -outward + unit(&mut rng),
             };
             spin = unit(&mut rng) * rng.f32() / 40.0;
+            if episode.is_medial {
+                let rows = &frames[0].1;
+                medial = medial_point(scene, rows, joints[0], 40.0 * most, &mut aims);
+            }
         }
         let axes = [[joints[0], joints[1]], [joints[1], joints[2]]];
         let tools =
             [0, 1].map(|at| Capsule::new(axes[at][0], axes[at][1], radii[at]).expect("finite"));
-        let mut command = Motion::new(joints[0], goal.normalize_or_zero() * most, spin * most);
+        let way = match medial {
+            Some(centre) => (centre - joints[0]).clamp_length_max(most),
+            None => goal.normalize_or_zero() * most,
+        };
+        let is_at = |centre: Vec3| centre.distance(joints[0]) < 0.1;
+        tally.medial += u64::from(medial.is_some_and(is_at));
+        let mut command = Motion::new(joints[0], way, spin * most);
         let period = episode.period;
         let truth = Truth { scene, course, start, period, radii, labels: &labels };
         if episode.climbs {
@@ -271,6 +290,16 @@ pub fn walk_by_label<const LABELS: usize>(
         joints = joints.map(|joint| admitted.motion.apply(joint));
     }
     tally
+}
+
+/// A point of the medial axis, the nearest of a few, at most so far on the way to the region's middle.
+fn medial_point(scene: &Scene, rows: &[Vec3], from: Vec3, far: f32, rng: &mut Rng) -> Option<Vec3> {
+    let inwards = (scene.middle - from).clamp_length_max(far);
+    let points = (0..4).filter_map(|_| {
+        let near = from + inwards * rng.f32() + unit(rng) * 6.0 * rng.f32();
+        medial_centre(rows, &scene.triangles, near)
+    });
+    points.min_by(|a, b| a.distance(from).total_cmp(&b.distance(from)))
 }
 
 fn ask<const LABELS: usize>(

@@ -3,6 +3,8 @@
 mod answers;
 mod at_surface;
 mod chain;
+mod climbed_budget;
+mod cold_start;
 mod contacts;
 mod cut_short;
 mod differential;

@@ -193,9 +193,10 @@ impl<const LABELS: usize> Filter<LABELS> {
     }
 
     /// The same with a budget: the instructions of all queries of a tick, by a [`Cost`]; 200,000 of a Cortex-M7 by
-    /// default. If it runs out, motions that are not verified are not admitted. The next tick's searches continue where
-    /// they stopped. It must have the cost's base (some 2,000) for each pair: a pair that is never searched has no answer,
-    /// and then no motion is admitted.
+    /// default. They are estimated by a fit to plain queries: deep in the tissue, ticks measured up to twice as many. If
+    /// the budget runs out, motions that are not verified are not admitted. The next tick's searches continue where they
+    /// stopped. It must have the cost's base (some 2,000) for each pair: a pair that is never searched has no answer, and
+    /// then no motion is admitted.
     #[must_use]
     pub const fn budget(self, instructions: u32, cost: Cost) -> Self {
         Self { instructions, cost, ..self }
@@ -212,8 +213,8 @@ impl<const LABELS: usize> Filter<LABELS> {
     /// The pairs are the current parts of one rigid instrument, each with its own surface and tracker: a chain of two
     /// tools in a scene of two surfaces has four pairs. `rows` are up to 8 additional limits.
     ///
-    /// Cost: the budget at most, and for each tried motion a solution of up to 16 rows: usually 1,000 instructions, at
-    /// most 40,000.
+    /// Cost: the [budget](Self::budget) at most, as estimated, and for each tried motion a solution of up to 16 rows:
+    /// usually 1,000 instructions, at most 40,000.
     ///
     /// # Errors
     /// [`FilterError`]: an argument that is not finite or out of range, or a query without an answer. The tool must
