@@ -57,7 +57,6 @@ impl GuardLimits {
     }
 
     /// The work limit of a tick: [`Budget::for_instructions`] by [`Cost::M7_TICK`](crate::Cost::M7_TICK).
-    /// That cost does not cover the list of a tick with [contacts](super::Guard::contacts), which takes longer.
     #[must_use]
     pub const fn budget(mut self, budget: Budget) -> Self {
         self.options = self.options.budget(budget);

@@ -125,8 +125,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
     /// contacts opened; other guards search from the root at each tick. The list is empty if there is no surface, or
     /// the query failed. Its [accuracy](Contacts::accuracy) covers the same errors as the pair's.
     ///
-    /// Cost: the budget's tests at most, plus about a thousand instructions, and some hundred for each contact.
-    /// [`Cost::M7_TICK`](crate::Cost::M7_TICK) does not cover the list's work between tests: measure the longest tick.
+    /// Cost: the budget at most, plus about a thousand instructions, and some hundred for each contact.
     pub fn contacts<T: Tool, const N: usize, const NEAR: usize>(
         &mut self,
         tool: &T,
