@@ -91,14 +91,17 @@ pub const CHECK: Check = Check {
 const fn without(id: &'static str, says: &'static str, bound: Bound) -> Promise {
     let (unit, limits) = (
         "of {listed.near} ticks within 5 mm",
-        "Budgets by `Cost::M7_TICK`. After 100 ticks, and after 100 from each leap. Without a list the budget ended before the deepest contact was known.",
+        "Budgets by `Cost::M7_TICK`. After 100 ticks, and after 100 from each leap. Without a list the budget ended before \
+         the deepest contact was known. The goal was 0 from 40,000 instructions on: reached from 60,000 on.",
     );
     Promise { id, says, criterion: TIMING, bound, unit, limits }
 }
 
 /// The share of complete lists.
 const fn complete(id: &'static str, says: &'static str, unit: &'static str) -> Promise {
-    let limits = "The whole list of an axis that crosses the surface or is inside is its deepest pair, which counts as incomplete.";
+    let limits = "The goals were 90 % within 60,000 instructions and 95 % within 100,000: not reached, because a list begins anew at \
+         each tick (docs/decisions.md). The whole list of an axis that crosses the surface or is inside is its deepest pair, \
+         which counts as incomplete.";
     Promise { id, says, criterion: TIMING, bound: Bound::Informs, unit, limits }
 }
 
