@@ -123,6 +123,11 @@ impl Options {
         self
     }
 
+    /// Whether the budget covers this work besides tests, or it has no price.
+    pub(super) const fn covers(&self, price: u32) -> bool {
+        !self.is_priced || self.budget.tests >= price
+    }
+
     /// The same options with a budget of tests alone.
     pub(super) const fn unpriced(mut self) -> Self {
         self.is_priced = false;

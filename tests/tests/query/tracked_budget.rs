@@ -5,7 +5,7 @@
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Capsule, Interval, NoSide, Odometer, Options, Query, Side, Tool, Tracker,
+    Budget, Capsule, Contacts, Interval, NoSide, Odometer, Options, Query, Side, Tool, Tracker,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::surfaces::cuboid;
@@ -50,7 +50,8 @@ fn ticks_hold(mesh: &Mesh, frames: &[Vec<Vec3>], size: f32, ticks: u32, seed: u6
     let built = Builder::new().stretch(1.5).build(mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
     let frames: Vec<_> = frames.iter().map(|frame| built.to_rows(frame)).collect();
-    let mut tracker = Tracker::<u16, MAX_STACK, 512>::new(&tree).expect("deep enough");
+    let mut tracker = Tracker::<u16, MAX_STACK, 512, 512>::with_range(&tree).expect("deep enough");
+    let mut list = Contacts::<8>::new();
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let mut odometer = Odometer::new(&tree);
     let mut rng = Rng::with_seed(seed);
@@ -71,7 +72,12 @@ fn ticks_hold(mesh: &Mesh, frames: &[Vec<Vec3>], size: f32, ticks: u32, seed: u6
             let tool = path.step();
             let budget = if tick == 0 { Budget::UNLIMITED } else { any_budget(&mut rng) };
             let options = Options::new().budget(budget);
-            let tracked = tracker.closest(&surface, &tool, &options).expect("an answer");
+            // At times with all contacts.
+            let tracked = match tick % 3 {
+                1 => tracker.contacts(&surface, &tool, 0.1 * size, &options, &mut list),
+                _ => tracker.closest(&surface, &tool, &options),
+            };
+            let tracked = tracked.expect("an answer");
             let closest = tracked.closest;
             let whole = Options::cold().depth_tolerance(0.001 * size);
             let whole = query.closest(&surface, &tool, &whole).expect("an answer");

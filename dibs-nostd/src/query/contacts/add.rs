@@ -9,6 +9,7 @@ use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
 use crate::query::made::Tests;
+use crate::query::prices::LIST;
 use crate::query::search::Waiting;
 use crate::query::side::{self, OnAxis, Side};
 use crate::query::{NoSide, Options, Proximity};
@@ -129,7 +130,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let (mut least, mut meets) = (f32::INFINITY, 0_u32);
         let is_left_out = |row| !is_of(TriangleRow(row));
         let ridges = (0.5 * RIDGE * margin, 2.0 * accuracy);
-        let missing = basins.each_valley(tree, ridges, is_left_out, &mut look, |near| {
+        let visit = |near: Near| {
             let is_on = sqrt(near.square) <= accuracy;
             meets += u32::from(is_on);
             // The crossing pair, inserted above, represents these triangles.
@@ -152,7 +153,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
                 found.insert(contact);
             }
             Ok(())
-        })?;
+        };
+        // A search that was not begun has left an earlier one's triangles.
+        let missing = if options.covers(LIST) {
+            basins.each_valley(tree, ridges, is_left_out, &mut look, visit)?
+        } else {
+            None
+        };
         let deepest =
             own.map_or(least, |own| if own.separation < least { own.separation } else { least });
         for contact in &mut found.list {

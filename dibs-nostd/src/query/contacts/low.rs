@@ -7,6 +7,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::Options;
 use crate::query::made::Tests;
 use crate::query::memory::range::RangeFrontMut;
+use crate::query::prices::LIST;
 use crate::query::search::{Search, Waiting};
 use crate::tool::AxisPair;
 use crate::tree::RootSet;
@@ -22,6 +23,9 @@ pub(super) struct Found {
     pub tests: Tests,
 }
 
+/// The result of a search that a tick's budget does not cover: nothing was visited.
+const NOT_BEGUN: Found = Found { complete: f32::INFINITY, beyond: 0.0, tests: Tests::NONE };
+
 impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// Adds the contacts of a pair. Returns the tests made.
     pub(in crate::query) fn add<I: Index, V: VertexTable + ?Sized, T: Tool>(
@@ -31,6 +35,9 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         options: &Options,
     ) -> Result<Tests, QueryError> {
         self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
+            if !options.covers(LIST) {
+                return Ok(NOT_BEGUN);
+            }
             let mut low = Low::new(basins, limit, pair);
             let search = over_range(pair, stack, options)?;
             let visit = |row, at: &AxisPair| low.add(row, at);
@@ -48,6 +55,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         mut front: RangeFrontMut<'_>,
     ) -> Result<Tests, QueryError> {
         self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
+            if !options.covers(LIST) {
+                front.keep(false);
+                return Ok(NOT_BEGUN);
+            }
             let mut low = Low::new(basins, limit, pair);
             let search = over_range(pair, stack, options)?;
             let visit = |row, at: &AxisPair| low.add(row, at);

@@ -84,25 +84,33 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let cost = Cost::M7_TICK;
     let deadlines = KINDS.iter().flat_map(|&bits| DEADLINES.map(|most| (bits, most)));
     let deadlines: Vec<_> = deadlines.collect();
-    let cases: Vec<_> = scenes
+    let cases: Vec<_> = deadlines
         .iter()
-        .flatten()
-        .flat_map(|scene| deadlines.iter().map(move |&(bits, most)| (scene, bits, most)))
+        .flat_map(|&(bits, most)| {
+            let scenes = scenes.iter().flatten().zip(&names);
+            scenes.map(move |(scene, name)| (scene, name, bits, most))
+        })
         .collect();
-    let shares = cases.par_iter().map(|&(scene, bits, most)| {
+    let shares = cases.par_iter().map(|&(scene, name, bits, most)| {
         let ticks = on_board(scene, bits, Budget::for_instructions(most, &cost))?;
         let shares = ticks.iter().map(|tick| f64::from(tick.instructions) / f64::from(most));
-        Ok(shares.collect::<Vec<f64>>())
+        let shares: Vec<f64> = shares.collect();
+        let (kind, largest) = (if bits == 0 { "pair" } else { "contacts" }, largest(&shares));
+        println!("{kind} within {most} instructions, {name}: at most {:.1} %", 100.0 * largest);
+        Ok(shares)
     });
     let shares = shares.collect::<Result<Vec<_>>>()?.concat();
     figures.note("tick.ticks", shares.len() as f64);
     figures.text("tick.surfaces", names.join(", "));
     figures.note("tick.late", shares.iter().filter(|&&share| share > 1.0).count() as f64);
-    let largest = shares.iter().copied().fold(0.0, f64::max);
-    figures.note("tick.largest-share", (1_000.0 * largest).round() / 10.0);
+    figures.note("tick.largest-share", (1_000.0 * largest(&shares)).round() / 10.0);
     figures.note("tick.base", f64::from(cost.base));
     figures.note("tick.test", f64::from(cost.node_test));
     Ok(Outcome::Passed)
+}
+
+fn largest(shares: &[f64]) -> f64 {
+    shares.iter().copied().fold(0.0, f64::max)
 }
 
 /// Fits the line, and writes it into the core crate.
