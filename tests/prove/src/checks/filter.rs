@@ -30,7 +30,7 @@ pub const CHECK: Check = Check {
             unit: "of {filter.ticks} ticks, {filter.near} of them within 5 mm; the worst was {filter.worst} mm below",
             limits: "Two capsules, ten scenes: corner, groove, gaps, spike, plate of 0.2 mm, ball, heart, brain; tissue at its limit of \
                      up to 300 mm/s, swinging, waving, drifting, closing; frames late and lost; periods of 0.5 to 4 ms; an eighth of the \
-                     walks take the worst of three commands. Truth by exhaustive search in f64 at six instants of a tick.",
+                     walks take the worst of three commands, and an eighth lead to the medial axis. Truth by exhaustive search in f64 at six instants of a tick.",
         },
         Promise {
             id: "filter.uncertain",
