@@ -15,7 +15,7 @@ use crate::{BusStatus, Receiver, Robot, TICK_RATE, Trust, time_of};
 
 /// The budget for a tick's closest pair, side and depth. On frames chosen to be expensive the whole tick stays below
 /// 120,000 instructions (docs/evidence/guarantees.md). If the budget ends a search, the last tick's bounds stay valid.
-pub const BUDGET: Budget = Budget::for_instructions(90_000, &Cost::M7_TICK);
+pub const BUDGET: Budget = Budget::for_instructions(80_000, &Cost::M7_TICK);
 
 /// How exactly the depth of a crossing axis is found, in mm: this changes the spring's force by a quarter of a newton,
 /// and few depths exceed the budget.
