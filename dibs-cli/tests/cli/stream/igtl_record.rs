@@ -161,7 +161,7 @@ fn the_bridge_is_recorded() {
             page.push('\n');
         }
     }
-    page += "\n`cargo xtask demo --bridge` is the same to the emulated board.\n";
+    page += "\n`cargo xtask demo --bridge` is the same to the emulated board: a [run](demo/bridge/report.json).\n";
     println!("{page}");
     if env::var_os("DIBS_WRITE").is_some() {
         let evidence = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/evidence").into();
