@@ -125,4 +125,12 @@ pub const ANOMALIES: &[Anomaly] = &[
         "Let the source send the time of its measurement, or none.",
         "dibs-cli/src/stream/part.rs",
     ),
+    anomaly(
+        "K-22",
+        "`Cost` is fitted on tables of vertices. A vertex that nodes carry costs {m7.nodes.vertex} to {m7.nodes.vertex.between} \
+         instructions: there a tick or a filter takes several times the instructions of its budget, and the demo with \
+         `--bridge --nodes` misses deadlines.",
+        "A budget in tests, measured with the nodes.",
+        "dibs-nostd/src/query/cost.rs",
+    ),
 ];
