@@ -170,8 +170,8 @@ fn a_posed_frame_is_as_old_as_its_older_part() {
         let pause = PAUSE.as_millis() as u32;
         let least = (1..).map(|step: u32| step * pause);
         if is_old {
-            // A millisecond less for what is rounded down.
-            let grows = ages.iter().zip(least).all(|(&age, least)| age + 1 >= least);
+            // Ages count from the quickest message so far, which a loaded computer may hold up, too.
+            let grows = ages.iter().zip(least).all(|(&age, least)| age + pause / 2 >= least);
             assert!(grows, "phase {phase}: {ages:?}");
         } else {
             // A loaded computer may hold some up.
