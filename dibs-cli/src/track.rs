@@ -35,7 +35,8 @@ it moved before (extrapolated). One line a tick on standard output, and what it 
 Where a budget ends the search for the closest pair, is_cut is true and the certified interval is wider: it is that of the
 last ticks, less what has moved since. is_kept says that the side is the last tick's. is_cut says nothing of the list of
 contacts: contacts_bound says how far that is complete, and is below the margin where the budget ended it; it is null where
-nothing is certain. A budget counts by the fit of a tracker's ticks, with contacts or without.")]
+nothing is certain. A budget counts by the fit of a tracker's ticks, with contacts or without, on a surface whose frames
+have the vertices: one that nodes carry takes several times as much.")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,

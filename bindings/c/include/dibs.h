@@ -893,7 +893,7 @@ enum dibs_cost
    */
   DIBS_COST_X86_CAPSULE = 3,
   /**
-   * A tick of a tracker or guard on a Cortex-M7, with contacts or without.
+   * A tick of a tracker or guard on a Cortex-M7, with contacts or without; not on a surface that nodes carry.
    */
   DIBS_COST_M7_TICK = 4,
 };

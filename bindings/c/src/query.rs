@@ -341,7 +341,7 @@ pub enum dibs_cost {
     X86Sphere = 2,
     /// A capsule on x86-64.
     X86Capsule = 3,
-    /// A tick of a tracker or guard on a Cortex-M7, with contacts or without.
+    /// A tick of a tracker or guard on a Cortex-M7, with contacts or without; not on a surface that nodes carry.
     M7Tick = 4,
 }
 

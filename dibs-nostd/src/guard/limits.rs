@@ -56,7 +56,8 @@ impl GuardLimits {
         self
     }
 
-    /// The work limit of a tick: [`Budget::for_instructions`] by [`Cost::M7_TICK`](crate::Cost::M7_TICK).
+    /// The work limit of a tick: [`Budget::for_instructions`] by [`Cost::M7_TICK`](crate::Cost::M7_TICK). No cost is fitted
+    /// for a surface that nodes carry: measure its ticks, and use [`Budget::new`].
     #[must_use]
     pub const fn budget(mut self, budget: Budget) -> Self {
         self.options = self.options.budget(budget);

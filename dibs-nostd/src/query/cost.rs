@@ -16,9 +16,10 @@ use super::Budget;
 ///
 /// [`M7_TICK`](Self::M7_TICK) is for the ticks of a tracker or guard, with contacts or without. A tick within a budget
 /// also pays for its work between tests, so its instructions follow its tests more closely: the constants are a line
-/// above the ticks of a path, plus a margin of 15 %. They do not hold for a front that is full
-/// ([`Fallback::Full`](crate::Fallback::Full)), and do not include a guard's own work. The contacts were those of a
-/// tracker [`with_range`](crate::Tracker::with_range), in a list of eight.
+/// above the ticks of a path, plus a margin of 15 %. They hold for a moving surface whose frames have the vertices. Where
+/// nodes carry the surface, a vertex is computed when it is read, and a tick can take several times as much. They do not
+/// hold for a front that is full ([`Fallback::Full`](crate::Fallback::Full)), and do not include a guard's own work. The
+/// contacts were those of a tracker [`with_range`](crate::Tracker::with_range), in a list of eight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

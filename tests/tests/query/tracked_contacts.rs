@@ -274,7 +274,7 @@ fn a_jump_far_away_starts_the_range_anew() {
     assert!(compared > 60, "{compared}");
 }
 
-/// The closest pair takes what it needs of a budget, and the list the rest: it pays for its start, too.
+/// The list is searched within the rest of the budget after the closest pair, and pays for its start, too.
 #[test]
 fn a_tick_with_contacts_takes_no_more_than_its_budget() {
     const START: u32 = 80;

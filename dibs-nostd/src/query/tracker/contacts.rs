@@ -18,8 +18,8 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
     /// which searches near parts first.
     ///
     /// Cost: that of [`closest`](Self::closest), a few instructions for each opened node, and a query's comparisons of
-    /// the triangles within the margin. Of a budget the closest pair takes what it needs, and the list the rest: where
-    /// that does not cover the start of its search, the closest pair is its only contact.
+    /// the triangles within the margin. The closest pair is searched first, and the list within the rest of the budget.
+    /// If the rest does not cover the start of that search, the closest pair is the list's only contact.
     ///
     /// # Errors
     /// Same as [`Query::contacts`](crate::Query::contacts).

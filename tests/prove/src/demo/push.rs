@@ -68,7 +68,8 @@ struct Expected {
     force: DVec3,
     /// Angle (radians) between the recorded direction and that of the recorded points.
     turned: f64,
-    /// Whether the points are those of the last tick's triangle and axis parameter, now.
+    /// Whether the pair has the last tick's triangle and axis parameter, and its direction follows from their present
+    /// positions.
     is_last_pair: bool,
     /// Distance (mm) of the axis' recorded point minus that of its nearest point. If the axis is parallel to the
     /// surface, many points are nearest within rounding, and each has its own direction.

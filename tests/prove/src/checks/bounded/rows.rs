@@ -83,7 +83,7 @@ impl Row {
         (self.scene)(TICKS)
     }
 
-    /// The budget that was measured to fit; with contacts that of the cost model.
+    /// The row's budget: measured to fit, or by the cost model if its ticks list contacts.
     pub fn budget(&self) -> Result<Budget> {
         if self.bits & tick::CONTACTS != 0 {
             return Ok(self.of_user());
