@@ -26,12 +26,16 @@ fn surface() -> Result<()> {
     for variable in ["DIBS_MESH", "DIBS_STRETCH", "DIBS_LIMITS", "DIBS_NODES"] {
         println!("cargo::rerun-if-env-changed={variable}");
     }
+    println!("cargo:rustc-check-cfg=cfg(nodes)");
     let path = env::var_os("DIBS_MESH").map(PathBuf::from);
     let tree = match (path, env::var("DIBS_NODES")) {
         (None, Err(_)) => dibs_build::tree(generate::heart(10_272)?.mesh),
         (Some(path), Err(_)) => dibs_build::tree(path),
         (None, Ok(_)) => bail!("DIBS_NODES takes a mesh, in DIBS_MESH"),
-        (Some(path), Ok(cells)) => carried(path, &cells)?,
+        (Some(path), Ok(cells)) => {
+            println!("cargo:rustc-cfg=nodes");
+            carried(path, &cells)?
+        }
     };
     let tree = match (env::var_os("DIBS_LIMITS"), env::var("DIBS_STRETCH")) {
         (Some(file), _) => tree.limits(file),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::DVec3;
 use dibs_nostd::filter::{Admitted, Filter, Motion, Reason, Uncertainty};
-use dibs_nostd::{Capsule, Cost, Index, MovingSurface, Odometer, Options, Tracker, Tree};
+use dibs_nostd::{Capsule, Index, MovingSurface, Odometer, Options, Tracker, Tree};
 
 use crate::query::STACK;
 use crate::recorded::{Moving, Recorded};
@@ -67,8 +67,7 @@ pub struct Args {
     /// Time constant of the approach to the stand-off, which avoids jumps; 0 for none
     #[arg(long, value_name = "MS", default_value_t = 0.0)]
     approach: f32,
-    /// Instructions of a Cortex-M7 that the queries of a tick may take, as estimated for plain queries: deep in the
-    /// tissue they take up to twice as many
+    /// Instructions of a Cortex-M7 that the searches of a tick may take
     #[arg(long, value_name = "N", default_value_t = 200_000)]
     budget: u32,
     /// Print a JSON object a line, and one with the totals on standard error
@@ -211,7 +210,7 @@ fn filter<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     }
     let filter = stand_off::filter(&args.stand_off, robot, (tree, &args.moving.tree))?
         .approach(args.approach / 1_000.0)?
-        .budget(args.budget, Cost::M7_CAPSULE);
+        .budget(args.budget);
     // Rounded up.
     let behind = (f64::from(tissue) * age / 1_000.0 * (1.0 + 2e-7)) as f32;
     let uncertainty = Uncertainty::new(tissue).error(behind).error(args.registration);

@@ -267,7 +267,7 @@ impl<I: Index> Session<'_, I> {
             LocalTool::Sphere(_) => &Cost::M7_SPHERE,
             LocalTool::Capsule(_) => &Cost::M7_CAPSULE,
         };
-        let cost = if self.tracker.is_some() { &Cost::M7_TICK } else { of_query };
+        let cost = if self.tracker.is_some() { &Cost::of_tick(self.tree) } else { of_query };
         match tool {
             LocalTool::Sphere(sphere) => self.closest(surface, sphere, stretch, cost),
             LocalTool::Capsule(capsule) => self.closest(surface, capsule, stretch, cost),

@@ -32,7 +32,7 @@ use core::num::NonZeroU32;
 use dibs_nostd::{Millis, Ticks};
 
 pub use control::{
-    BUDGET, Control, DAMPING, MARGIN, MAX_FORCE, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS, start,
+    Control, DAMPING, MARGIN, MAX_FORCE, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS, instructions, start,
 };
 pub use fingerprint::fingerprint;
 pub use hand::Hand;

@@ -19,7 +19,7 @@ fn main() -> io::Result<()> {
         for argument in ["--nmagic", "-Tlink.x"] {
             for name in [
                 "probe", "torn", "receive", "bus", "track", "side", "chain", "filter", "weights",
-                "nodes", "tick",
+                "nodes", "carried", "tick",
             ] {
                 println!("cargo:rustc-link-arg-bin={name}={argument}");
             }

@@ -7,7 +7,7 @@ use dibs_build::{Builder, Mesh, Motion as Recorded, generate};
 use dibs_nostd::constraint::{EnergyAccount, ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::filter::{Filter, Motion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Contacts, Cost, Odometer, Options, Query, Sphere, Tracker, Unavailable};
+use dibs_nostd::{Contacts, Odometer, Options, Query, Sphere, Tracker, Unavailable};
 use glam::Vec3;
 
 use crate::surfaces::{ball, sheet};
@@ -161,7 +161,7 @@ impl Scene {
         let command = Hand::free(self.push * Hand::PUSH);
         let most = 2.0 * command.length();
         // The gap's slivers take long to tell sides apart; budgets are the subject of other checks.
-        let filter = Filter::new(0.0, most).expect("in range").budget(2_000_000, Cost::M7_SPHERE);
+        let filter = Filter::new(0.0, most).expect("in range").budget(2_000_000);
         let uncertainty = Uncertainty::new(self.fastest());
         let mut at = self.from;
         let mut pushed = Pushed { least: f32::INFINITY, step: 0.0, given: 0.0 };

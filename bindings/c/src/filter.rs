@@ -46,9 +46,9 @@ pub struct dibs_filter {
     /// A tool approaches its stand-off no faster than its distance from it divided by this time (s), at least 0; 0 for
     /// no such limit.
     pub approach: f32,
-    /// Most instructions of all queries of a tick, by `cost`.
+    /// Most instructions of all searches of a tick, by `cost`.
     pub instructions: u32,
-    /// A `dibs_cost`, but not that of a tracker's tick.
+    /// `DIBS_COST_M7_TICK`, which is `DIBS_COST_M7_NODES_TICK` for a tree with nodes; not a query's.
     pub cost: u32,
     /// As in `dibs_options`.
     pub depth_tolerance: f32,
@@ -82,12 +82,13 @@ impl dibs_filter {
             *place = (u8::try_from(label).map_err(|_| dibs_code::Argument)?, stand_off);
         }
         let filter = filter.stand_off_of(labels)?;
-        let cost = *cost_of(self.cost)?;
-        // A filter counts its queries by a plain query's fit.
-        if cost == Cost::M7_TICK {
-            return Err(dibs_code::Argument);
+        let filter = filter.budget(self.instructions).options(options);
+        // Its searches are ticks, whose costs are not a plain query's.
+        match *cost_of(self.cost)? {
+            Cost::M7_TICK => Ok(filter),
+            cost if cost == Cost::M7_NODES_TICK => Ok(filter.cost(cost)),
+            _ => Err(dibs_code::Argument),
         }
-        Ok(filter.budget(self.instructions, cost).options(options))
     }
 }
 
@@ -97,7 +98,7 @@ impl dibs_filter {
 /// @param speed      Largest speed (mm/s) of the robot.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_filter_of(stand_off: f32, speed: f32) -> dibs_filter {
-    let (instructions, cost) = (200_000, dibs_cost::M7Capsule as u32);
+    let (instructions, cost) = (200_000, dibs_cost::M7Tick as u32);
     let (lever, approach, depth_tolerance) = (0.0, 0.0, 0.0);
     let labels = [dibs_stand_off_of { label: 0, stand_off: 0.0 }; DIBS_FILTER_LABELS];
     let label_count = 0;
@@ -249,8 +250,8 @@ impl Command<'_> {
 /// its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
 /// its tracker continues in the next tick.
 ///
-/// Cost: at most the filter's instructions for the queries, as estimated by a fit to plain queries (deep in the tissue,
-/// ticks measured up to twice as many), and for each motion that is tried usually 1,000, at most 40,000.
+/// Cost: at most the filter's instructions for the searches, and for each motion that is tried usually 1,000, at most
+/// 40,000.
 ///
 /// @param filter       The filter.
 /// @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.

@@ -341,8 +341,10 @@ pub enum dibs_cost {
     X86Sphere = 2,
     /// A capsule on x86-64.
     X86Capsule = 3,
-    /// A tick of a tracker or guard on a Cortex-M7, with contacts or without; not on a surface that nodes carry.
+    /// A tick of a tracker or guard on a Cortex-M7, with contacts or without.
     M7Tick = 4,
+    /// The same on a surface that nodes carry.
+    M7NodesTick = 5,
 }
 
 /// The budget of a query or tick that must end within this number of instructions, by a fitted model with a margin.
@@ -364,12 +366,13 @@ pub extern "C" fn dibs_budget_for_instructions(
 
 /// The cost model that a number from C stands for.
 pub(crate) fn cost_of(cost: u32) -> Result<&'static Cost, dibs_code> {
-    const COSTS: [(dibs_cost, &Cost); 5] = [
+    const COSTS: [(dibs_cost, &Cost); 6] = [
         (dibs_cost::M7Sphere, &Cost::M7_SPHERE),
         (dibs_cost::M7Capsule, &Cost::M7_CAPSULE),
         (dibs_cost::X86Sphere, &Cost::X86_64_SPHERE),
         (dibs_cost::X86Capsule, &Cost::X86_64_CAPSULE),
         (dibs_cost::M7Tick, &Cost::M7_TICK),
+        (dibs_cost::M7NodesTick, &Cost::M7_NODES_TICK),
     ];
     let found = COSTS.iter().find(|(number, _)| *number as u32 == cost);
     found.map(|(_, cost)| *cost).ok_or(dibs_code::Argument)

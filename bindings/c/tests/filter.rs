@@ -10,7 +10,7 @@ use std::process::Command;
 use dibs_build::{Builder, generate};
 use dibs_nostd::filter::{Filter, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::{Capsule, Cost, MovingTable, Odometer, Tracker, Tree};
+use dibs_nostd::{Capsule, MovingTable, Odometer, Tracker, Tree};
 
 use crate::programs::{include, library, run, tool};
 
@@ -83,7 +83,7 @@ fn admitted_motions_have_the_same_bits() {
         let command = Motion::new(chain[1].1, Vec3::new(x, y, z), Vec3::new(a, b, c));
         let instructions = if tick % 5 == 4 { 30_000 } else { 200_000 };
         let filter = Filter::new(1.0, 400.0).expect("a filter");
-        let filter = filter.budget(instructions, Cost::M7_CAPSULE);
+        let filter = filter.budget(instructions);
         let filter = if tick % 3 == 2 { filter.approach(0.02).expect("a time") } else { filter };
         let filter = if tick % 7 == 6 { filter.lever(50.0).expect("a lever") } else { filter };
         let of_vessel = if tick % 4 == 3 { 1.0 } else { 3.0 };

@@ -133,9 +133,8 @@ class Filter(Remade):
     `stand_off_of`, up to 7, say `{VESSEL: 3.0}`: each of these counts as one more tool for every tool. It is for a robot
     that moves its reference point with at most `speed` (mm/s). A rotation by one radian counts as a translation by the
     `lever` arm (mm), by default the distance from the reference point to the farthest end of a tool's axis. If `approach` (s) is not 0, a tool approaches its
-    stand-off no faster than its distance from it divided by `approach`. `instructions` limits the queries of a tick in
-    instructions of a Cortex-M7, by a cost model fitted to plain queries: deep in the tissue they take up to twice as
-    many. A motion that is not verified within the limit is not admitted.
+    stand-off no faster than its distance from it divided by `approach`. `instructions` limits the searches of a tick, in
+    instructions of a Cortex-M7 by the fitted cost model. A motion that is not verified within the limit is not admitted.
     """
 
     def __init__(

@@ -149,7 +149,8 @@ impl Tracker {
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
         let mut options = options(surface.get());
         if let Some(instructions) = instructions {
-            options = options.budget(Budget::for_instructions(instructions, &Cost::M7_TICK));
+            let cost = of_any_width!(self.tree.view(), tree => Cost::of_tick(&tree));
+            options = options.budget(Budget::for_instructions(instructions, &cost));
         }
         // While a thread waits for the list, it releases Python, so that the thread that holds the list can return.
         let list = self.contacts.lock_py_attached(py);
@@ -245,7 +246,7 @@ impl Filter {
             None => filter,
         };
         let filter = filter.approach(approach).map_err(named)?;
-        let filter = filter.budget(instructions, Cost::M7_CAPSULE);
+        let filter = filter.budget(instructions);
         let mut labels = [(0, stand_off); LABELS];
         let found = of_labels.len();
         if found > LABELS {

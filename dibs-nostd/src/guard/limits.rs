@@ -4,7 +4,7 @@
 
 use super::Rows;
 use crate::failsafe::{LimitError, Limits, Watch};
-use crate::{Budget, Index, Millis, Options, SurfaceLimits, Tree};
+use crate::{Budget, Cost, Index, Millis, Options, SurfaceLimits, Tree};
 
 /// The limits on the surface, and the options of a tick's query.
 ///
@@ -22,7 +22,9 @@ pub struct GuardLimits {
     is_automatic: bool,
     has_transit: bool,
     pub(super) rate: f32,
-    pub(super) options: Options,
+    options: Options,
+    /// The instructions of a tick, instead of the options' budget.
+    instructions: Option<u32>,
 }
 
 /// The default reach, in units of half the largest extent of the rest shape.
@@ -46,6 +48,7 @@ impl GuardLimits {
             has_transit: true,
             rate: 1_000.0,
             options: Options::new(),
+            instructions: None,
         }
     }
 
@@ -56,11 +59,19 @@ impl GuardLimits {
         self
     }
 
-    /// The work limit of a tick: [`Budget::for_instructions`] by [`Cost::M7_TICK`](crate::Cost::M7_TICK). No cost is fitted
-    /// for a surface that nodes carry: measure its ticks, and use [`Budget::new`].
+    /// The work limit of a tick, in instructions of a Cortex-M7: [`Budget::for_instructions`] by the tree's
+    /// [`Cost::of_tick`].
+    #[must_use]
+    pub const fn instructions(mut self, instructions: u32) -> Self {
+        self.instructions = Some(instructions);
+        self
+    }
+
+    /// The work limit of a tick in tests, for a processor whose [`Cost`] you measured.
     #[must_use]
     pub const fn budget(mut self, budget: Budget) -> Self {
         self.options = self.options.budget(budget);
+        self.instructions = None;
         self
     }
 
@@ -99,6 +110,16 @@ impl GuardLimits {
     pub const fn surfaces(mut self, limits: SurfaceLimits) -> Self {
         self.surface = Some(limits);
         self
+    }
+
+    /// The options of a tick.
+    pub(super) fn of_tick<I: Index>(&self, tree: &Tree<'_, I>) -> Options {
+        match self.instructions {
+            Some(most) => {
+                self.options.budget(Budget::for_instructions(most, &Cost::of_tick(tree)))
+            }
+            None => self.options,
+        }
     }
 
     /// The fail-safe machine's limits.

@@ -90,7 +90,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
             tree: bytes,
             tracker: Tracker::with_range(tree)?,
             failsafe: FailSafe::new(limits.failsafe()?),
-            options: limits.options,
+            options: limits.of_tick(tree),
             rate: limits.rate,
             speed: limits.speed,
             before: None,

@@ -3,6 +3,8 @@
 // Requirement: A-05
 
 use super::Budget;
+use crate::tree::PathKind;
+use crate::{Index, Tree};
 
 /// A fitted bound on a query's cost: `base + n * node_test + t * triangle_test`, in instructions, where `n` and `t` are
 /// the node and triangle tests that an answer counts. A [`Budget`] limits the tests exactly; the instructions of a test
@@ -14,12 +16,12 @@ use super::Budget;
 /// cycles per instruction. They hold for [`Query::closest`](crate::Query::closest), vertex tables that are slices of
 /// `Vec3`, and the firmware's profile or an optimised build.
 ///
-/// [`M7_TICK`](Self::M7_TICK) is for the ticks of a tracker or guard, with contacts or without. A tick within a budget
-/// also pays for its work between tests, so its instructions follow its tests more closely: the constants are a line
-/// above the ticks of a path, plus a margin of 15 %. They hold for a moving surface whose frames have the vertices. Where
-/// nodes carry the surface, a vertex is computed when it is read, and a tick can take several times as much. They do not
-/// hold for a front that is full ([`Fallback::Full`](crate::Fallback::Full)), and do not include a guard's own work. The
-/// contacts were those of a tracker [`with_range`](crate::Tracker::with_range), in a list of eight.
+/// [`M7_TICK`](Self::M7_TICK) is for the ticks of a tracker, guard or filter, with contacts or without, on a moving surface
+/// whose frames have the vertices; [`M7_NODES_TICK`](Self::M7_NODES_TICK) for one that nodes carry, whose vertices are
+/// computed when they are read. A tick within a budget also pays for its work between tests, so its instructions follow
+/// its tests more closely: the constants are a line above the ticks of a path, plus a margin of 15 %. They do not include
+/// a guard's own work. The contacts were those of a tracker [`with_range`](crate::Tracker::with_range), in a list of eight.
+/// No cost is fitted for the ticks on a surface of [modes](crate::modes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -35,6 +37,16 @@ pub struct Cost {
 }
 
 impl Cost {
+    /// The cost of a tick on a tree's surface, on a Cortex-M7: [`M7_NODES_TICK`](Self::M7_NODES_TICK) if nodes carry it,
+    /// [`M7_TICK`](Self::M7_TICK) if frames have its vertices.
+    #[must_use]
+    pub const fn of_tick<I: Index>(tree: &Tree<'_, I>) -> Self {
+        match tree.paths() {
+            PathKind::Volume => Self::M7_NODES_TICK,
+            _ => Self::M7_TICK,
+        }
+    }
+
     /// An upper bound by the fit on the instructions of a query with this many tests.
     ///
     /// ```

@@ -5,6 +5,7 @@ mod contacts;
 mod corners;
 mod cost;
 mod cost_m7;
+mod cost_nodes;
 mod cost_tick;
 mod cost_x86_64;
 mod depth;

@@ -117,7 +117,7 @@ impl Options {
         self.within(budget)
     }
 
-    /// The same options with another budget, for a part of the work, or for a filter, which counts by a query's fit.
+    /// The same options with another budget, for a part of the work.
     pub(crate) const fn within(mut self, budget: Budget) -> Self {
         self.budget = budget;
         self

@@ -15,7 +15,7 @@ use cortex_m_semihosting::hprintln;
 use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::GuardLimits;
-use dibs_nostd::{Advance, Budget, Capsule, Cost, Error, Millis};
+use dibs_nostd::{Advance, Capsule, Error, Millis};
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
@@ -28,7 +28,7 @@ static SURFACE: heart::Surface = heart::Surface::new();
 const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
     .without_transit()
     .automatic()
-    .budget(Budget::for_instructions(400_000, &Cost::M7_TICK));
+    .instructions(400_000);
 
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static TICK: Signal<CriticalSectionRawMutex, Millis> = Signal::new();

@@ -29,7 +29,7 @@ mod app {
     use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
     use dibs_nostd::glam::Vec3;
     use dibs_nostd::guard::GuardLimits;
-    use dibs_nostd::{Budget, Capsule, Cost, Error, Millis};
+    use dibs_nostd::{Capsule, Error, Millis};
 
     use crate::board::{self, end};
     use crate::{SURFACE, heart};
@@ -38,7 +38,7 @@ mod app {
     const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
         .without_transit()
         .automatic()
-        .budget(Budget::for_instructions(400_000, &Cost::M7_TICK));
+        .instructions(400_000);
 
     /// Number of control ticks so far: the time, in ms.
     static NOW: AtomicU32 = AtomicU32::new(0);

@@ -7,7 +7,7 @@ use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Capsule, Cost, MeasuredStretch, MovingSurface, Odometer, Options, Tracker, Tree,
+    Capsule, MeasuredStretch, MovingSurface, Odometer, Options, Tracker, Tree,
     measure_stretch,
 };
 
@@ -114,7 +114,7 @@ fn walk<const OPENED: usize>(
     let instructions = word(machine)?;
     let filter = Filter::new(stand_off, robot).map_err(|_| Fault)?;
     let filter = filter.approach(approach).map_err(|_| Fault)?;
-    let filter = filter.budget(instructions, Cost::M7_CAPSULE);
+    let filter = filter.budget(instructions);
     let walk = Walk { filter, period: number(machine)? };
     let is_measured = word(machine)? == 1;
     for tracker in &mut *trackers {

@@ -9,6 +9,7 @@ pub mod bus;
 pub mod filter;
 pub mod nodes;
 pub mod receive;
+pub mod rows;
 pub mod tick;
 pub mod track;
 pub mod weights;

@@ -4,17 +4,18 @@
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Budget, Capsule, Contacts, Fallback, MeasuredStretch, MovingSurface, Odometer, Options,
-    Proximity, Query, Side, Step, Tracker, Tree, TriangleRow, measure_stretch,
+    Budget, Capsule, Contacts, Fallback, MeasuredStretch, MovingSurface, Options, Proximity, Query,
+    Side, Step, Tracker, Tree, TriangleRow,
 };
 
+use crate::rows::Rows;
 use crate::{Fault, MARGIN, Machine, point, put, word};
 
 /// The meanings of the word at the start of a record.
 pub mod command {
     /// End of the script.
     pub const END: u32 = 0;
-    /// The next frame: three `f32` for each of the tree's vertices.
+    /// The next frame: three `f32` for each of the tree's vertices, or nodes.
     pub const FRAME: u32 = 1;
     /// A tick: the surface and the question ([`tick`](super::tick)), the surface's share of the way between frames, the
     /// axis' ends, of a chain all [`JOINTS`](super::JOINTS), and the capsules' radius. Answered by
@@ -107,12 +108,12 @@ impl Default for Trackers {
     }
 }
 
-/// Follows a script to its end. Of a tick's bits those in `KINDS` count, so that a program may hold the tracker once, as
-/// a controller does.
+/// Follows a script to its end, whose frames have these rows. Of a tick's bits those in `KINDS` count, so that a program may
+/// hold the tracker once, as a controller does.
 ///
 /// # Errors
 /// [`Fault`] where the script makes no sense, or a query fails.
-pub fn run<const KINDS: u32>(
+pub fn run<R: Rows, const KINDS: u32>(
     memory: &'static mut Memory,
     Trackers { links, lists }: &mut Trackers,
     machine: &mut impl Machine,
@@ -121,7 +122,8 @@ pub fn run<const KINDS: u32>(
     let Memory { tree, frames } = memory;
     machine.read(tree.get_mut(..length.next_multiple_of(4)).ok_or(Fault)?)?;
     let tree = Tree::<u16>::from_bytes(tree.get(..length).ok_or(Fault)?).map_err(|_| Fault)?;
-    let count = tree.vertex_count() as usize;
+    let made = R::of(&tree)?;
+    let count = made.count() as usize;
     let [before, after] = frames.each_mut().map(|rows| rows.get_mut(..count));
     let (mut before, mut after) = (before.ok_or(Fault)?, after.ok_or(Fault)?);
     for tracker in &mut *links {
@@ -129,7 +131,7 @@ pub fn run<const KINDS: u32>(
     }
     let query = Query::new(&tree).map_err(|_| Fault)?;
     let mut session = Session { query, trackers: links, lists, last: None };
-    let mut odometer = Odometer::new(&tree);
+    let mut odometer = made.odometer();
     let mut stretch: Option<MeasuredStretch> = None;
     let mut next = word(machine)?;
     while next == command::FRAME {
@@ -137,10 +139,10 @@ pub fn run<const KINDS: u32>(
         for row in after.iter_mut() {
             *row = point(machine)?;
         }
-        let measured = measure_stretch(&tree, &*after).map_err(|_| Fault)?;
+        let measured = made.measure(after)?;
         let both = stretch.unwrap_or(measured).or_larger(measured).ok_or(Fault)?;
         let step = odometer.step(&*before, &*after);
-        next = session.ticks::<KINDS>(&step, both, measured, machine)?;
+        next = session.ticks::<R, KINDS>(&made, &step, [both, measured], machine)?;
         stretch = Some(measured);
     }
     if next == command::END { Ok(()) } else { Err(Fault) }
@@ -170,11 +172,11 @@ struct Found {
 
 impl Session<'_, '_> {
     /// Runs the ticks of a frame. Returns the first other command.
-    fn ticks<const KINDS: u32>(
+    fn ticks<R: Rows, const KINDS: u32>(
         &mut self,
+        made: &R,
         step: &Step<'_, [Vec3], [Vec3]>,
-        both: MeasuredStretch,
-        measured: MeasuredStretch,
+        [both, measured]: [MeasuredStretch; 2],
         machine: &mut impl Machine,
     ) -> Result<u32, Fault> {
         loop {
@@ -192,9 +194,15 @@ impl Session<'_, '_> {
             }
             let radius = f32::from_bits(word(machine)?);
             let answer = if kind & tick::INTERPOLATED == 0 {
-                self.ask::<KINDS>(&step.after(), joints, radius, kind, measured, machine)
+                let rows = step.after();
+                let mut room = Default::default();
+                let surface = made.surface(&rows, &mut room);
+                self.ask::<KINDS>(surface, joints, radius, kind, measured, machine)
             } else {
-                self.ask::<KINDS>(&step.at(share), joints, radius, kind, both, machine)
+                let rows = step.at(share);
+                let mut room = Default::default();
+                let surface = made.surface(&rows, &mut room);
+                self.ask::<KINDS>(surface, joints, radius, kind, both, machine)
             }?;
             put(machine, &answer)?;
         }

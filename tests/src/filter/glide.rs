@@ -3,7 +3,7 @@
 use dibs_build::{Builder, Mesh, Motion as Recorded};
 use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, Contacts, Cost, Odometer, Options, Query, Tracker, measure_stretch};
+use dibs_nostd::{Capsule, Contacts, Odometer, Options, Query, Tracker, measure_stretch};
 use glam::Vec3;
 
 use super::{Asked, Listener, Settings};
@@ -76,7 +76,7 @@ pub fn glide_told(
     let frames: Vec<Vec<Vec3>> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
     let tissue = fastest(motion);
     let filter = Filter::new(STAND_OFF, ROBOT).expect("in range");
-    let filter = filter.budget(INSTRUCTIONS, Cost::M7_CAPSULE);
+    let filter = filter.budget(INSTRUCTIONS);
     listener.walk(&Settings {
         stand_off: STAND_OFF,
         robot: ROBOT,

@@ -5,7 +5,7 @@ use std::ops::AddAssign;
 
 use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, Cost, MovingSurface, Odometer, Tracker};
+use dibs_nostd::{Capsule, MovingSurface, Odometer, Tracker};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -173,7 +173,7 @@ pub fn walk_by_label<const LABELS: usize>(
     let mut rng = Rng::with_seed(seed);
     let tree = scene.tree.tree::<u16>().expect("16-bit indices");
     let filter = Filter::new(episode.stand_off, episode.robot).expect("in range");
-    let filter = filter.budget(episode.instructions, Cost::M7_CAPSULE);
+    let filter = filter.budget(episode.instructions);
     let filter = filter.approach(episode.approach).expect("in range");
     // A scene may be so small that no triangle has the label, which a filter would refuse.
     let labels =

@@ -255,7 +255,7 @@ fn nothing_unverified_is_admitted() {
     let tool = capsule(Vec3::Z * 50.0, Vec3::Z * 90.0);
     let mut admitted = 0;
     for budget in [0, 2_000, 5_000, 10_000, 30_000, 100_000] {
-        bench.filter = bench.filter.budget(budget, Cost::M7_CAPSULE);
+        bench.filter = bench.filter.budget(budget);
         let found = bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer");
         assert!(found.instructions <= budget, "{budget}: {found:?}");
         let is_admitted = found.reason == Reason::Commanded;
@@ -277,13 +277,13 @@ fn no_pair_goes_without_an_answer() {
     let mut trackers =
         tools.map(|_| Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough"));
     let command = Motion::translation(Vec3::X * 0.1);
-    for budget in [200_000, 3 * Cost::M7_CAPSULE.base] {
+    for budget in [200_000, 3 * Cost::M7_TICK.base] {
         let mut pairs: Vec<_> = trackers
             .iter_mut()
             .zip(&tools)
             .map(|(tracker, tool)| (tracker, &surface, tool))
             .collect();
-        let filter = bench.filter.budget(budget, Cost::M7_CAPSULE);
+        let filter = bench.filter.budget(budget);
         let admitted = filter.admit(&mut pairs, &command, 0.001, &Uncertainty::NONE, &[]);
         let admitted = admitted.expect("an answer");
         assert_eq!(admitted.reason, Reason::Commanded, "{budget}: {admitted:?}");

@@ -109,7 +109,8 @@ pub struct Filter<const LABELS: usize = 0> {
     /// s.
     approach: f32,
     instructions: u32,
-    cost: Cost,
+    /// `None` for that of the trees.
+    cost: Option<Cost>,
     options: Options,
 }
 
@@ -132,7 +133,7 @@ impl Filter {
             lever: None,
             approach: 0.0,
             instructions: INSTRUCTIONS,
-            cost: Cost::M7_CAPSULE,
+            cost: None,
             options: Options::new(),
         })
     }
@@ -192,14 +193,20 @@ impl<const LABELS: usize> Filter<LABELS> {
         Ok(Self { approach: checked("approach", time, time >= 0.0)?, ..self })
     }
 
-    /// The same with a budget: the instructions of all queries of a tick, by a [`Cost`]; 200,000 of a Cortex-M7 by
-    /// default. They are estimated by a fit to plain queries: deep in the tissue, ticks measured up to twice as many. If
-    /// the budget runs out, motions that are not verified are not admitted. The next tick's searches continue where they
-    /// stopped. It must have the cost's base (some 2,000) for each pair: a pair that is never searched has no answer, and
-    /// then no motion is admitted.
+    /// The same with a budget: the instructions of all searches of a tick, 200,000 by default. If it runs out, motions that
+    /// are not verified are not admitted, and the next tick's searches continue where they stopped. It must cover the
+    /// [cost](Self::cost)'s base (some 10,000) for each pair: a pair that is never searched has no answer, and then no
+    /// motion is admitted.
     #[must_use]
-    pub const fn budget(self, instructions: u32, cost: Cost) -> Self {
-        Self { instructions, cost, ..self }
+    pub const fn budget(self, instructions: u32) -> Self {
+        Self { instructions, ..self }
+    }
+
+    /// The same with the cost of a search, as a tracker's tick; the largest [`Cost::of_tick`] of the pairs' trees by
+    /// default.
+    #[must_use]
+    pub const fn cost(self, cost: Cost) -> Self {
+        Self { cost: Some(cost), ..self }
     }
 
     /// The same with options for every query. Their budget is not used, and the side is always asked for.
@@ -213,7 +220,7 @@ impl<const LABELS: usize> Filter<LABELS> {
     /// The pairs are the current parts of one rigid instrument, each with its own surface and tracker: a chain of two
     /// tools in a scene of two surfaces has four pairs. `rows` are up to 8 additional limits.
     ///
-    /// Cost: the [budget](Self::budget) at most, as estimated, and for each tried motion a solution of up to 16 rows:
+    /// Cost: the [budget](Self::budget) at most, and for each tried motion a solution of up to 16 rows:
     /// usually 1,000 instructions, at most 40,000.
     ///
     /// # Errors
@@ -249,7 +256,10 @@ impl<const LABELS: usize> Filter<LABELS> {
             return Err(FilterError::Unlabelled { label });
         }
         let lever = self.lever_of(pairs.iter().map(|(_, _, tool)| *tool), command);
-        Session::new(self, command, period, uncertainty, (rows, lever))?.run(pairs)
+        let costs = pairs.iter().map(|(tracker, ..)| Cost::of_tick(tracker.tree()));
+        let dearest = costs.max_by_key(|cost| cost.node_test).unwrap_or(Cost::M7_TICK);
+        let cost = self.cost.unwrap_or(dearest);
+        Session::new(self, command, period, uncertainty, (rows, lever, cost))?.run(pairs)
     }
 
     /// The lever, for these tools and the reference point of a motion.

@@ -13,7 +13,7 @@ use super::{
     Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty,
     path,
 };
-use crate::Budget;
+use crate::{Budget, Cost};
 use crate::math::sqrt::sqrt;
 
 /// Number of motions tried in full, and of shortened ones after that.
@@ -64,6 +64,8 @@ pub(super) struct Session<'f, const LABELS: usize> {
     grow: f32,
     /// The fraction of the distance beyond the least one that a motion may use up.
     share: f32,
+    /// Of a search.
+    cost: Cost,
     queries: u32,
     instructions: u32,
 }
@@ -74,7 +76,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         command: &Motion,
         period: f32,
         uncertainty: &Uncertainty,
-        (rows, lever): (&[MotionRow], f32),
+        (rows, lever, cost): (&[MotionRow], f32, Cost),
     ) -> Result<Self, FilterError> {
         let most = filter.speed * period;
         let within = Motion {
@@ -95,6 +97,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             margin: uncertainty.now,
             grow: uncertainty.grown(period),
             share: if filter.approach > period { period / filter.approach } else { 1.0 },
+            cost,
             queries: 0,
             instructions: 0,
         })
@@ -190,7 +193,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             }
             (Some(_), _) => None,
             (None, _) => {
-                let left = self.left(to_come.saturating_mul(self.filter.cost.base));
+                let left = self.left(to_come.saturating_mul(self.cost.base));
                 left.map(|left| self.search(pair, ends, false, None, left)).transpose()?
             }
         };
@@ -362,7 +365,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     /// The budget left for a query, less what is reserved for others (instructions); `None` if that is below the base
     /// cost.
     fn left(&self, reserved: u32) -> Option<Budget> {
-        let Filter { instructions, cost, .. } = self.filter;
+        let Self { filter: Filter { instructions, .. }, cost, .. } = self;
         let left = instructions.checked_sub(self.instructions)?.checked_sub(reserved)?;
         (left >= cost.base).then(|| Budget::for_instructions(left, cost))
     }
@@ -382,8 +385,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         near: Option<(u8, f32)>,
         left: Budget,
     ) -> Result<Found, FilterError> {
-        let Filter { cost, options, .. } = self.filter;
-        let options = options.signed().budget(Budget::UNLIMITED).within(left);
+        let options = self.filter.options.signed().budget(left);
         let found = match near {
             // Without labels that is not compiled.
             Some(near) if LABELS > 0 => {
@@ -393,7 +395,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         };
         let Found { node_tests, triangle_tests, .. } = found;
         // The root's test is included in the base cost.
-        let spent = cost.instructions(node_tests.saturating_sub(1), triangle_tests);
+        let spent = self.cost.instructions(node_tests.saturating_sub(1), triangle_tests);
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);
         self.instructions = self.instructions.saturating_add(spent);
         self.queries += 1;

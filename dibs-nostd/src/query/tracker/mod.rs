@@ -15,6 +15,7 @@ use super::made::Tests;
 use super::memory::clock::Reading;
 use super::memory::separation::Certain;
 use super::memory::{Lost, Memory};
+use super::prices::QUERY;
 use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
 use super::{Budget, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
@@ -323,10 +324,19 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tests: Tests,
     ) -> Result<Proximity, QueryError> {
         let options = options.after(tests);
+        let left = options.budget.tests();
+        let options = match options.is_priced {
+            true => options.within(Budget::new(left / (QUERY + 1) * QUERY)),
+            false => options,
+        };
         let (stack, ties) = (&mut self.stack, Some(&mut self.ties));
         let all = RootSet::ALL;
         let search = Search::start(all, &self.tree, stack, surface, tool, &options, first, ties)?;
         let mut closest = search.run::<WHOLE>(f32::INFINITY)?;
+        if options.is_priced {
+            let node_tests = closest.work() / QUERY;
+            closest.add_tests(Tests { node_tests, ..Tests::NONE });
+        }
         closest.add_tests(tests);
         Ok(closest)
     }

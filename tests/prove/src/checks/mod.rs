@@ -149,5 +149,5 @@ pub const EITHER: [&str; 5] = [
 pub fn fit(only: Option<&str>) -> Result<()> {
     cost::fit(only)?;
     bounded::rows::fit(only)?;
-    if only.is_none_or(|only| "tick".contains(only)) { tick_cost::fit() } else { Ok(()) }
+    tick_cost::fit(only)
 }

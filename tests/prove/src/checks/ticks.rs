@@ -5,7 +5,7 @@
 
 use anyhow::{Context, Result, ensure};
 use controller::surface::{self, CENTRE, REACH};
-use controller::{BUDGET, MTU, TICK_INSTRUCTIONS, instrument};
+use controller::{MTU, TICK_INSTRUCTIONS, instructions, instrument};
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::wire::{
@@ -92,6 +92,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let expected = frames.len() * (1 + TICKS as usize);
     ensure!(answers.len() == expected, "{} ticks answered, not {expected}", answers.len());
 
+    let budget = Budget::for_instructions(instructions(false), &Cost::M7_TICK);
     let (mut sum, mut longest, mut cut_short) = (0.0, 0.0_f64, 0);
     for (number, ticks) in answers.chunks(1 + TICKS as usize).enumerate() {
         for (place, &[took, nodes, triangles, epoch]) in ticks.iter().enumerate() {
@@ -105,7 +106,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
             let work = nodes + triangles * Budget::TRIANGLE;
             // What is left of the budget must be less than a triangle's test and its plane's, or the tests of a node's
             // children.
-            cut_short += u32::from(work + 2 * Budget::TRIANGLE > BUDGET.tests());
+            cut_short += u32::from(work + 2 * Budget::TRIANGLE > budget.tests());
         }
     }
     let unlimited = frames.iter().map(|frame| frame.cost).max().unwrap_or_default();

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::Result;
 use controller::telemetry::{Push, Tick};
-use controller::{BUDGET, PERIOD, STAND_OFF};
+use controller::{PERIOD, STAND_OFF};
 use dibs_nostd::Budget;
 use dibs_nostd::failsafe::State;
 use dibs_tests::oracle::{Instrument, exhaustive};
@@ -181,7 +181,8 @@ impl Hand {
                     (count + 1, least.min(*apart))
                 })
             };
-            Way::new(&moments.iter().filter(is_of), least(&separations).1, least(&heart))
+            let budget = scene.budget();
+            Way::new(&moments.iter().filter(is_of), budget, least(&separations).1, least(&heart))
         };
         let commanded: Vec<&Moment> = moments.iter().filter(|m| m.is_commanded()).collect();
         let mut reasons = BTreeMap::new();
@@ -309,6 +310,7 @@ impl Hand {
 impl Way {
     fn new<'m>(
         moments: &(impl Iterator<Item = &'m Moment> + Clone),
+        budget: Budget,
         separation: f64,
         (instants, heart): (usize, f64),
     ) -> Self {
@@ -323,7 +325,7 @@ impl Way {
             let Tick { node_tests, triangle_tests, .. } = moment.tick;
             // The root's test is not counted in the budget.
             let tests = node_tests.saturating_sub(1) + triangle_tests * Budget::TRIANGLE;
-            f64::from(tests) / f64::from(BUDGET.tests())
+            f64::from(tests) / f64::from(budget.tests())
         });
         Self {
             ticks,

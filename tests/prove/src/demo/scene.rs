@@ -3,12 +3,13 @@
 use std::borrow::Cow;
 
 use anyhow::{Context, Result, ensure};
+use controller::instructions;
 use dibs_build::{
     Builder, BuiltTree, Format, Mesh, Motion, MotionStretch, Paths, Unit, Volume, generate,
     write_limits,
 };
 use dibs_nostd::nodes::{Nodes, WHOLE};
-use dibs_nostd::{Index, Tool, Tree, VertexTable};
+use dibs_nostd::{Budget, Cost, Index, Tool, Tree, VertexTable};
 use glam::{DVec3, Vec3};
 use xtask::firmware::{HEART_STRETCH, Limits, Surface};
 use xtask::workspace;
@@ -173,6 +174,13 @@ impl Scene {
             16 => of::<u16>(self, rows),
             _ => of::<u32>(self, rows),
         }
+    }
+
+    /// The firmware's budget for a tick on this surface.
+    pub fn budget(&self) -> Budget {
+        let has_nodes = !self.carriers.is_empty();
+        let cost = if has_nodes { Cost::M7_NODES_TICK } else { Cost::M7_TICK };
+        Budget::for_instructions(instructions(has_nodes), &cost)
     }
 
     /// One line for the user.

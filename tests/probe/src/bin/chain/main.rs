@@ -13,11 +13,12 @@ mod files;
 mod machine;
 
 use cortex_m_rt::entry;
+use probe::rows::Vertices;
 use probe::track::{Memory, Trackers, run};
 
 #[entry]
 fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
-    machine::answer(|board| run::<{ u32::MAX }>(MEMORY, TRACKERS, board))
+    machine::answer(|board| run::<Vertices, { u32::MAX }>(MEMORY, TRACKERS, board))
 }

@@ -13,11 +13,12 @@ mod files;
 mod machine;
 
 use cortex_m_rt::entry;
+use probe::rows::Vertices;
 use probe::track::{Memory, Trackers, run, tick};
 
 #[entry]
 fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
-    machine::answer(|board| run::<{ tick::INTERPOLATED }>(MEMORY, TRACKERS, board))
+    machine::answer(|board| run::<Vertices, { tick::INTERPOLATED }>(MEMORY, TRACKERS, board))
 }

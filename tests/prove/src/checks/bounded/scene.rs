@@ -1,10 +1,11 @@
 //! A moving surface, the poses of an instrument around it, and whole queries of both.
 
 use anyhow::Result;
-use dibs_build::{Builder, BuiltTree, Mesh, Motion, generate};
+use dibs_build::{Builder, BuiltTree, Mesh, Motion, Volume, generate};
 use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{
-    Budget, Capsule, MeasuredStretch, Odometer, Options, Proximity, Query, Side, SurfaceBlend,
+    Budget, Capsule, Cost, MeasuredStretch, Odometer, Options, Proximity, Query, Side, SurfaceBlend,
     Tool, Tree, measure_stretch,
 };
 use glam::Vec3;
@@ -21,12 +22,17 @@ const TICKS_A_FRAME: usize = 40;
 /// A point in a ventricle of the generated heart.
 const MIDDLE: Vec3 = Vec3::new(12.0, -4.0, 38.0);
 
-/// A tree, its surface's frames with their stretches, and the poses of a path.
+/// A tree, its frames with their stretches, and the poses of a path.
 pub struct Scene {
     tree: BuiltTree,
     frames: Vec<(Vec<Vec3>, MeasuredStretch)>,
     path: Vec<Capsule>,
+    /// The program on the board that reads such frames.
+    program: &'static str,
 }
+
+/// The programs for frames of vertices and of nodes.
+const PROGRAMS: [&str; 2] = ["chain", "carried"];
 
 /// The result of whole queries for a tick.
 pub struct Truth {
@@ -58,6 +64,24 @@ impl Scene {
         Self::of(&mesh, &motion, 1.5, |corners| path::through(corners, MIDDLE, ticks)).map(Some)
     }
 
+    /// A generated heart of this many triangles that a lattice's nodes move, and the path around it.
+    pub fn carried(triangles: u32, cells: [u32; 3], ticks: usize) -> Result<Self> {
+        let mesh = generate::heart(triangles)?.mesh;
+        let volume = Volume::lattice(&mesh, cells)?;
+        let nodes: Vec<Vec3> = volume.nodes().iter().map(|node| node.as_vec3()).collect();
+        let tree = Builder::new().stretch(1.5).nodes(&volume).build(&mesh)?;
+        let of = Nodes::of(&tree.tree::<u16>()?)?;
+        let frames = generate::beat(&nodes).frames.into_iter();
+        let frames = frames.map(|rows| {
+            let stretch = of.measure(rows.as_slice())?;
+            Ok((rows, stretch))
+        });
+        let frames = frames.collect::<Result<_>>()?;
+        let path = path::path(&corners(&mesh, &mesh.positions), (MIDDLE, 1.0), ticks);
+        let [_, program] = PROGRAMS;
+        Ok(Self { tree, frames, path, program })
+    }
+
     /// A human heart, if it is beside the repository. A triangle of it is stretched by 1.522.
     pub fn human(ticks: usize) -> Result<Option<Self>> {
         let Some(folder) = real() else { return Ok(None) };
@@ -76,16 +100,15 @@ impl Scene {
     ) -> Result<Self> {
         let tree = Builder::new().stretch(stretch).build(mesh)?;
         let view = tree.tree::<u16>()?;
-        let corners: Vec<[Vec3; 3]> =
-            mesh.triangles.iter().map(|rows| rows.map(|row| frames[0][row as usize])).collect();
-        let path = path(&corners);
+        let path = path(&corners(mesh, &frames[0]));
         let frames = frames.iter().map(|frame| {
             let rows = tree.to_rows(frame);
             let stretch = measure_stretch(&view, rows.as_slice())?;
             Ok((rows, stretch))
         });
         let frames = frames.collect::<Result<_>>()?;
-        Ok(Self { tree, frames, path })
+        let [program, _] = PROGRAMS;
+        Ok(Self { tree, frames, path, program })
     }
 
     /// The tree as the queries read it.
@@ -93,12 +116,17 @@ impl Scene {
         self.tree.tree().expect("16-bit indices")
     }
 
+    /// The cost of a tick on its surface.
+    pub fn cost(&self) -> Cost {
+        Cost::of_tick(&self.tree())
+    }
+
     /// The number of ticks.
     pub fn ticks(&self) -> usize {
         self.path.len()
     }
 
-    /// Calls a function with each tick's surface and pose.
+    /// Calls a function with each tick's surface, whose frames are of vertices, and pose.
     pub fn each<T>(
         &self,
         tree: &Tree<'_, u16>,
@@ -123,6 +151,11 @@ impl Scene {
     }
 }
 
+/// The corners of all triangles.
+fn corners(mesh: &Mesh, positions: &[Vec3]) -> Vec<[Vec3; 3]> {
+    mesh.triangles.iter().map(|rows| rows.map(|row| positions[row as usize])).collect()
+}
+
 /// A tick's frame, and the fraction of the interval to the next frame.
 fn place(tick: usize) -> (usize, f32) {
     (tick / TICKS_A_FRAME, (tick % TICKS_A_FRAME) as f32 / TICKS_A_FRAME as f32)
@@ -142,7 +175,7 @@ pub fn truth(scene: &Scene) -> Vec<Truth> {
 
 /// All ticks except the first of a tracker on the board within a budget. `bits` selects what else the tracker must find.
 pub fn on_board(scene: &Scene, bits: u32, budget: Budget) -> Result<Vec<Tick>> {
-    let program = build_for_board(&board()?, "chain")?;
+    let program = build_for_board(&board()?, scene.program)?;
     let frames = &scene.frames;
     let mut script = Script::new(&scene.tree, &frames[0].0);
     let bits = bits | tick::INTERPOLATED | tick::SIGNED | budget.tests() << tick::BUDGET;

@@ -1,0 +1,24 @@
+//! Follows the ticks of the script `script.bin` on the emulated board, of any kind, on a surface that nodes carry, and
+//! writes `answers.bin`. With `-icount shift=6` an instruction takes 64 ns, or 1.6 counts of the 25 MHz clock.
+#![no_std]
+#![no_main]
+
+#[path = "../board/clock.rs"]
+mod clock;
+#[path = "../board/exit.rs"]
+mod exit;
+#[path = "../board/files.rs"]
+mod files;
+#[path = "../board/machine.rs"]
+mod machine;
+
+use cortex_m_rt::entry;
+use dibs_nostd::nodes::Nodes;
+use probe::track::{Memory, Trackers, run};
+
+#[entry]
+fn main() -> ! {
+    static mut MEMORY: Memory = Memory::new();
+    static mut TRACKERS: Trackers = Trackers::new();
+    machine::answer(|board| run::<Nodes, { u32::MAX }>(MEMORY, TRACKERS, board))
+}
