@@ -36,7 +36,7 @@ pub type Place = [u32; 4];
 
 impl File {
     /// The lines with code, each with how often it was executed: a line counts as its most executed part.
-    pub fn lines(&self) -> BTreeMap<u32, u64> {
+    fn lines(&self) -> BTreeMap<u32, u64> {
         let mut of_line: BTreeMap<u32, Vec<Segment>> = BTreeMap::new();
         for &segment in &self.segments {
             of_line.entry(segment.0).or_default().push(segment);
@@ -61,22 +61,32 @@ impl File {
         }
         lines
     }
+}
 
-    /// The line and the count of each region.
-    pub fn regions(&self) -> impl Iterator<Item = (u32, u64)> {
-        let begun = self.segments.iter().filter(|segment| begins(segment));
-        begun.map(|segment| (segment.0, segment.2))
-    }
+/// What several programs counted in a file.
+#[derive(Default)]
+pub struct Counts {
+    pub lines: BTreeMap<u32, u64>,
+    /// By line and column.
+    pub regions: BTreeMap<(u32, u32), u64>,
+    /// How often each condition was true and false.
+    pub branches: BTreeMap<Place, [u64; 2]>,
+}
 
-    /// How often each condition was true and false, in all instances of its function.
-    pub fn branches(&self) -> BTreeMap<Place, [u64; 2]> {
-        let mut found: BTreeMap<Place, [u64; 2]> = BTreeMap::new();
-        for &[line, column, last_line, last_column, is_true, is_false, ..] in &self.branches {
+impl Counts {
+    /// Adds what a program counted, in all instances of the file's functions.
+    pub fn add(&mut self, file: &File) {
+        for (line, count) in file.lines() {
+            *self.lines.entry(line).or_default() += count;
+        }
+        for segment in file.segments.iter().filter(|segment| begins(segment)) {
+            *self.regions.entry((segment.0, segment.1)).or_default() += segment.2;
+        }
+        for &[line, column, last_line, last_column, is_true, is_false, ..] in &file.branches {
             let place = [line, column, last_line, last_column].map(|number| number as u32);
-            let sum = found.entry(place).or_default();
+            let sum = self.branches.entry(place).or_default();
             sum[0] += is_true;
             sum[1] += is_false;
         }
-        found
     }
 }

@@ -66,7 +66,7 @@ pub fn count() -> Result<()> {
 }
 
 /// What the last run counted, and the run.
-pub fn exported() -> Result<(Run, Export)> {
+pub fn exported() -> Result<(Run, Vec<Export>)> {
     let (counts, of) = places();
     let text = fs::read_to_string(&of).context("nothing was counted yet")?;
     let mut raw = Vec::new();
@@ -78,17 +78,16 @@ pub fn exported() -> Result<(Run, Export)> {
     let merged = counts.with_extension("profdata");
     let mut merge = Command::new(&profdata);
     run(merge.args(["merge", "--sparse", "-o"]).arg(&merged).args(&raw))?;
-    let mut export = Command::new(&cov);
-    export.args(["export", "--format=text", "--skip-functions", "--skip-expansions"]);
-    export.arg("--instr-profile").arg(&merged);
-    for (number, program) in built()?.iter().enumerate() {
-        if number > 0 {
-            export.arg("--object");
-        }
-        export.arg(program);
+    // One by one: of several, llvm-cov takes a function from the first, where it may have no instance.
+    let mut exports = Vec::new();
+    for program in built()? {
+        let mut export = Command::new(&cov);
+        export.args(["export", "--format=text", "--skip-functions", "--skip-expansions"]);
+        export.arg("--instr-profile").arg(&merged).arg(program).arg("--sources").arg(core());
+        let counted = quiet(&mut export, Duration::from_secs(600))?;
+        exports.push(serde_json::from_str(&counted)?);
     }
-    let counted = quiet(export.arg("--sources").arg(core()), Duration::from_secs(600))?;
-    Ok((serde_json::from_str(&text)?, serde_json::from_str(&counted)?))
+    Ok((serde_json::from_str(&text)?, exports))
 }
 
 /// The sources that are counted.

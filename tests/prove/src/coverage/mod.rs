@@ -46,8 +46,8 @@ pub fn run(options: &Options) -> Result<()> {
         if !options.counted {
             measure::count()?;
         }
-        let (run, export) = measure::exported()?;
-        let record = Record::of(run, &export)?;
+        let (run, exports) = measure::exported()?;
+        let record = Record::of(run, &exports)?;
         ensure!(!record.files.is_empty(), "no file of the core was counted");
         let text = serde_json::to_string_pretty(&record)? + "\n";
         fs::write(&file, text).with_context(|| format!("cannot write {}", file.display()))?;

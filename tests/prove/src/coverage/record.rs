@@ -2,13 +2,14 @@
 
 // Requirement: E-06
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-use super::export::{Export, File};
+use super::export::{Counts, Export};
 use super::{measure, own_tests};
 use crate::harness::run::Run;
 
@@ -53,17 +54,21 @@ impl Record {
         Self { run, files: Vec::new(), open: Vec::new() }
     }
 
-    /// The record of what was counted.
-    pub fn of(run: Run, export: &Export) -> Result<Self> {
+    /// The record of what each program counted.
+    pub fn of(run: Run, exports: &[Export]) -> Result<Self> {
         let mut record = Self::new(run);
+        let mut counts: BTreeMap<&str, Counts> = BTreeMap::new();
+        for file in exports.iter().flat_map(|export| &export.data).flat_map(|data| &data.files) {
+            counts.entry(&file.filename).or_default().add(file);
+        }
         let core = measure::core();
-        for file in export.data.iter().flat_map(|data| &data.files) {
-            let path = Path::new(&file.filename);
+        for (path, counts) in counts {
+            let path = Path::new(path);
             let Ok(name) = path.strip_prefix(&core) else { continue };
             if !own_tests::is_test(path)? {
                 let source = fs::read_to_string(path)
                     .with_context(|| format!("cannot read {}", path.display()))?;
-                record.add(&name.to_string_lossy(), file, &source);
+                record.add(&name.to_string_lossy(), &counts, &source);
             }
         }
         record.files.sort_by(|one, other| one.file.cmp(&other.file));
@@ -78,7 +83,7 @@ impl Record {
     }
 
     /// Adds a file, by its name below `dibs-nostd/src`.
-    pub fn add(&mut self, name: &str, file: &File, source: &str) {
+    pub fn add(&mut self, name: &str, counts: &Counts, source: &str) {
         let text: Vec<&str> = source.lines().collect();
         let tests = own_tests::lines(source);
         let line = |number: u32| text.get(number as usize - 1).copied().unwrap_or_default();
@@ -90,7 +95,7 @@ impl Record {
             function: function(&text, number as usize).to_owned(),
             condition,
         };
-        let lines = file.lines();
+        let lines = &counts.lines;
         // A line that only closes what others opened is no statement.
         let says = |number: u32| line(number).contains(|one: char| one.is_alphanumeric());
         let is_own = |number: u32| says(number) && !tests.contains(&number);
@@ -101,8 +106,8 @@ impl Record {
                 self.open.push(open(number, None));
             }
         }
-        for (place, counts) in file.branches() {
-            let [number, column, last, last_column] = place;
+        for (place, outcomes) in &counts.branches {
+            let [number, column, last, last_column] = *place;
             if tests.contains(&number) {
                 continue;
             }
@@ -111,7 +116,7 @@ impl Record {
             let whole: Vec<char> = line(number).chars().collect();
             let part = &whole[(column as usize - 1).min(whole.len())..end.min(whole.len())];
             let part: String = part.iter().collect();
-            for (outcome, count) in [(true, counts[0]), (false, counts[1])] {
+            for (outcome, count) in [(true, outcomes[0]), (false, outcomes[1])] {
                 sums.branches[1] += 1;
                 sums.branches[0] += usize::from(count > 0);
                 // A statement that is not executed says the same of its conditions.
@@ -120,9 +125,9 @@ impl Record {
                 }
             }
         }
-        for (_, count) in file.regions().filter(|(number, _)| !tests.contains(number)) {
+        for (_, count) in counts.regions.iter().filter(|((number, _), _)| !tests.contains(number)) {
             sums.regions[1] += 1;
-            sums.regions[0] += usize::from(count > 0);
+            sums.regions[0] += usize::from(*count > 0);
         }
         if sums.regions[1] > 0 {
             self.files.push(sums);

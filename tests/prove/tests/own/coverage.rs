@@ -5,6 +5,7 @@
 use std::fs;
 use std::path::Path;
 
+use dibs_prove::coverage::export::Counts;
 use dibs_prove::coverage::reasons::Reason;
 use dibs_prove::coverage::record::Record;
 use dibs_prove::coverage::{RECORD, measure, own_tests, page};
@@ -33,8 +34,10 @@ fn an_export_is_read_by_lines_and_outcomes() {
     let file = r#"{"filename":"a.rs","branches":[[2,8,2,13,0,5,0,0,4],[6,8,6,13,2,0,0,0,4],[6,8,6,13,0,1,0,0,4]],
         "segments":[[1,1,5,true,true,false],[2,14,0,true,true,false],[4,6,5,true,true,false],[6,14,2,true,true,false],
         [8,6,5,true,false,false],[9,2,0,false,false,false],[13,5,0,true,true,false],[13,14,0,false,false,false]]}"#;
+    let mut counts = Counts::default();
+    counts.add(&serde_json::from_str(file).expect("a file"));
     let mut record = Record::new(run("a"));
-    record.add("a.rs", &serde_json::from_str(file).expect("a file"), source);
+    record.add("a.rs", &counts, source);
     let sums = record.sums();
     assert_eq!((sums.statements, sums.branches, sums.regions), ([5, 6], [3, 4], [3, 4]));
     let open: Vec<_> = record.open.iter().map(|one| (one.number, one.condition.clone())).collect();
