@@ -43,8 +43,8 @@ pub fn page(record: &Record, reasons: &[Reason]) -> String {
          [the record](coverage.json).\n\n\
          Executed by the core's own tests and by the programs `bus`, `surface`, `tree` and `query` of `tests/`, on this \
          computer. A generic function counts as its instances together. A *statement* is a line with code, and counts as \
-         its most executed part. A *branch* is an outcome of a condition: of `if`, `while`, `&&`, `||` and of a guard, not \
-         of `match`, `let else` and `?`. A *region* is a part of a line between such places, the end by `?` among them. \
+         its most executed part. A *branch* is an outcome of a condition: of `if`, `if let`, `let else`, `while`, `&&`, `||` and of a guard, not of \
+         `match` and `?`. A *region* is a part of a line between such places, the end by `?` among them. \
          The core's tests themselves do not count. Not compiled, so not counted: `cfg` of other processors, of `defmt`, \
          `portable-atomic` and `loom`; code that the compiler evaluates does not count as executed.\n\n\
          | of {} files | executed | all | share | goal |\n|---|---:|---:|---:|---:|\n{}{}{}\n",

@@ -156,7 +156,7 @@ fn function<'a>(lines: &[&'a str], number: usize) -> &'a str {
     let named = before.filter(|&(at, line)| at + 1 == number || indent(line) < own);
     let mut names = named.filter_map(|(_, line)| {
         let (before, rest) = line.trim_start().split_once("fn ")?;
-        let is_head = before.chars().all(|one| one.is_alphanumeric() || " ()_\"".contains(one));
+        let is_head = before.chars().all(|one| one.is_alphanumeric() || " ()_:\"".contains(one));
         let end = rest.find(|one: char| !one.is_alphanumeric() && one != '_')?;
         is_head.then(|| &rest[..end])
     });
