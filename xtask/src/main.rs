@@ -50,6 +50,9 @@ enum Task {
     /// Changes operators of the core one by one, and lists the changes that no test notices.
     #[command(disable_help_flag = true)]
     Mutants(Passed),
+    /// Counts which statements and branches of the core its tests execute, and writes docs/evidence/coverage.md.
+    #[command(disable_help_flag = true)]
+    Coverage(Passed),
     /// Checks the core crate for every row of docs/processors.md.
     #[command(disable_help_flag = true)]
     Processors(Passed),
@@ -72,6 +75,7 @@ fn main() -> ExitCode {
         Task::Viewer(options) => viewer::viewer(&options),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
         Task::Mutants(passed) => prove::run("mutants", &passed),
+        Task::Coverage(passed) => prove::run("coverage", &passed),
         Task::Processors(passed) => prove::run("processors", &passed),
         Task::Sanitize => or_say(nightly::missing(), nightly::sanitize_by_hand),
         Task::Miri => or_say(nightly::miri_missing(), nightly::miri),

@@ -5,6 +5,7 @@
 pub mod binary;
 pub mod bound;
 pub mod checks;
+pub mod coverage;
 pub mod data;
 pub mod demo;
 pub mod evidence;

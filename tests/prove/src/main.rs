@@ -1,4 +1,4 @@
-//! Measures and proves: `cargo xtask demo | evidence | guarantees | profile | bound | mutants | processors` run this, and `test` its checks.
+//! Measures and proves: `cargo xtask demo | evidence | guarantees | profile | bound | mutants | coverage | processors` run this, and `test` its checks.
 //! docs/proofs.md lists the file for each promise.
 
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use dibs_prove::harness::{self, Effort};
-use dibs_prove::{bound, demo, evidence, mutants, processors, profile};
+use dibs_prove::{bound, coverage, demo, evidence, mutants, processors, profile};
 use xtask::steps::{Outcome, Steps};
 
 /// `cargo xtask` passes its arguments on to this.
@@ -26,6 +26,7 @@ enum Task {
     Profile,
     Bound(bound::report::Options),
     Mutants(mutants::Options),
+    Coverage(coverage::Options),
     /// Checks the core crate for every row of docs/processors.md.
     Processors,
     /// Runs the checks of `cargo xtask test`.
@@ -57,6 +58,7 @@ fn main() -> ExitCode {
         Task::Profile => profile::run(),
         Task::Bound(options) => bound::report::run(&options),
         Task::Mutants(options) => mutants::mutants(&options),
+        Task::Coverage(options) => coverage::run(&options),
         Task::Processors => processors::check().map(|outcome| {
             if let Outcome::Skipped(reason) = outcome {
                 println!("skipped: {reason}");

@@ -6,6 +6,7 @@ mod coverage;
 mod far;
 mod format;
 mod mesh_files;
+mod messages;
 mod nasty;
 mod readers;
 mod readers_damaged;

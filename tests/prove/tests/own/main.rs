@@ -3,6 +3,7 @@
 mod accuracy;
 mod bound;
 mod bridged;
+mod coverage;
 mod evidence;
 mod figures;
 mod path;

@@ -387,4 +387,9 @@ pub const REQUIREMENTS: &[Requirement] = &[
         "The comparison with other libraries has methods that agree, and statistics as in textbooks.",
         &[],
     ),
+    requirement(
+        "E-06",
+        "Statements and branches of the core that no test executes are counted and listed.",
+        &[],
+    ),
 ];
