@@ -32,7 +32,8 @@ use core::num::NonZeroU32;
 use dibs_nostd::{Millis, Ticks};
 
 pub use control::{
-    Control, DAMPING, MARGIN, MAX_FORCE, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS, instructions, start,
+    Control, DAMPING, MARGIN, MAX_FORCE, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS, instructions,
+    start,
 };
 pub use fingerprint::fingerprint;
 pub use hand::Hand;

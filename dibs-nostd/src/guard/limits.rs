@@ -115,9 +115,7 @@ impl GuardLimits {
     /// The options of a tick.
     pub(super) fn of_tick<I: Index>(&self, tree: &Tree<'_, I>) -> Options {
         match self.instructions {
-            Some(most) => {
-                self.options.budget(Budget::for_instructions(most, &Cost::of_tick(tree)))
-            }
+            Some(most) => self.options.budget(Budget::for_instructions(most, &Cost::of_tick(tree))),
             None => self.options,
         }
     }

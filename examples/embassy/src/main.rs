@@ -25,10 +25,8 @@ dibs_nostd::include_tree!("heart");
 static SURFACE: heart::Surface = heart::Surface::new();
 
 /// Tissue that hardly moves: 1 mm/s. On the emulated line a frame takes long, and no status is returned.
-const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
-    .without_transit()
-    .automatic()
-    .instructions(400_000);
+const LIMITS: GuardLimits =
+    GuardLimits::new(1.0, Millis(2_000)).without_transit().automatic().instructions(400_000);
 
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
 static TICK: Signal<CriticalSectionRawMutex, Millis> = Signal::new();

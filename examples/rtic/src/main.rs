@@ -35,10 +35,8 @@ mod app {
     use crate::{SURFACE, heart};
 
     /// Tissue that hardly moves: 1 mm/s. On the emulated line a frame takes long, and no status is returned.
-    const LIMITS: GuardLimits = GuardLimits::new(1.0, Millis(2_000))
-        .without_transit()
-        .automatic()
-        .instructions(400_000);
+    const LIMITS: GuardLimits =
+        GuardLimits::new(1.0, Millis(2_000)).without_transit().automatic().instructions(400_000);
 
     /// Number of control ticks so far: the time, in ms.
     static NOW: AtomicU32 = AtomicU32::new(0);

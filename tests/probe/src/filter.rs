@@ -7,8 +7,7 @@ use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Capsule, MeasuredStretch, MovingSurface, Odometer, Options, Tracker, Tree,
-    measure_stretch,
+    Capsule, MeasuredStretch, MovingSurface, Odometer, Options, Tracker, Tree, measure_stretch,
 };
 
 use crate::track::Memory;

@@ -13,8 +13,8 @@ use super::{
     Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty,
     path,
 };
-use crate::{Budget, Cost};
 use crate::math::sqrt::sqrt;
+use crate::{Budget, Cost};
 
 /// Number of motions tried in full, and of shortened ones after that.
 const WHOLE: u32 = 4;

@@ -288,7 +288,12 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             }
             Outcome::Full { tests } => {
                 fallback = Some(Fallback::Full);
-                (self.whole(surface, tool, &options.within(budget), best, tests)?, true)
+                // A whole query that cannot test the closest triangle again would answer less than is known.
+                if for_whole(budget, options.is_priced, tests) < Budget::TRIANGLE {
+                    (tick.finish(0.0)?, false)
+                } else {
+                    (self.whole(surface, tool, &options.within(budget), best, tests)?, true)
+                }
             }
         };
         let memory = &mut self.memory;
@@ -323,12 +328,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         first: Option<TriangleRow>,
         tests: Tests,
     ) -> Result<Proximity, QueryError> {
-        let options = options.after(tests);
-        let left = options.budget.tests();
-        let options = match options.is_priced {
-            true => options.within(Budget::new(left / (QUERY + 1) * QUERY)),
-            false => options,
-        };
+        let left = for_whole(options.budget, options.is_priced, tests);
+        let options = options.within(Budget::new(left));
         let (stack, ties) = (&mut self.stack, Some(&mut self.ties));
         let all = RootSet::ALL;
         let search = Search::start(all, &self.tree, stack, surface, tool, &options, first, ties)?;
@@ -340,6 +341,12 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         closest.add_tests(tests);
         Ok(closest)
     }
+}
+
+/// The tests of a whole query in the budget that is left after `made`.
+const fn for_whole(budget: Budget, is_priced: bool, made: Tests) -> u32 {
+    let left = budget.less(made.work()).tests();
+    if is_priced { left / (QUERY + 1) * QUERY } else { left }
 }
 
 /// The closest pair's part of a tick's budget: the rest is for the depth of an axis that may be inside. Where no depth is

@@ -82,7 +82,8 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     names.push("a human heart of 10,272");
     if scenes.iter().any(Option::is_none) {
         println!("skipped: the real heart is not beside the repository");
-        (scenes, names) = (scenes.into_iter().filter(Option::is_some).collect(), names[..4].to_vec());
+        (scenes, names) =
+            (scenes.into_iter().filter(Option::is_some).collect(), names[..4].to_vec());
     }
     scenes.extend([Some(carried()?), Some(Scene::carried(10_272, [5, 4, 4], CARRIED_TICKS)?)]);
     names.extend(["one of 50,000 that 720 nodes carry", "one of 10,272 and 150 nodes"]);

@@ -20,5 +20,7 @@ use probe::track::{Memory, Trackers, run, tick};
 fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
-    machine::answer(|board| run::<Vertices, { tick::INTERPOLATED | tick::SIDE }>(MEMORY, TRACKERS, board))
+    machine::answer(|board| {
+        run::<Vertices, { tick::INTERPOLATED | tick::SIDE }>(MEMORY, TRACKERS, board)
+    })
 }

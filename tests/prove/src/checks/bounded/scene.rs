@@ -5,8 +5,8 @@ use dibs_build::{Builder, BuiltTree, Mesh, Motion, Volume, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{
-    Budget, Capsule, Cost, MeasuredStretch, Odometer, Options, Proximity, Query, Side, SurfaceBlend,
-    Tool, Tree, measure_stretch,
+    Budget, Capsule, Cost, MeasuredStretch, Odometer, Options, Proximity, Query, Side,
+    SurfaceBlend, Tool, Tree, measure_stretch,
 };
 use glam::Vec3;
 use probe::track::tick;
