@@ -34,7 +34,7 @@ fn an_account_gives_the_same_bits() {
     let (mut lines, mut expected, mut reduced) = (String::new(), Vec::new(), 0);
     for [force, velocity] in ticks() {
         let numbers = [force, velocity].map(|of| of.to_array());
-        let numbers = numbers.as_flattened().iter().map(|number| number.to_string());
+        let numbers = numbers.as_flattened().iter().map(ToString::to_string);
         writeln!(lines, "{}", numbers.collect::<Vec<_>>().join(" ")).expect("a string");
         let passed = account.pass(force, velocity, 0.001);
         reduced += usize::from(passed != force);
