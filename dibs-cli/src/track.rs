@@ -344,9 +344,10 @@ fn is_cut(closest: &Proximity, tool: &LocalTool) -> bool {
     let width = closest.separation - closest.lower;
     match closest.side {
         Side::Undefined(NoSide::CutShort) => true,
-        // The default accuracy of a depth.
-        Side::Inside | Side::Crossing | Side::Either => {
-            width > (length / 512.0).max(33.0 * closest.accuracy)
+        side if side.has_depth() => {
+            let tolerance = Options::default_depth_tolerance(length, closest.accuracy);
+            // The interval's ends are rounded.
+            width > tolerance + closest.accuracy
         }
         _ => !(width <= 0.0),
     }

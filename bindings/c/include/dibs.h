@@ -34,6 +34,11 @@
 
 
 /**
+ * Bytes of an account's storage.
+ */
+#define DIBS_ACCOUNT_SIZE 64
+
+/**
  * Alignment, in bytes, of the storage of every object: a computer's cipher needs that much.
  */
 #define DIBS_ALIGNMENT 16
@@ -943,6 +948,15 @@ typedef uint32_t dibs_fallback;
 #endif // __cplusplus
 
 /**
+ * An account of the energy that a wall's force gives to the hand, relative to the wall. It reduces the force where
+ * the energy given would exceed the energy received by more than a stated tank, and limits the force's steps. A force
+ * against an inward motion is never reduced by the account.
+ *
+ * One context at a time.
+ */
+typedef struct dibs_account dibs_account;
+
+/**
  * The bus's end of a guarded surface: it receives packets, checks complete frames in slices, publishes them, checks
  * the tree's bytes in the background, and writes the statuses for the sender.
  *
@@ -1057,6 +1071,24 @@ typedef struct dibs_tree dibs_tree;
  * stretch is checked: frames that arrive over a line belong to a receiver. One context at a time.
  */
 typedef struct dibs_writer dibs_writer;
+
+/**
+ * A point, a direction, a force or a velocity.
+ */
+typedef struct {
+  /**
+   * Along x.
+   */
+  float x;
+  /**
+   * Along y.
+   */
+  float y;
+  /**
+   * Along z.
+   */
+  float z;
+} dibs_vec3;
 
 /**
  * Options of a query. Null for none: no budget, a warm start, signed.
@@ -1232,24 +1264,6 @@ typedef struct {
    */
   uint32_t rounds;
 } dibs_bus_facts;
-
-/**
- * A point, a direction, a force or a velocity.
- */
-typedef struct {
-  /**
-   * Along x.
-   */
-  float x;
-  /**
-   * Along y.
-   */
-  float y;
-  /**
-   * Along z.
-   */
-  float z;
-} dibs_vec3;
 
 /**
  * A wall: a margin around the surface, with a spring and a damper.
@@ -2138,6 +2152,54 @@ typedef struct {
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
+
+/**
+ * Makes an account with a full tank.
+ *
+ * @param storage    `DIBS_ACCOUNT_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
+ * @param size       Bytes of the storage.
+ * @param tank       Energy (mJ) that may be given beyond what was received, above 0.
+ * @param step       Largest change of the force per tick (N), above 0.
+ * @param stiffness  Stiffness of the wall (N/mm), above 0.
+ * @param account    Receives the account's address.
+ * @return `DIBS_CODE_OK`, `DIBS_CODE_GAIN`, or a misuse.
+ */
+dibs_code dibs_account_init(void *storage,
+                            size_t size,
+                            float tank,
+                            float step,
+                            float stiffness,
+                            dibs_account **account);
+
+/**
+ * The force to apply for the next period, for the force that `dibs_wall_force`, `dibs_wall_proxy_force` or
+ * `dibs_answer_force` computed. Call it at every tick, during a hold too.
+ *
+ * If a number is not finite, the force falls to zero in steps.
+ *
+ * @param account   The account.
+ * @param force     The computed force (N).
+ * @param velocity  Velocity (mm/s) of the tool relative to the wall since the last tick, as for the wall's force.
+ * @param period    The period, in s.
+ * @param applied   Receives the force to apply (N); always finite. May be the computed one's memory.
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_account_pass(dibs_account *account,
+                            dibs_vec3 force,
+                            dibs_vec3 velocity,
+                            float period,
+                            dibs_vec3 *applied);
+
+/**
+ * The energy (mJ) that may still be given.
+ *
+ * Below 0 after a tick whose motion took more than predicted from the last one.
+ *
+ * @param account  The account.
+ * @param balance  Receives it.
+ * @return `DIBS_CODE_OK`, or a misuse.
+ */
+dibs_code dibs_account_balance(dibs_account *account, float *balance);
 
 /**
  * Makes the bus's end of a surface, once. `dibs_start` makes it together with all other objects.

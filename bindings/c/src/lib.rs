@@ -18,6 +18,7 @@
 #[cfg(not(target_os = "none"))]
 extern crate std;
 
+mod account;
 mod border;
 mod bus;
 mod causes;

@@ -4,7 +4,6 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::path::Path;
 use std::process::Command;
 
 use dibs_build::{Builder, generate};
@@ -12,7 +11,7 @@ use dibs_nostd::filter::{Filter, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, MovingTable, Odometer, Tracker, Tree};
 
-use crate::programs::{include, library, run, tool};
+use crate::programs::{compile, run};
 
 const TICKS: usize = 1_500;
 
@@ -124,13 +123,7 @@ fn admitted_motions_have_the_same_bits() {
         ("frames", floats.collect()),
         ("commands", commands.into_bytes()),
     ];
-    let program = folder.path().join("filter");
-    let mut gcc = tool("gcc", "gcc");
-    gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror"]);
-    gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
-    gcc.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs/filter.c"));
-    run(gcc.arg(library()).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
-    let mut command = Command::new(program);
+    let mut command = Command::new(compile("filter", folder.path()));
     for (name, bytes) in files {
         let path = folder.path().join(name);
         fs::write(&path, bytes).expect("writable");

@@ -24,7 +24,7 @@ use dibs_nostd::{
 };
 use xtask::workspace;
 
-use crate::programs::{include, installed, library, run, tool, tree_and_stream};
+use crate::programs::{compile, installed, run, tool, tree_and_stream};
 
 /// Vertices of the generated heart of 1,000 triangles.
 const VERTICES: usize = 502;
@@ -447,18 +447,6 @@ fn example(folder: &Path) -> PathBuf {
     run(&mut configure);
     run(Command::new("cmake").arg("--build").arg(&build));
     build.join("dibs-host")
-}
-
-/// Compiles a program of `tests/programs` with the library.
-fn compile(name: &str, folder: &Path) -> PathBuf {
-    let program = folder.join(name);
-    let mut gcc = tool("gcc", "gcc");
-    gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror"]);
-    gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
-    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs");
-    gcc.arg(sources.join(name).with_extension("c"));
-    run(gcc.arg(library()).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
-    program
 }
 
 /// The answers of a surface of `N` rows, which are the same in C to the bit.

@@ -2,6 +2,7 @@
 //!
 //! One program for all, because each would compile the queries of Rust anew.
 
+mod account;
 mod filter;
 mod guard;
 mod header;

@@ -11,13 +11,14 @@ Lengths are in millimetres, in the coordinates of the mesh's file. Wrong values 
 `TypeError`, each with one sentence; files and lines that fail raise `OSError`.
 """
 
-from ._filter import Admitted, Filter, RigidMotion, Tracked, Tracker
-from ._guard import Answer, ForbiddenRegion, Force, ForceState, Guard, State
+from ._filter import Admitted, Filter, RigidMotion, Tracked, Tracker, Uncertainty
+from ._guard import Answer, Guard, State
 from ._mesh import Mesh, MeshWarning, Reading, build, generate, read
 from ._motion import Motion, MotionStretch, read_motion
 from ._stream import Sender, Sent, Totals
 from ._tools import capsules, spheres
 from ._tree import ANSWER, CONTACT, SIDE_REASONS, Contacts, Coverage, Scene, Side, Surface, Tree
+from ._wall import EnergyAccount, ForbiddenRegion, Force, ForceState, Proxy, Wrench
 
 __all__ = [
     "ANSWER",
@@ -27,6 +28,7 @@ __all__ = [
     "Answer",
     "Contacts",
     "Coverage",
+    "EnergyAccount",
     "Filter",
     "ForbiddenRegion",
     "Force",
@@ -36,6 +38,7 @@ __all__ = [
     "MeshWarning",
     "Motion",
     "MotionStretch",
+    "Proxy",
     "Reading",
     "RigidMotion",
     "Scene",
@@ -48,6 +51,8 @@ __all__ = [
     "Tracked",
     "Tracker",
     "Tree",
+    "Uncertainty",
+    "Wrench",
     "build",
     "capsules",
     "generate",

@@ -111,6 +111,32 @@ class RigidMotion(NamedTuple):
         return moved
 
 
+class Uncertainty(NamedTuple):
+    """How far the tissue may be from the known surface: `filter.admit(..., **tissue._asdict())`.
+
+    Tissue of at most 100 mm/s, registered to within 0.5 mm, on a frame held for 12 ms after 4 ms on the way:
+    `Uncertainty(100.0, 0.5).after(12).after(4)`.
+    """
+
+    tissue_speed: float
+    """Largest speed (mm/s) of any point of the tissue."""
+    error: float = 0.0
+    """mm, at the start of a period: the error of registration, and what `after` adds."""
+
+    def after(self, ms: int) -> Uncertainty:
+        """The same for a surface of this age: adds the speed times the age. Age and transit both count."""
+        older = _dibs.after(*self._checked(), _whole("ms", ms))
+        return self._replace(error=older)
+
+    def stand_off(self, period: float) -> float:
+        """The distance (mm) between tool and known surface at which a `period` (s) starts without a risk of contact: the
+        uncertainty at its end. A filter keeps its stand-off in addition."""
+        return _dibs.stand_off(*self._checked(), _at_least("period", period, 0))
+
+    def _checked(self) -> tuple[float, float]:
+        return _at_least("tissue_speed", self.tissue_speed, 0), _at_least("error", self.error, 0)
+
+
 class Admitted(NamedTuple):
     """The motion that a filter admits."""
 

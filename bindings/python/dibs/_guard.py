@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import operator
 from enum import IntEnum
-from typing import Any, Literal, NamedTuple, Optional, Union
+from typing import Any, Literal, Optional
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _arrays, _dibs
-from ._filter import Admitted, Filter, RigidMotion, Tracked, _at_least, admitted_of, contacts_of, motion_of, tool_of
+from ._filter import Admitted, Filter, RigidMotion, _at_least, admitted_of, contacts_of, motion_of, tool_of
 from ._pickle import Bound, Remade
 from ._tree import ANSWER, Contacts, Tree, _tests
 
@@ -31,19 +31,6 @@ class State(IntEnum):
     """The surface may be acted on, with a growing margin."""
     SAFE = 2
     """The surface must not be acted on."""
-
-
-class ForceState(IntEnum):
-    """Which rule a force comes from."""
-
-    INACTIVE = 0
-    """The tool is outside the margin."""
-    ACTIVE = 1
-    """The wall acts."""
-    SATURATED = 2
-    """The wall acts with its largest force."""
-    SAFE = 3
-    """There is no pair to act on: the force is the hold, pure damping."""
 
 
 class Answer(Bound):
@@ -89,45 +76,6 @@ class Answer(Bound):
     def __repr__(self) -> str:
         what = self.reason if self.closest is None else f"{self.closest['separation']} mm"
         return f"Answer({self.state.name}, {what})"
-
-
-class Force(NamedTuple):
-    """A force on the tool."""
-
-    force: npt.NDArray[np.float32]
-    """In N. Always finite."""
-    state: ForceState
-    cause: Optional[str]
-    """The cause of a hold."""
-
-
-class ForbiddenRegion(Remade):
-    """A wall: a margin around the surface, with a spring and a damper.
-
-    `stiffness` in N/mm, `damping` and `hold_damping` (used if there is no pair to act on) in N s/mm, `max_force` in N,
-    `margin` in mm. A sampled wall is passive only if the device's damping is above `stiffness * tick / 2 + damping`.
-    """
-
-    def __init__(
-        self, stiffness: float, damping: float, max_force: float, margin: float, *, hold_damping: float = 0.0
-    ) -> None:
-        names = ["stiffness", "damping", "hold_damping", "max_force", "margin"]
-        values = [stiffness, damping, hold_damping, max_force, margin]
-        self._native = _dibs.ForbiddenRegion(*map(_arrays.number, names, values))
-
-    def force(self, answer: Union[Answer, Tracked], velocity: Optional[npt.ArrayLike] = None) -> Force:
-        """The force on the tool, at every tick. For a tracker's answer pass the `velocity` (mm/s) of the tool's point
-        of the pair relative to the surface's; a guard's answer has it."""
-        if isinstance(answer, Tracked):
-            flow = _arrays.finite("velocity", _arrays.numbers("velocity", (0, 0, 0) if velocity is None else velocity))
-            if flow.shape != (3,):
-                raise ValueError(f"velocity: the shape is {flow.shape}; give 3 numbers")
-            force, state, cause = self._native.force_of(answer._native, flow.tolist())
-        elif isinstance(answer, Answer):
-            force, state, cause = self._native.force(answer._native)
-        else:
-            raise TypeError(f"answer: an Answer of Guard.closest is needed, not {type(answer).__name__}")
-        return Force(np.array(force, dtype=np.float32), ForceState(state), cause)
 
 
 class Guard(Remade):

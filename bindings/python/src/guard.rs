@@ -19,7 +19,7 @@ use pyo3::sync::MutexExt;
 use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::record::push_answer;
-use crate::surface::List;
+use crate::surface::{Kept, List};
 use crate::tool::AnyTool;
 use crate::tracker::{Admitted, Filter, Listed, listed, motion, named, record};
 use crate::tree::{Owned, Tree, View, of_any_width};
@@ -269,7 +269,7 @@ impl Guard {
                 None => pair.guard.without_pose(now),
             })
         });
-        Ok(Answer { answer, tree: Arc::clone(&self.tree) })
+        Ok(Answer { answer, contacts: None, tree: Arc::clone(&self.tree) })
     }
 
     /// The answer, and the contacts within a margin.
@@ -293,7 +293,9 @@ impl Guard {
                 AnyTool::Capsule(capsule) => pair.guard.contacts(capsule, margin, now, contacts),
             })
         });
-        Ok((Answer { answer, tree: Arc::clone(&self.tree) }, listed(py, contacts, &self.tree)))
+        let kept = Some(Box::new(contacts.without_search()));
+        let listed = listed(py, contacts, &self.tree);
+        Ok((Answer { answer, contacts: kept, tree: Arc::clone(&self.tree) }, listed))
     }
 
     /// The answer, and the motion that a filter admits; `None` if no surface is trusted.
@@ -320,7 +322,7 @@ impl Guard {
             Err(FilterError::Untrusted(_)) => None,
             Err(error) => return Err(named(error)),
         };
-        Ok((Answer { answer, tree: Arc::clone(&self.tree) }, admitted))
+        Ok((Answer { answer, contacts: None, tree: Arc::clone(&self.tree) }, admitted))
     }
 
     fn acknowledge(&self) -> PyResult<()> {
@@ -352,7 +354,8 @@ fn start_error(error: Error) -> PyErr {
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Answer {
     pub answer: guard::Answer,
-    tree: Arc<Owned>,
+    pub contacts: Option<Box<Kept>>,
+    pub tree: Arc<Owned>,
 }
 
 #[pymethods]

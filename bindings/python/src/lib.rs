@@ -38,11 +38,11 @@ mod _dibs {
     #[pymodule_export]
     use crate::surface::Surface;
     #[pymodule_export]
-    use crate::tracker::{Filter, Tracked, Tracker};
+    use crate::tracker::{Filter, Tracked, Tracker, after, stand_off};
     #[pymodule_export]
     use crate::tree::Tree;
     #[pymodule_export]
-    use crate::wall::ForbiddenRegion;
+    use crate::wall::{EnergyAccount, ForbiddenRegion, Proxy};
 
     use crate::record;
 

@@ -21,6 +21,9 @@ pub const MOST_CONTACTS: usize = 64;
 /// A list of contacts of a tool and a surface.
 pub type List = Contacts<MOST_CONTACTS, 16_384>;
 
+/// The same contacts, kept beside an answer.
+pub type Kept = Contacts<MOST_CONTACTS, 1>;
+
 /// A tree with the positions and velocities of its vertices.
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Surface {

@@ -6,7 +6,7 @@ use dibs_build::SurfaceRows;
 use dibs_build::glam::DVec3;
 use dibs_nostd::filter::{self, FilterError, Motion, MotionRow, Uncertainty};
 use dibs_nostd::{
-    Budget, Capsule, Cost, Fallback, Index, MovingTable, Odometer, Options, Proximity,
+    Budget, Capsule, Cost, Fallback, Index, Millis, MovingTable, Odometer, Options, Proximity,
     TrackerAnswer,
 };
 use pyo3::prelude::*;
@@ -14,7 +14,7 @@ use pyo3::sync::MutexExt;
 use pyo3::types::PyByteArray;
 
 use crate::record::{push_answer, push_contact};
-use crate::surface::{List, Surface};
+use crate::surface::{Kept, List, Surface};
 use crate::tool::AnyTool;
 use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, invalid};
@@ -177,7 +177,8 @@ impl Tracker {
         });
         let found = found.map_err(invalid)?;
         let listed = margin.map(|_| listed(py, contacts, &self.tree));
-        Ok((Tracked { found, tree: Arc::clone(&self.tree) }, listed))
+        let kept = margin.map(|_| Box::new(contacts.without_search()));
+        Ok((Tracked { found, contacts: kept, tree: Arc::clone(&self.tree) }, listed))
     }
 }
 
@@ -185,7 +186,8 @@ impl Tracker {
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Tracked {
     found: TrackerAnswer,
-    tree: Arc<Owned>,
+    pub contacts: Option<Box<Kept>>,
+    pub tree: Arc<Owned>,
 }
 
 impl Tracked {
@@ -212,6 +214,19 @@ impl Tracked {
         });
         (self.found.is_kept, reason, self.found.moved)
     }
+}
+
+/// The error (mm) of a surface this much older, of tissue with an error and a speed.
+#[pyfunction]
+pub fn after(speed: f32, error: f32, ms: u32) -> f32 {
+    // At the end of a period without length.
+    Uncertainty::new(speed).error(error).after(Millis(ms)).stand_off(0.0)
+}
+
+/// The distance (mm) at which a period (s) starts without a risk of contact.
+#[pyfunction]
+pub fn stand_off(speed: f32, error: f32, period: f32) -> f32 {
+    Uncertainty::new(speed).error(error).stand_off(period)
 }
 
 /// Translation and rotation, least separation, reason, queries, instructions.

@@ -356,10 +356,8 @@ impl Scene {
     fn add(&mut self, surface: usize, tool: usize, found: Proximity, own: &mut Option<Proximity>) {
         self.is_entered = true;
         self.options = self.options.after(found.tests());
-        if matches!(
-            found.side,
-            Side::Inside | Side::Crossing | Side::Either | Side::Undefined(NoSide::BelowAccuracy)
-        ) {
+        let is_near = found.side == Side::Undefined(NoSide::BelowAccuracy);
+        if found.side.has_depth() || is_near {
             self.is_outside = false;
         }
         if own.is_none_or(|own| found.separation < own.separation) {

@@ -3,6 +3,12 @@
 use super::made::Tests;
 use crate::{Coverage, MeasuredStretch, TriangleRow, VertexTable};
 
+/// The default tolerance of a depth, as a fraction of the axis' length.
+const TOLERANCE: f32 = 1.0 / 512.0;
+
+/// The least default tolerance, in units of the accuracy: about a hundredth of a millimetre on a heart.
+const LEAST_TOLERANCE: f32 = 32.0;
+
 /// The work limit of one query, in node tests. It bounds the query's time; an answer that was cut short is still valid,
 /// with a wider interval.
 ///
@@ -186,6 +192,14 @@ impl Options {
     pub const fn depth_tolerance(mut self, tolerance: f32) -> Self {
         self.depth_tolerance = Some(tolerance);
         self
+    }
+
+    /// The default [`depth_tolerance`](Self::depth_tolerance) (mm) for an axis of this length (mm) and an answer of this
+    /// accuracy (mm).
+    #[must_use]
+    pub fn default_depth_tolerance(axis_length: f32, accuracy: f32) -> f32 {
+        let (whole, least) = (axis_length * TOLERANCE, LEAST_TOLERANCE * accuracy);
+        if whole > least { whole } else { least }
     }
 
     /// Lists only contacts of the triangles with this [label](crate::Tree::label), as if there were no others: the

@@ -36,6 +36,14 @@ pub enum Side {
     Undefined(NoSide),
 }
 
+impl Side {
+    /// Whether the axis crosses the surface, is inside, or may be either: the separation is then a depth's.
+    #[must_use]
+    pub const fn has_depth(self) -> bool {
+        matches!(self, Self::Inside | Self::Crossing | Self::Either)
+    }
+}
+
 /// Why a tool's side is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -56,7 +56,7 @@ fn ticks_hold(mesh: &Mesh, frames: &[Vec<Vec3>], size: f32, ticks: u32, seed: u6
     let mut odometer = Odometer::new(&tree);
     let mut rng = Rng::with_seed(seed);
     let (mut settled, mut narrowed, mut wide) = (0, 0, 0);
-    let mut has_past = false;
+    let (mut has_past, mut past) = (false, None::<Interval>);
     let mut step = None;
     for length in [0.0, 0.1 * size, size] {
         let (tip, along) = (Vec3::X * 2.0 * size, Vec3::Y);
@@ -83,22 +83,22 @@ fn ticks_hold(mesh: &Mesh, frames: &[Vec<Vec3>], size: f32, ticks: u32, seed: u6
             let whole = query.closest(&surface, &tool, &whole).expect("an answer");
             let found = query.closest(&surface, &tool, &options).expect("an answer");
             has_past &= tracked.moved.is_some();
+            let interval = closest.interval();
+            if let (true, Some(past), Some(moved)) = (has_past, past, tracked.moved) {
+                // What was certain a tick ago, widened by the motion.
+                let most = moved + 4.0 * closest.accuracy;
+                let is_certain =
+                    interval.lower >= past.lower - most && interval.upper <= past.upper + most;
+                assert!(is_certain, "{tick}: {interval:?} after {past:?}, moved {moved}");
+            }
+            past = Some(interval);
             if matches!(whole.side, Side::Undefined(_)) {
                 continue;
             }
-            let interval = closest.interval();
             assert!(meet(interval, whole.interval()), "{tick}: {closest:?} {whole:?}");
             assert!(closest.lower <= closest.separation, "{closest:?}");
             if has_past {
-                // At the surface both sides have the same separation.
-                let has_side = match closest.side {
-                    Side::Undefined(NoSide::BelowAccuracy) => {
-                        closest.axis_distance < 3.0 * closest.accuracy
-                    }
-                    Side::Undefined(_) => false,
-                    _ => true,
-                };
-                assert!(has_side, "{tick}: {closest:?}");
+                assert!(!matches!(closest.side, Side::Undefined(_)), "{tick}: {closest:?}");
                 assert!((closest.direction.length() - 1.0).abs() < 1e-3, "{tick}: {closest:?}");
                 settled += u32::from(found.side == Side::Undefined(NoSide::CutShort));
                 narrowed += u32::from(

@@ -274,6 +274,50 @@ fn a_jump_far_away_starts_the_range_anew() {
     assert!(compared > 60, "{compared}");
 }
 
+/// A tick that has no list to search, because the tool is beyond the margin or the budget is used up, leaves the front of
+/// the range as it was.
+#[test]
+fn a_tick_without_a_search_keeps_the_range() {
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let (mut own, mut whole) = (Contacts::<64, 1024>::new(), Contacts::<64, 1024>::new());
+    let (mut warm, mut after, mut anew, mut without) = (0, 0, 0, 0);
+    for row in (0..rows.len()).step_by(61) {
+        let surface = Odometer::new(&tree).start(rows.as_slice());
+        let start = Sphere::new(rows[row] * 1.2, 1.0).expect("a valid sphere");
+        let pair = query.closest(&surface, &start, &Options::cold()).expect("an answer");
+        let at = |separation: f32| {
+            let centre = pair.point_on_surface + pair.direction * (1.0 + separation);
+            Sphere::new(centre, 1.0).expect("a valid sphere")
+        };
+        let [near, far] = [at(MARGIN - 0.01), at(MARGIN + 0.05)];
+        let mut tick = |tracker: &mut Tracked<'_>, tool: &Sphere, budget| {
+            let options = Options::new().budget(budget);
+            let found = tracker.contacts(&surface, tool, MARGIN, &options, &mut own);
+            (found.expect("an answer").closest.node_tests, own.len())
+        };
+        for (tool, budget) in [(far, Budget::UNLIMITED), (near, Budget::new(0))] {
+            let mut tracker = Tracked::with_range(&tree).expect("deep enough");
+            tick(&mut tracker, &near, Budget::UNLIMITED);
+            warm += tick(&mut tracker, &near, Budget::UNLIMITED).0;
+            without += usize::from(tick(&mut tracker, &tool, budget).1 == 0);
+            let (tests, contacts) = tick(&mut tracker, &near, Budget::UNLIMITED);
+            after += tests;
+            query.contacts(&surface, &near, MARGIN, &Options::cold(), &mut whole).expect("one");
+            assert_eq!(contacts, whole.len(), "{row}");
+            // Another label's part is another range.
+            let options = Options::new().contacts_of(1);
+            tracker.contacts(&surface, &near, MARGIN, &options, &mut whole).expect("an answer");
+            anew += tick(&mut tracker, &near, Budget::UNLIMITED).0;
+        }
+    }
+    println!("{warm} tests with a range, {after} after a tick without a search, {anew} anew");
+    assert!(without > 20 && after < warm + (anew - warm) / 10, "{warm} {after} {anew} {without}");
+}
+
 /// The list is searched within the rest of the budget after the closest pair, and pays for its start, too.
 #[test]
 fn a_tick_with_contacts_takes_no_more_than_its_budget() {

@@ -29,7 +29,7 @@ static const dibs_tool tool = {{100.0f, 0.0f, 20.0f}, {140.0f, 0.0f, 50.0f}, 2.5
 
 #define LONGEST_FILE ((size_t)1 << 24)
 
-static unsigned char *read_file(const char *path, size_t *length) {
+static inline unsigned char *read_file(const char *path, size_t *length) {
     FILE *file = fopen(path, "rb");
     unsigned char *bytes = malloc(LONGEST_FILE);
     if (file == NULL || bytes == NULL) {

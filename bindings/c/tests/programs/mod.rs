@@ -61,6 +61,18 @@ pub fn run(command: &mut Command) -> String {
     out
 }
 
+/// Compiles a program of `tests/programs` with the library, under sanitizers.
+pub fn compile(name: &str, folder: &Path) -> PathBuf {
+    let program = folder.join(name);
+    let mut gcc = tool("gcc", "gcc");
+    gcc.args(["-std=c11", "-g", "-Wall", "-Wextra", "-Werror"]);
+    gcc.args(["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-I"]).arg(include());
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/programs");
+    gcc.arg(sources.join(name).with_extension("c"));
+    run(gcc.arg(library()).args(["-lpthread", "-ldl", "-lm", "-o"]).arg(&program));
+    program
+}
+
 /// A command by name, installed where it is missing.
 pub fn tool(name: &str, package: &str) -> Command {
     // Two installations would refuse each other.

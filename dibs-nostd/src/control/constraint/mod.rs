@@ -16,8 +16,8 @@
 //!   budget never weakens the force.
 //! - If the side is undefined, the output is the hold, never [`Inactive`](ConstraintState::Inactive): the tool may be
 //!   inside. Only at the surface itself, where both sides have nearly the same separation, the constraint acts on it.
-//!   After a first certain tick a [`Tracker`](crate::Tracker) always has a side or is at the surface, for any budget,
-//!   as long as the surface's motion is measured and not larger than stated.
+//!   After a first certain tick a [`Tracker`](crate::Tracker) always has a side, for any budget, as long as the
+//!   surface's motion is measured and not larger than stated.
 //! - If the proximity is unknown, the surface stale, or a number not finite, the output is the *hold*: pure damping
 //!   against the tool's velocity with the same saturation, and the state gives the reason. For a velocity that is not
 //!   finite it is zero.

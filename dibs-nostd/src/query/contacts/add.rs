@@ -102,7 +102,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let mut own =
             pair.contact(closest).filter(|at| at.separation <= margin && is_of(at.triangle));
         let mut spent = Tests::NONE;
-        if matches!(closest.side, Side::Inside | Side::Crossing | Side::Either)
+        if closest.side.has_depth()
             && let Some(contact) = &mut own
         {
             (contact.across, spent) = pair.across(contact, stack, options)?;

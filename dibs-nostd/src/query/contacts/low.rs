@@ -54,19 +54,26 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         options: &Options,
         mut front: RangeFrontMut<'_>,
     ) -> Result<Tests, QueryError> {
-        self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
-            if !options.covers(LIST) {
-                front.keep(false);
-                return Ok(NOT_BEGUN);
-            }
-            let mut low = Low::new(basins, limit, pair);
-            let search = over_range(pair, stack, options)?;
-            let visit = |row, at: &AxisPair| low.add(row, at);
-            let (beyond, tests) =
-                search.each_low_from(&mut front, limit, (ridge, options), visit)?;
-            front.keep(beyond == f32::INFINITY);
-            Ok(Found { complete: low.complete, beyond, tests })
-        })
+        let mut is_begun = false;
+        let made =
+            self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
+                if !options.covers(LIST) {
+                    return Ok(NOT_BEGUN);
+                }
+                is_begun = true;
+                let mut low = Low::new(basins, limit, pair);
+                let search = over_range(pair, stack, options)?;
+                let visit = |row, at: &AxisPair| low.add(row, at);
+                let (beyond, tests) =
+                    search.each_low_from(&mut front, limit, (ridge, options), visit)?;
+                front.keep(beyond == f32::INFINITY);
+                Ok(Found { complete: low.complete, beyond, tests })
+            })?;
+        // Beyond the margin, inside, or without a budget nothing was searched: the front is as it was.
+        if !is_begun {
+            front.keep(false);
+        }
+        Ok(made)
     }
 }
 

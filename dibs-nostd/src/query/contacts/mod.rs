@@ -163,6 +163,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         Self { found: List::new(), basins: Basins::new() }
     }
 
+    /// The same list, with less memory for searches: bindings keep it beside an answer.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn without_search(&self) -> Contacts<N, 1> {
+        Contacts { found: self.found.clone(), basins: Basins::new() }
+    }
+
     /// The contacts, deepest first.
     pub fn iter(&self) -> impl Iterator<Item = &Contact> + Clone {
         self.found.list.iter()

@@ -43,12 +43,6 @@ use touches::Touches;
 /// A limit that never ends a search early.
 const EXACT: f32 = f32::NEG_INFINITY;
 
-/// The default tolerance, as a fraction of the axis' length.
-const TOLERANCE: f32 = 1.0 / 512.0;
-
-/// The least default tolerance, in units of the accuracy: about a hundredth of a millimetre on a heart.
-const LEAST_TOLERANCE: f32 = 32.0;
-
 /// Most points of the axis that are searched.
 const LOOKS: u32 = 27;
 
@@ -137,8 +131,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// The answer with side, signed separation, and the deepest point's pair.
     pub fn run(&mut self) -> Result<Proximity, QueryError> {
-        let least = LEAST_TOLERANCE * self.closest.accuracy;
-        let default = larger(self.tool.axis_length() * TOLERANCE, least);
+        let (length, accuracy) = (self.tool.axis_length(), self.closest.accuracy);
+        let default = Options::default_depth_tolerance(length, accuracy);
         let tolerance = self.options.depth_tolerance.unwrap_or(default);
         let reach = self.reach();
         if reach <= self.enough(tolerance) {

@@ -128,12 +128,15 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if deepest > both.lower {
             both.lower = deepest;
         }
-        if found.is_at_surface() {
-            // The search knows the separation, which is the same on both sides.
+        let is_at_surface = found.is_at_surface();
+        if is_at_surface {
+            // The pair is the search's. Another part of the axis may be inside, as deep as the interval allows.
             found.direction = last.direction;
-            return Ok(Some(both));
-        }
-        if both.lower > -nearest {
+            if both.lower > both.upper {
+                return Ok(None);
+            }
+            found.side = Side::Either;
+        } else if both.lower > -nearest {
             // The motion was too small to reach the inside.
             if nearest > both.lower {
                 both.lower = nearest;
@@ -161,7 +164,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             self.take_pair(vertices, tool, options, found, &last)?;
         }
         both.set_ends(found, tool.radius());
-        Ok(Some(both.with_pair_of(found)))
+        Ok(Some(if is_at_surface { both } else { both.with_pair_of(found) }))
     }
 
     /// Makes the last tick's pair, at its current positions, the answer's pair.

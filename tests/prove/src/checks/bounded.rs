@@ -4,15 +4,18 @@
 // Requirement: T-02
 
 mod budgets;
+pub mod force;
 mod path;
 pub mod rows;
 pub mod scene;
 pub mod tally;
 
 use anyhow::{Context, Result};
+use dibs_nostd::Budget;
 use rayon::prelude::*;
 use xtask::steps::Outcome;
 
+use self::force::steps;
 use self::rows::USUAL;
 use self::scene::truth;
 use self::tally::{Tally, run};
@@ -90,6 +93,14 @@ pub const CHECK: Check = Check {
         note("bounded.20k.inner"),
         note("bounded.20k.bought"),
         note("bounded.20k.user"),
+        steps(
+            "bounded.20k.size",
+            "N; of the force {bounded.20k.step} N, more than 0.5 N at {bounded.20k.steps} % of the ticks; without a budget {bounded.uncut.step} N, {bounded.uncut.steps} %",
+        ),
+        note("bounded.20k.step"),
+        note("bounded.20k.steps"),
+        note("bounded.uncut.step"),
+        note("bounded.uncut.steps"),
         largest(
             "bounded.20k.instructions",
             "On the board the largest of these ticks takes",
@@ -114,6 +125,12 @@ pub const CHECK: Check = Check {
         note("bounded.40k.inner"),
         note("bounded.40k.bought"),
         note("bounded.40k.user"),
+        steps(
+            "bounded.40k.size",
+            "N; of the force {bounded.40k.step} N, more than 0.5 N at {bounded.40k.steps} % of the ticks; without a budget {bounded.uncut.step} N, {bounded.uncut.steps} %",
+        ),
+        note("bounded.40k.step"),
+        note("bounded.40k.steps"),
         largest(
             "bounded.40k.instructions",
             "On the board the largest of these ticks takes",
@@ -138,6 +155,12 @@ pub const CHECK: Check = Check {
         note("bounded.60k.inner"),
         note("bounded.60k.bought"),
         note("bounded.60k.user"),
+        steps(
+            "bounded.60k.size",
+            "N; of the force {bounded.60k.step} N, more than 0.5 N at {bounded.60k.steps} % of the ticks; without a budget {bounded.uncut.step} N, {bounded.uncut.steps} %",
+        ),
+        note("bounded.60k.step"),
+        note("bounded.60k.steps"),
         largest(
             "bounded.60k.instructions",
             "On the board the largest of these ticks takes",
@@ -162,6 +185,12 @@ pub const CHECK: Check = Check {
         note("bounded.100k.inner"),
         note("bounded.100k.bought"),
         note("bounded.100k.user"),
+        steps(
+            "bounded.100k.size",
+            "N; of the force {bounded.100k.step} N, more than 0.5 N at {bounded.100k.steps} % of the ticks; without a budget {bounded.uncut.step} N, {bounded.uncut.steps} %",
+        ),
+        note("bounded.100k.step"),
+        note("bounded.100k.steps"),
         largest(
             "bounded.100k.instructions",
             "On the board the largest of these ticks takes",
@@ -224,6 +253,8 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("bounded.damped", sum(|tally| tally.damped));
     figures.note("bounded.idle", sum(|tally| tally.idle));
     figures.note("bounded.near", sum(|tally| tally.widths.len()));
+    let uncut = run(&scene, &truth, Budget::UNLIMITED);
+    uncut.steps.note_force("bounded.uncut", figures);
     let users = USUAL.par_iter().map(|row| run(&scene, &truth, row.of_user()));
     let users: Vec<Tally> = users.collect();
     for ((tally, user), row) in tallies.iter().zip(&users).zip(&USUAL) {

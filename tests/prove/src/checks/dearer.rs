@@ -4,8 +4,10 @@
 // Requirement: T-02
 
 use anyhow::Result;
+use dibs_nostd::Budget;
 use xtask::steps::Outcome;
 
+use super::bounded::force::steps;
 use super::bounded::rows::{DEARER, HUMAN, Row, TICKS};
 use super::bounded::scene::truth;
 use super::bounded::tally::run;
@@ -38,6 +40,14 @@ pub const CHECK: Check = Check {
         note("dearer.fast.largest"),
         note("dearer.fast.turned"),
         note("dearer.fast.inner"),
+        steps(
+            "dearer.fast.size",
+            "N; of the force {dearer.fast.step} N, more than 0.5 N at {dearer.fast.steps} % of the ticks; without a budget {dearer.fast.uncut.step} N, {dearer.fast.uncut.steps} %",
+        ),
+        note("dearer.fast.step"),
+        note("dearer.fast.steps"),
+        note("dearer.fast.uncut.step"),
+        note("dearer.fast.uncut.steps"),
         largest(
             "dearer.fast.instructions",
             "On the board the largest of these ticks takes",
@@ -60,6 +70,14 @@ pub const CHECK: Check = Check {
         note("dearer.large.largest"),
         note("dearer.large.turned"),
         note("dearer.large.inner"),
+        steps(
+            "dearer.large.size",
+            "N; of the force {dearer.large.step} N, more than 0.5 N at {dearer.large.steps} % of the ticks; without a budget {dearer.large.uncut.step} N, {dearer.large.uncut.steps} %",
+        ),
+        note("dearer.large.step"),
+        note("dearer.large.steps"),
+        note("dearer.large.uncut.step"),
+        note("dearer.large.uncut.steps"),
         largest(
             "dearer.large.instructions",
             "On the board the largest of these ticks takes",
@@ -82,6 +100,14 @@ pub const CHECK: Check = Check {
         note("dearer.through.largest"),
         note("dearer.through.turned"),
         note("dearer.through.inner"),
+        steps(
+            "dearer.through.size",
+            "N; of the force {dearer.through.step} N, more than 0.5 N at {dearer.through.steps} % of the ticks; without a budget {dearer.through.uncut.step} N, {dearer.through.uncut.steps} %",
+        ),
+        note("dearer.through.step"),
+        note("dearer.through.steps"),
+        note("dearer.through.uncut.step"),
+        note("dearer.through.uncut.steps"),
         largest(
             "dearer.through.instructions",
             "On the board the largest of these ticks takes",
@@ -115,6 +141,14 @@ pub const OF_HUMAN: Check = Check {
         note("dearer.human.largest"),
         note("dearer.human.turned"),
         note("dearer.human.inner"),
+        steps(
+            "dearer.human.size",
+            "N; of the force {dearer.human.step} N, more than 0.5 N at {dearer.human.steps} % of the ticks; without a budget {dearer.human.uncut.step} N, {dearer.human.uncut.steps} %",
+        ),
+        note("dearer.human.step"),
+        note("dearer.human.steps"),
+        note("dearer.human.uncut.step"),
+        note("dearer.human.uncut.steps"),
         largest(
             "dearer.human.instructions",
             "On the board the largest of these ticks takes",
@@ -169,7 +203,10 @@ fn measure(rows: &[Row], name: &str, figures: &mut Figures) -> Result<Outcome> {
             let reason = format!("{}: its mesh is not beside the repository", row.name);
             return Ok(Outcome::Skipped(reason));
         };
-        let tally = run(&scene, &truth(&scene), row.budget()?);
+        let truth = truth(&scene);
+        let tally = run(&scene, &truth, row.budget()?);
+        let uncut = run(&scene, &truth, Budget::UNLIMITED);
+        uncut.steps.note_force(&format!("{}.uncut", row.name), figures);
         tally.note(row.name, figures);
         row.note_board(&scene, &tally.work, figures)?;
         wrong += tally.wrong;

@@ -11,6 +11,7 @@ use dibs_nostd::{
 use glam::Vec3;
 use probe::track::tick;
 
+use super::force::wall;
 use super::path;
 use crate::data::real;
 use crate::probe::ticks::{Script, Tick, read};
@@ -40,6 +41,8 @@ pub struct Truth {
     pub upper: f32,
     pub accuracy: f32,
     pub direction: Vec3,
+    /// The force (N) of the demo's wall, without damping.
+    pub force: Vec3,
 }
 
 impl Truth {
@@ -165,11 +168,13 @@ fn place(tick: usize) -> (usize, f32) {
 pub fn truth(scene: &Scene) -> Vec<Truth> {
     let tree = scene.tree();
     let mut query = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
+    let wall = wall();
     scene.each(&tree, |_, surface, tool, options| {
         let options = options.depth_tolerance(0.02);
         let found = query.closest(surface, tool, &options).expect("an answer");
         let Proximity { lower, separation: upper, accuracy, direction, .. } = found;
-        Truth { lower, upper, accuracy, direction }
+        let force = wall.force(&Ok(found), Vec3::ZERO).force;
+        Truth { lower, upper, accuracy, direction, force }
     })
 }
 

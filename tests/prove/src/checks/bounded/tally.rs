@@ -1,21 +1,16 @@
 //! How wide a tracker's intervals are over a path within a budget, and whether whole queries agree with them.
 
-use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
+use dibs_nostd::constraint::ConstraintState;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Options, Proximity, Query, Sphere, SurfaceBlend, Tool, Tracker};
 use glam::Vec3;
 use probe::track::{OPENED, STACK};
 
+use super::force::{Steps, wall};
 use super::rows::DEAREST;
 use super::scene::{Scene, Truth};
 use super::{MARGIN, Settling};
 use crate::harness::figures::Figures;
-
-/// The default tolerance of a depth, as a fraction of the axis' length.
-const TOLERANCE: f32 = 1.0 / 512.0;
-
-/// The least default tolerance, in units of the accuracy.
-const LEAST_TOLERANCE: f32 = 32.0;
 
 /// Results of the ticks with one budget.
 #[derive(Default)]
@@ -29,6 +24,8 @@ pub struct Tally {
     pub widths: Vec<f32>,
     /// Those of an axis that crosses the surface or is inside.
     inner: Vec<f32>,
+    /// Steps of the force near the wall.
+    pub steps: Steps,
     /// Work of each tick, in node tests.
     pub work: Vec<u32>,
 }
@@ -39,7 +36,8 @@ impl Tally {
         width(&self.widths, part)
     }
 
-    /// Notes the widths, and how often the pair was off the deepest, under names that start with `name`.
+    /// Notes the widths, how often the pair was off the deepest, and steps of the force, under names that start with
+    /// `name`.
     pub fn note(&self, name: &str, figures: &mut Figures) {
         for (end, part) in [("95", 0.95), ("99", 0.99), ("largest", 1.0)] {
             figures.note(&format!("{name}.{end}"), self.width(part));
@@ -47,6 +45,8 @@ impl Tally {
         figures.note(&format!("{name}.inner"), width(&self.inner, 0.95));
         let turned = self.turned as f64 / self.widths.len().max(1) as f64 * 100.0;
         figures.note(&format!("{name}.turned"), (turned * 100.0).round() / 100.0);
+        self.steps.note_size(name, figures);
+        self.steps.note_force(name, figures);
     }
 }
 
@@ -64,8 +64,7 @@ pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
     let mut tracker =
         Tracker::<_, STACK, OPENED, OPENED>::with_range(&tree).expect("enough for the tree");
     let mut point = Query::<_, MAX_STACK>::new(&tree).expect("enough for any tree");
-    let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
-    let wall = ForbiddenRegion::new(spring, MARGIN).expect("a valid margin");
+    let wall = wall();
     let (mut tally, mut settling) = (Tally::default(), Settling::default());
     scene.each(&tree, |tick, surface, tool, options| {
         let options = options.budget(budget);
@@ -82,11 +81,12 @@ pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
         if truth.upper < -tool.radius() {
             tally.inner.push(width);
         }
-        let tolerance = (TOLERANCE * tool.axis_length()).max(LEAST_TOLERANCE * found.accuracy);
+        let tolerance = Options::default_depth_tolerance(tool.axis_length(), found.accuracy);
         let is_idle =
             width > tolerance + 2.0 * found.accuracy && found.work() + DEAREST <= budget.tests();
         tally.idle += usize::from(is_idle);
         let force = wall.force(&Ok(found), Vec3::ZERO);
+        tally.steps.add(tick, force.force, truth.force);
         let is_damped = matches!(force.state, ConstraintState::Safe(_));
         tally.damped += usize::from(is_damped);
         let is_turned = found.direction.dot(truth.direction) < std::f32::consts::FRAC_1_SQRT_2;
