@@ -898,9 +898,13 @@ enum dibs_cost
    */
   DIBS_COST_X86_CAPSULE = 3,
   /**
-   * A tick of a tracker or guard on a Cortex-M7, with contacts or without; not on a surface that nodes carry.
+   * A tick of a tracker or guard on a Cortex-M7, with contacts or without.
    */
   DIBS_COST_M7_TICK = 4,
+  /**
+   * The same on a surface that nodes carry.
+   */
+  DIBS_COST_M7_NODES_TICK = 5,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -1628,11 +1632,11 @@ typedef struct {
    */
   float approach;
   /**
-   * Most instructions of all queries of a tick, by `cost`.
+   * Most instructions of all searches of a tick, by `cost`.
    */
   uint32_t instructions;
   /**
-   * A `dibs_cost`, but not that of a tracker's tick.
+   * `DIBS_COST_M7_TICK`, which is `DIBS_COST_M7_NODES_TICK` for a tree with nodes; not a query's.
    */
   uint32_t cost;
   /**
@@ -2528,8 +2532,8 @@ dibs_filter dibs_filter_of(float stand_off, float speed);
  * its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
  * its tracker continues in the next tick.
  *
- * Cost: at most the filter's instructions for the queries, as estimated by a fit to plain queries (deep in the tissue,
- * ticks measured up to twice as many), and for each motion that is tried usually 1,000, at most 40,000.
+ * Cost: at most the filter's instructions for the searches, and for each motion that is tried usually 1,000, at most
+ * 40,000.
  *
  * @param filter       The filter.
  * @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.

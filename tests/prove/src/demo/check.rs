@@ -64,6 +64,11 @@ pub fn check(scene: &Scene, link: &Link, tick: &Tick) -> Result<Checked> {
             let corners = rows.map(|row| positions[row as usize].as_dvec3());
             closest_pair(point, point, corners).distance
         }
+        // A search that was cut short may have been nearer to a vertex than to any triangle that it tested.
+        None if tick.triangle == u32::MAX => {
+            let apart = positions.iter().map(|vertex| vertex.as_dvec3().distance(point));
+            apart.fold(f64::INFINITY, f64::min)
+        }
         None => f64::INFINITY,
     };
     let largest = separation.max(interval).max(off_surface);

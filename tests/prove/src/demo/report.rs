@@ -235,11 +235,15 @@ impl Report {
         promise(self.queries == outcome.checked.len(), "not every answer was checked".to_owned());
         let wrong = self.mismatches;
         let first = outcome.checked.iter().find(|checked| checked.is_wrong());
-        let tick = first.map_or(0, |checked| checked.tick);
-        promise(
-            wrong == 0,
-            format!("{wrong} answers differ from exhaustive search, the first at tick {tick}"),
-        );
+        let of = |tick: &&Tick| first.is_some_and(|checked| checked.tick == tick.tick);
+        let found = outcome.ticks.iter().find(of).map_or_else(String::new, |tick| {
+            let Tick { tick, separation, lower, triangle, node_tests, triangle_tests, .. } = tick;
+            format!(
+                ", the first at tick {tick}: {separation} mm, certain from {lower} mm on, triangle {triangle}, {node_tests} node and \
+                 {triangle_tests} triangle tests"
+            )
+        });
+        promise(wrong == 0, format!("{wrong} answers differ from exhaustive search{found}"));
         let wrong = self.frames_published_wrong;
         promise(wrong == 0, format!("{wrong} published frames differ from what was sent"));
         // The last frame may have been published too late to be read completely.

@@ -264,11 +264,12 @@ pub const CALLS: &[Call] = &[
         KEPT,
     ),
     call(
-        "GuardLimits::budget",
-        "Too small: intervals are wide, and walls damp. Too large for the processor: ticks are late.",
+        "GuardLimits::instructions",
+        "Too few: intervals are wide, and walls damp. More than the processor has in a period: ticks are late.",
         NOTHING,
         KEPT,
     ),
+    call("GuardLimits::budget", "The same, in tests.", NOTHING, KEPT),
     call(
         "GuardLimits::options",
         "A stretch of another tree or frame: each tick says so. A query without side: walls take the tool to be outside.",
