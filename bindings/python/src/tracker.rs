@@ -149,7 +149,7 @@ impl Tracker {
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
         let mut options = options(surface.get());
         if let Some(instructions) = instructions {
-            let cost = of_any_width!(self.tree.view(), tree => Cost::of_tick(&tree));
+            let cost = of_any_width!(self.tree.view(), tree => Cost::of_tick(tree));
             options = options.budget(Budget::for_instructions(instructions, &cost));
         }
         // While a thread waits for the list, it releases Python, so that the thread that holds the list can return.

@@ -279,22 +279,23 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let outcome = tick.run(moved)?;
         let best = tick.triangle();
         self.triangle = best.or(self.triangle);
-        let (mut closest, is_complete) = match outcome {
+        let ended = match outcome {
             Outcome::Ended { lower, is_complete, restarted } => {
                 if restarted {
                     fallback = Some(Fallback::Jump);
                 }
-                (tick.finish(lower)?, is_complete)
+                Ok((lower, is_complete))
             }
             Outcome::Full { tests } => {
                 fallback = Some(Fallback::Full);
                 // A whole query that cannot test the closest triangle again would answer less than is known.
-                if for_whole(budget, options.is_priced, tests) < Budget::TRIANGLE {
-                    (tick.finish(0.0)?, false)
-                } else {
-                    (self.whole(surface, tool, &options.within(budget), best, tests)?, true)
-                }
+                let left = for_whole(budget, options.is_priced, tests);
+                if left < Budget::TRIANGLE { Ok((0.0, false)) } else { Err(tests) }
             }
+        };
+        let (mut closest, is_complete) = match ended {
+            Ok((lower, is_complete)) => (tick.finish(lower)?, is_complete),
+            Err(tests) => (self.whole(surface, tool, &options.within(budget), best, tests)?, true),
         };
         let memory = &mut self.memory;
         let nearest = closest.lower;
