@@ -74,14 +74,18 @@ fn no_walk_to_a_medial_axis_comes_nearer_than_the_stand_off() {
 #[test]
 fn along_a_wall_it_does_not_brake() {
     let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a valid size");
+    let (mut instructions, mut ticks) = (0, 0);
     for seed in 1..4 {
         let glided = glide(&mesh, &motion, 1.5, 4_000, seed);
         println!("{glided:?}");
         assert!(glided.free > 1_000 && glided.whole == glided.free);
         assert!(glided.along > 40 && glided.least_along >= 0.95);
         assert_eq!(glided.unsafe_ticks, 0);
-        assert!(glided.instructions <= 60_000 * u64::from(glided.ticks) && glided.most <= 200_000);
+        assert!(glided.most <= 200_000);
+        (instructions, ticks) = (instructions + glided.instructions, ticks + glided.ticks);
     }
+    // By the cost of a tick, which is above the instructions of each search.
+    assert!(instructions <= 60_000 * u64::from(ticks), "{instructions} in {ticks} ticks");
 }
 
 /// A surface at rest, and a tool with a filter.

@@ -19,7 +19,7 @@ use glam::Vec3;
 const ASKED: u32 = 300;
 const APART: u32 = 23;
 
-/// The budgets in a page: their instructions, and the names of their cost models.
+/// The budgets in a page, a guard's too: their instructions, and the names of their cost models.
 fn shown(page: &str) -> Vec<(u32, String)> {
     let path = format!("{}/../{page}", env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(path).expect("a page");
@@ -27,7 +27,11 @@ fn shown(page: &str) -> Vec<(u32, String)> {
         let (number, model) = rest.split_once(')')?.0.split_once(", &Cost::")?;
         Some((number.replace('_', "").parse().expect("a number"), model.to_owned()))
     });
-    budgets.collect()
+    let of_guards = text.split(".instructions(").skip(1).filter_map(|rest| {
+        let number = rest.split_once(')')?.0.replace('_', "");
+        Some((number.parse().expect("a number"), "M7_TICK".to_owned()))
+    });
+    budgets.chain(of_guards).collect()
 }
 
 #[test]

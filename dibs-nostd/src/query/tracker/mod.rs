@@ -336,7 +336,8 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let search = Search::start(all, &self.tree, stack, surface, tool, &options, first, ties)?;
         let mut closest = search.run::<WHOLE>(f32::INFINITY)?;
         if options.is_priced {
-            let node_tests = closest.work() / QUERY;
+            // But for the root and the closest triangle.
+            let node_tests = closest.work().saturating_sub(1 + Budget::TRIANGLE) / QUERY;
             closest.add_tests(Tests { node_tests, ..Tests::NONE });
         }
         closest.add_tests(tests);
