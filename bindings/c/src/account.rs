@@ -27,7 +27,7 @@ impl Kind for dibs_account {
 ///
 /// @param storage    `DIBS_ACCOUNT_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size       Bytes of the storage.
-/// @param tank       Energy (mJ) that may be given beyond what was received, above 0.
+/// @param tank       Largest difference (mJ) of the energy given and the energy received, above 0.
 /// @param step       Largest change of the force per tick (N), above 0.
 /// @param stiffness  Stiffness of the wall (N/mm), above 0.
 /// @param account    Receives the account's address.

@@ -227,7 +227,8 @@ fn guard_source(is_embedded: bool, opened: u32) -> String {
         pub type Guard<const RANGE: usize = 0> =
             ::dibs_nostd::guard::Guard<'static, 'static, Index, STACK, {opened}, {kind}, RANGE>;
 
-        /// Validates the tree, and makes the two ends of its surface, once.
+        /// Validates the tree, and makes the two ends of its surface, once. They pass over the stack: it needs room for
+        /// about three times the size of both.
         ///
         /// # Errors
         /// Where the tree is damaged, a limit out of range, or the ends were taken before.

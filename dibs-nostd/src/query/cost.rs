@@ -21,7 +21,8 @@ use crate::{Index, Tree};
 /// computed when they are read. A tick within a budget also pays for its work between tests, so its instructions follow
 /// its tests more closely: the constants are a line above the ticks of a path, plus a margin of 15 %. They do not include
 /// a guard's own work. The contacts were those of a tracker [`with_range`](crate::Tracker::with_range), in a list of eight.
-/// No cost is fitted for the ticks on a surface of [modes](crate::modes).
+/// A tick whose front is full ([`Fallback::Full`](crate::Fallback::Full)) pays as a query; its instructions were not
+/// measured. No cost is fitted for the ticks on a surface of [modes](crate::modes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -17,8 +17,8 @@ pub(super) const CHILD_PLANE: u32 = 2;
 /// A triangle below an opened leaf: its corners, and the closest pair's plane (187), besides the node test.
 pub(super) const TRIANGLE: u32 = 1;
 
-/// A whole query in a tick whose front is full has no prices: for this many tests it pays one more. A test of a query takes
-/// 159 instructions.
+/// The tests of a whole query, in a tick whose front is full, for which it pays one more: its other work has no prices. A
+/// test of a query takes 159 instructions.
 pub(super) const QUERY: u32 = 2;
 
 /// The plane of a leaf around a point (407), besides the node test.

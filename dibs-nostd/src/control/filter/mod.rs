@@ -109,7 +109,7 @@ pub struct Filter<const LABELS: usize = 0> {
     /// s.
     approach: f32,
     instructions: u32,
-    /// `None` for that of the trees.
+    /// The cost of a search; without one [`Cost::of_tick`] of the pairs' trees.
     cost: Option<Cost>,
     options: Options,
 }
@@ -202,8 +202,8 @@ impl<const LABELS: usize> Filter<LABELS> {
         Self { instructions, ..self }
     }
 
-    /// The same with the cost of a search, as a tracker's tick; the largest [`Cost::of_tick`] of the pairs' trees by
-    /// default.
+    /// The same with another cost of a search, which is a tracker's tick. The default is the largest [`Cost::of_tick`] of the
+    /// pairs' trees.
     #[must_use]
     pub const fn cost(self, cost: Cost) -> Self {
         Self { cost: Some(cost), ..self }

@@ -64,7 +64,7 @@ pub(super) struct Session<'f, const LABELS: usize> {
     grow: f32,
     /// The fraction of the distance beyond the least one that a motion may use up.
     share: f32,
-    /// Of a search.
+    /// The cost of a search.
     cost: Cost,
     queries: u32,
     instructions: u32,
