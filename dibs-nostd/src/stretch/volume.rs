@@ -85,7 +85,7 @@ impl Volume {
     pub fn check(&self) -> Result<(), StretchError> {
         let Self { work: volume, reference, .. } = *self;
         let kept = if reference < 0.0 { -volume } else { volume };
-        if kept < -FLAT * reference.abs() {
+        if reference != 0.0 && kept < -FLAT * reference.abs() {
             return Err(StretchError::InsideOut { volume, reference });
         }
         Ok(())
