@@ -164,6 +164,13 @@ mod tests {
         }
     }
 
+    #[test]
+    fn ticks_are_counted_across_the_end_of_their_range() {
+        let last = Ticks(u64::MAX);
+        assert_eq!((last.after(Ticks(4)), Ticks(3).since(last)), (Ticks(3), Ticks(4)));
+        assert_eq!(Ticks(701).since(Ticks(700)), Ticks(1));
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 10_000, ..ProptestConfig::default() })]
 

@@ -3,7 +3,7 @@
 // Requirements: C-01, C-07
 
 use dibs_build::{Builder, generate};
-use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
+use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Guidance, SpringDamper};
 use dibs_nostd::failsafe::{LimitError, Limits, State, Watch};
 use dibs_nostd::filter::{Filter, FilterError, Motion, Reason};
 use dibs_nostd::glam::Vec3;
@@ -83,7 +83,9 @@ fn the_velocity_is_that_of_the_tool_relative_to_the_tissue() {
     let limits = GuardLimits::new(300.0, Millis(200)).automatic();
     let mut world = World::new(&built, &heart.positions, limits);
     let start = Vec3::new(75.0, 0.0, 20.0);
-    let (mut along, mut still) = (0, 0);
+    let spring = SpringDamper::stiffness(1.0).damping(0.001).max_force(5.0);
+    let guide = Guidance::new(spring, 0.0).expect("valid");
+    let (mut along, mut still, mut guided) = (0, 0, 0);
     for tick in 0..2_000 {
         if tick % PERIOD == 0 {
             world.is_serial = tick % 2 == 0;
@@ -101,9 +103,16 @@ fn the_velocity_is_that_of_the_tool_relative_to_the_tissue() {
         let searched = answer.searched.expect("a surface");
         assert!((answer.velocity - expected).length() < 0.3, "tick {tick}: {}", answer.velocity);
         assert!((searched.velocity - FLOW).length() < 0.3 && searched.lag == Some(Millis(0)));
+        // The guide gets the pair and its velocity: it pulls the tool to the tissue, and damps.
+        let force = answer.guide(&guide);
+        assert_eq!(force, guide.force(&answer.closest, answer.velocity));
+        if let Ok(pair) = answer.closest {
+            assert!(force.force.dot(pair.direction) < 0.0, "{tick}: {force:?}");
+            guided += 1;
+        }
         *if is_along { &mut along } else { &mut still } += 1;
     }
-    assert!(along > 1_000 && still > 700);
+    assert!(along > 1_000 && still > 700 && guided > 900, "{guided}");
 }
 
 /// Skipped ticks do not increase the tool's velocity.

@@ -21,6 +21,7 @@ mod partial;
 mod posed_packets;
 mod properties;
 mod published_motion;
+mod refused_input;
 mod specification;
 mod strangers;
 mod time;

@@ -6,7 +6,7 @@
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, MotionRow, Reason, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, Cost, Millis, Odometer, Tracker};
+use dibs_nostd::{Capsule, Cost, Millis, MovingTable, Odometer, Tracker};
 use dibs_tests::deform::unit;
 use dibs_tests::filter::{Episode, Tally, glide, scenes, walk};
 use dibs_tests::oracle::{Instrument, exhaustive};
@@ -168,6 +168,10 @@ fn bad_input_is_named() {
     bench.uncertainty = Uncertainty::NONE;
     bench.own = vec![MotionRow::along(Vec3::X, -9.0); 9];
     assert_eq!(bench.ask(&tool, &step), Err(FilterError::Rows { found: 9, most: 8 }));
+    let none: &mut [(&mut Tracker<'_, u16, MAX_STACK, 256>, &MovingTable<'_, [Vec3]>, &Capsule)] =
+        &mut [];
+    let refused = bench.filter.admit(none, &step, 0.001, &Uncertainty::NONE, &[]);
+    assert_eq!(refused, Err(FilterError::Pairs { found: 0, most: Filter::MOST_PAIRS }));
     // A large command is shortened to the robot's speed.
     bench.own.clear();
     let leap = Motion::new(tool.start(), Vec3::splat(1e30), Vec3::splat(-1e9));

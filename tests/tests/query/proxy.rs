@@ -4,9 +4,9 @@
 // Requirement: C-03
 
 use dibs_build::{Builder, Mesh, generate};
-use dibs_nostd::constraint::{Proxy, SpringDamper};
+use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper, Wrench};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, Contact, Contacts, Options, Query, Side, Sphere};
+use dibs_nostd::{Capsule, Contact, Contacts, Options, Query, Side, Sphere, Unavailable};
 use dibs_tests::deform::unit;
 use dibs_tests::sample;
 use dibs_tests::surfaces::sheet;
@@ -50,6 +50,12 @@ struct Wall {
 /// The library's force and torque for a spring of 1 N/mm that never saturates: the displacement, and its moment.
 fn found(template: &Contact, walls: &[Wall]) -> [DVec3; 2] {
     let spring = SpringDamper::stiffness(1.0).max_force(1e9);
+    let wrench = pushed(template, walls, spring, Vec3::ZERO);
+    [wrench.force.as_dvec3(), wrench.torque.as_dvec3()]
+}
+
+/// The wrench of walls on a tool with this velocity.
+fn pushed(template: &Contact, walls: &[Wall], spring: SpringDamper, velocity: Vec3) -> Wrench {
     let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
     let contacts: Vec<Contact> = walls
         .iter()
@@ -61,8 +67,7 @@ fn found(template: &Contact, walls: &[Wall]) -> [DVec3; 2] {
             contact
         })
         .collect();
-    let wrench = proxy.wrench(Ok(contacts.iter()), 0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-    [wrench.force.as_dvec3(), wrench.torque.as_dvec3()]
+    proxy.wrench(Ok(contacts.iter()), 0.0, Vec3::ZERO, velocity, Vec3::ZERO)
 }
 
 /// The true displacement and moment, and the walls' pushes, by trying every active set.
@@ -333,4 +338,34 @@ fn no_force_jumps_where_a_wall_begins_or_ends() {
     }
     println!("{halved} steps: of the force, {worst} at most, {worst_size} of the size");
     assert!(halved > 500);
+}
+
+/// Numbers beyond f32 give the hold, and walls that balance each other give no force, whatever the speed.
+#[test]
+fn a_force_beyond_its_numbers_is_not_given() {
+    let template = contact();
+    let wall = |x: f32, at: Vec3| Wall { normal: Vec3::X * x, depth: 1.0, at };
+    let one = [wall(1.0, Vec3::ZERO)];
+    let spring = SpringDamper::stiffness(1.0).max_force(1e9);
+    let held = ConstraintState::Safe(Unavailable::NotFinite);
+    let away = spring.damping(10.0);
+    // The damper's force alone is infinite.
+    let wrench = pushed(&template, &one, away, Vec3::X * 3e38);
+    assert_eq!((wrench.state, wrench.torque), (held, Vec3::ZERO));
+    // Two walls that face each other, at rest and at a speed whose shares of the damper are infinite.
+    let two = [wall(1.0, Vec3::ZERO), wall(-1.0, Vec3::ZERO)];
+    for speed in [0.0, 1.0, 3e38] {
+        let wrench = pushed(&template, &two, away, Vec3::X * speed);
+        let none = (Vec3::ZERO, Vec3::ZERO, ConstraintState::Active);
+        assert_eq!((wrench.force, wrench.torque, wrench.state), none, "at {speed} mm/s");
+    }
+    // A force within the limit over a length so short that their ratio is infinite.
+    let strong = SpringDamper::stiffness(1.0).damping(1.0).max_force(1e38);
+    let shallow = [Wall { depth: 1e-6, ..one[0] }];
+    let wrench = pushed(&template, &shallow, strong, Vec3::X * -2e38);
+    assert_eq!((wrench.state, wrench.torque), (held, Vec3::ZERO));
+    // A lever so long that only the torque is infinite.
+    let far = [wall(1.0, Vec3::Y * 1e35)];
+    let wrench = pushed(&template, &far, SpringDamper::stiffness(1e9).max_force(1e9), Vec3::ZERO);
+    assert_eq!((wrench.state, wrench.torque), (held, Vec3::ZERO));
 }

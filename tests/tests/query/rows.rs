@@ -4,6 +4,7 @@
 
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::constraint::VelocityRow;
+use dibs_nostd::filter::MotionRow;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Contacts, Options, Query, Side, measure_stretch};
 use dibs_tests::deform::unit;
@@ -270,6 +271,10 @@ fn a_row_without_budget_is_that_of_the_contact() {
         assert_eq!(found.expect("an answer").side, Side::Crossing);
         let contact = contacts.iter().next().expect("the deepest pair");
         let row = VelocityRow::new(contact, 0.0, Vec3::ZERO);
+        let kept = row.stand_off(1.0).gain(20.0);
+        let motion = MotionRow::of_velocity(&kept, 0.25);
+        assert_eq!((motion.linear, motion.angular), (kept.linear, kept.angular));
+        assert!(kept.least != 0.0 && motion.least == kept.least * 0.25, "{motion:?}");
         kinds[usize::from(row.linear != contact.normal.to_array())] += 1;
         let along = (tool.end() - tool.start()).normalize();
         let is_level = Vec3::from(row.linear).dot(along).abs() < 1e-4;

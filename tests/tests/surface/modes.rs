@@ -11,13 +11,15 @@ use std::path::Path;
 use dibs_build::modes::{MARGIN, ModalFit, ModesError, Projector};
 use dibs_build::{Builder, IndexWidth, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::modes::{self, MAX_MODES, ModalReader, ModalSurface, Modes, WeightsError};
+use dibs_nostd::modes::{
+    self, MAX_MODES, ModalGate, ModalReader, ModalSurface, Modes, WeightsError,
+};
 use dibs_nostd::{Frames, Index, Options, Query, StretchError, Tree, VertexTable, measure_stretch};
 use dibs_tests::modal::{anywhere, positions, small};
 use dibs_tests::motions::trembling;
 use dibs_tests::oracle::exhaustive;
 use dibs_tests::poses::pose;
-use dibs_tests::tree_bytes::{reseal as reseal_tree, section};
+use dibs_tests::tree_bytes::{reseal as reseal_tree, row_of_section, section, with_words};
 use dibs_tests::{ask, surfaces};
 use fastrand::Rng;
 use glam::Vec3;
@@ -147,6 +149,8 @@ fn weights_that_make_no_surface_are_refused() {
     let (_, reader) = frames.split().expect("once");
     let refused = ModalReader::<4>::new(reader, &modes).expect_err("a row is missing");
     assert_eq!(refused, WeightsError::Count { expected: 4, found: 3 });
+    let refused = ModalGate::<_, 3>::new(&modes, &tree).err();
+    assert_eq!(refused, Some(WeightsError::Count { expected: 4, found: 3 }));
     for mode in 0..4 {
         let [low, high] = modes.range(mode).expect("there");
         let with = |weight: f32| {
@@ -314,6 +318,13 @@ fn damaged_modes_do_not_validate() {
         let refused = damaged(anchor + at, &wrong.to_le_bytes()).expect_err("is wrong");
         assert_eq!(refused, E::Anchor { anchor: 2 });
     }
+
+    // A section shorter than its header, and modes without the shape that they move.
+    let modes_of = |blob: &[u8]| Modes::of(&Tree::<u16>::from_bytes(blob).expect("sound")).err();
+    let short = with_words(blob, &[(row_of_section(blob, 7) + 8, 31)]);
+    assert_eq!(modes_of(&short), Some(E::Length { expected: 32, found: 31 }));
+    let bare = with_words(blob, &[(row_of_section(blob, 4), 1 << 31)]);
+    assert_eq!(modes_of(&bare), Some(E::NoRestShape));
 
     let mut rng = Rng::with_seed(8);
     for _ in 0..2_000 {

@@ -7,7 +7,7 @@
 use dibs_build::{BuildError, Builder, BuiltTree, IndexWidth, Mesh, ReadOptions, Unit, generate};
 use dibs_nostd::format::{CRC, Link, MAX_STACK};
 use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree, TriangleRow};
-use dibs_tests::tree_bytes::{reseal, section};
+use dibs_tests::tree_bytes::{section, with_words, word};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
@@ -17,16 +17,9 @@ fn heart(index: IndexWidth) -> (Mesh, BuiltTree) {
     (mesh, tree)
 }
 
-fn word(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
-}
-
 /// Changes a word and corrects the checksum, so that only the word is wrong.
 fn with_word(bytes: &[u8], at: usize, value: u32) -> Vec<u8> {
-    let mut changed = bytes.to_vec();
-    changed[at..at + 4].copy_from_slice(&value.to_le_bytes());
-    reseal(&mut changed);
-    changed
+    with_words(bytes, &[(at, value)])
 }
 
 #[test]

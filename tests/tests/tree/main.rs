@@ -10,3 +10,5 @@ mod messages;
 mod nasty;
 mod readers;
 mod readers_damaged;
+mod refused;
+mod words;

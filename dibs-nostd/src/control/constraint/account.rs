@@ -203,4 +203,18 @@ mod tests {
         assert_eq!(EnergyAccount::new(1.0, 0.0, 1.0).unwrap_err().parameter, "step");
         assert_eq!(EnergyAccount::new(1.0, 0.5, -1.0).unwrap_err().parameter, "stiffness");
     }
+
+    /// A sum of infinite parts is not a number: then the account is empty, and there is no force.
+    #[test]
+    fn what_overflows_empties_the_account() {
+        let mut account = EnergyAccount::new(1.0, 1e20, 1.0).unwrap();
+        let wanted = Vec3::new(1e19, 1e19, 0.0);
+        assert_eq!(account.pass(wanted, Vec3::ZERO, 1.0), wanted);
+        // The work is infinite along one axis, and its opposite along the other.
+        let force = account.pass(Vec3::ZERO, Vec3::new(1e20, -1e20, 0.0), 1.0);
+        assert_eq!((account.balance(), force), (0.0, Vec3::ZERO));
+        // The force would give infinite work at once.
+        let mut account = EnergyAccount::new(1.0, 1e20, 1.0).unwrap();
+        assert_eq!(account.pass(Vec3::X * 1e19, Vec3::X * 1e20, 1.0), Vec3::ZERO);
+    }
 }

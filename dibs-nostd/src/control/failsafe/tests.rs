@@ -158,6 +158,13 @@ fn every_input_at_each_limit_leads_from_each_state_to_the_state_of_the_table() {
 }
 
 #[test]
+fn a_machine_keeps_the_limits_that_it_was_given() {
+    let machine = FailSafe::new(limits(7, true));
+    let kept = machine.limits();
+    assert_eq!((kept.age(), kept.recovery_frames(), kept.is_automatic()), (AGE, 7, true));
+}
+
+#[test]
 fn recovery_takes_its_frames_in_a_row_and_from_safe_an_acknowledgement() {
     for before in [State::Degraded, State::Safe] {
         for frames in [1_u16, 2, 5] {

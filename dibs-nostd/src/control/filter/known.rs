@@ -70,3 +70,16 @@ pub(super) fn smaller(a: f32, b: f32) -> f32 {
         f32::NAN
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A distance that is not a number is never replaced by one.
+    #[test]
+    fn no_number_hides_one_that_is_missing() {
+        assert_eq!((smaller(1.0, 2.0), smaller(2.0, 1.0), larger(1.0, 2.0)), (1.0, 1.0, 2.0));
+        assert!(smaller(f32::NAN, 1.0).is_nan() && smaller(1.0, f32::NAN).is_nan());
+        assert!(larger(f32::NAN, 1.0).is_nan());
+    }
+}

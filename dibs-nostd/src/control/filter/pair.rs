@@ -106,3 +106,40 @@ fn distance(found: &Proximity, radius: f32, is_outside: bool) -> f32 {
     };
     sum_down(sum_down(lower, radius), -found.accuracy)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An answer 5 mm from the surface, or this far, for a tool of 2 mm with an error of 0.5 mm.
+    fn bound(side: Side, axis_distance: f32, is_outside: bool) -> f32 {
+        let found = Proximity {
+            separation: 5.0,
+            lower: 5.0,
+            accuracy: 0.5,
+            side,
+            axis_distance,
+            point_on_surface: Vec3::ZERO,
+            ..Proximity::NOWHERE
+        };
+        distance(&found, 2.0, is_outside)
+    }
+
+    /// Without a side the axis may be inside, unless it was outside before, or no inside exists.
+    #[test]
+    fn a_missing_side_counts_as_its_reason_says() {
+        let close = |bound: f32, expected: f32| (bound - expected).abs() < 1e-5;
+        for side in [Side::Outside, Side::Undefined(NoSide::OpenBoundary)] {
+            assert!(close(bound(side, 7.0, false), 6.5), "{side:?}");
+        }
+        for reason in [NoSide::BelowAccuracy, NoSide::CutShort, NoSide::Degenerate] {
+            let side = Side::Undefined(reason);
+            assert!(close(bound(side, 7.0, true), 6.5), "{reason:?}");
+            assert!(bound(side, 7.0, false) == f32::NEG_INFINITY, "{reason:?}");
+        }
+        // At the surface it is inside by no more than twice its distance from there.
+        let at_surface = Side::Undefined(NoSide::BelowAccuracy);
+        assert!(close(bound(at_surface, 0.25, false), 6.0));
+        assert!(bound(Side::Undefined(NoSide::CutShort), 0.25, false) == f32::NEG_INFINITY);
+    }
+}

@@ -1,0 +1,111 @@
+//! What a list of contacts says of those that it lacks, and of a tool on the surface; and a vertex of too many triangles.
+
+// Requirements: S-01, S-04
+
+use dibs_build::{Builder, Mesh};
+use dibs_nostd::format::MAX_STACK;
+use dibs_nostd::{
+    Budget, Contact, Contacts, Cost, NoSide, Odometer, Options, Query, Side, Sphere, Tracker,
+};
+use dibs_tests::surfaces::{ball, joined, moved};
+use glam::Vec3;
+
+/// A list says how far it is complete: no contact nearer than that is missing.
+#[test]
+fn no_contact_below_the_bound_is_missing() {
+    let ball = ball(2);
+    let size = ball.positions[0].length();
+    let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+    let balls: Vec<Mesh> =
+        (2..).zip(axes).map(|(gap, axis)| moved(&ball, axis * (size + gap as f32))).collect();
+    let mesh = joined(&balls);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let tool = Sphere::new(Vec3::ZERO, 1.0).expect("valid");
+    let mut all = Contacts::<16>::new();
+    let mut few = Contacts::<3>::new();
+    let options = Options::cold();
+    query.contacts(rows.as_slice(), &tool, 9.0, &options, &mut all).expect("an answer");
+    query.contacts(rows.as_slice(), &tool, 9.0, &options, &mut few).expect("an answer");
+    let all: Vec<Contact> = all.within(9.0).expect("complete").copied().collect();
+    assert_eq!(all.len(), axes.len(), "one of each ball");
+    let list = few.within(9.0).expect("the deepest is in the list");
+    assert!(!list.is_complete());
+    assert_eq!(list.size_hint(), (3, Some(3)));
+    let bound = list.bound();
+    let kept: Vec<f32> = list.map(|contact| contact.separation).collect();
+    let below: Vec<f32> =
+        all.iter().map(|contact| contact.separation).filter(|&apart| apart < bound).collect();
+    assert_eq!(kept, below);
+    assert!(bound > kept[2] && bound <= all[3].separation, "{bound} {kept:?}");
+}
+
+/// A tool whose axis meets the surface has no side of its own, but the side of the tick before.
+#[test]
+fn contacts_of_a_tool_that_arrives_at_the_surface_stay_known() {
+    let mesh = ball(3);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let [a, b, c] = mesh.triangles[7].map(|vertex| mesh.positions[vertex as usize]);
+    let (middle, outward) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize());
+    let mut tracker = Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough");
+    let mut contacts = Contacts::<4>::new();
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let mut sides = Vec::new();
+    for height in [1e-2, 0.0] {
+        let tool = Sphere::new(middle + outward * height, 1.0).expect("valid");
+        let options = Options::new();
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let plain = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
+        let found = tracker.contacts(&surface, &tool, 2.0, &options, &mut contacts);
+        let found = found.expect("an answer");
+        sides.push((plain.side, found.closest.side));
+        let first = contacts.within(2.0).expect("it has a side").next().expect("one");
+        assert!((first.separation - (height - 1.0)).abs() < 2e-3, "{first:?}");
+        assert!(first.normal.dot(outward) > 0.99, "{first:?}");
+    }
+    let outside = (Side::Outside, Side::Outside);
+    let kept = (Side::Undefined(NoSide::BelowAccuracy), Side::Either);
+    assert_eq!(sides, [outside, kept]);
+}
+
+/// A pleated cone whose tip joins more triangles than a side looks at: every other one is in a plane with the point.
+#[test]
+fn a_vertex_of_too_many_triangles_has_no_side() {
+    let cone = |around: u32| {
+        let angle = |at: u32| (at / 2) as f32 / (around / 2) as f32 * std::f32::consts::TAU;
+        let low = |at: u32| Vec3::Z * (at % 2) as f32 * -5.0;
+        let rim =
+            (0..around).map(|at| Vec3::new(angle(at).cos(), angle(at).sin(), 0.0) * 20.0 + low(at));
+        let mut mesh = Mesh { positions: rim.collect(), ..Mesh::default() };
+        mesh.positions.extend([Vec3::Z * 20.0, Vec3::Z * -20.0]);
+        for at in 0..around {
+            let next = (at + 1) % around;
+            mesh.triangles.extend([[at, next, around], [next, at, around + 1]]);
+        }
+        mesh
+    };
+    for (around, expected) in [(200, Side::Outside), (300, Side::Undefined(NoSide::Degenerate))] {
+        let mesh = cone(around);
+        let built = Builder::new().build(&mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("valid");
+        let rows = built.to_rows(&mesh.positions);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let tool = Sphere::new(Vec3::Z * 25.0, 1.0).expect("valid");
+        let found = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
+        assert!((found.separation - 4.0).abs() <= 1e-4, "{found:?}");
+        assert_eq!(found.side, expected, "{around} triangles");
+    }
+}
+
+/// Tests that cost nothing need no budget.
+#[test]
+fn free_tests_have_no_budget() {
+    let free = Cost { node_test: 0, triangle_test: 0, ..Cost::M7_CAPSULE };
+    assert_eq!(Budget::for_instructions(1, &free), Budget::UNLIMITED);
+    assert_ne!(Budget::for_instructions(1, &Cost::M7_CAPSULE), Budget::UNLIMITED);
+}
