@@ -1,6 +1,6 @@
 //! The nodes of a tree as bytes: section 11 of `dibs-nostd`'s `docs/format.md`.
 
-use dibs_nostd::nodes::{HEADER_BYTES, LEAST_VOLUME, MARGIN, Nodes, SIGNED_ZERO};
+use dibs_nostd::nodes::{HEADER_BYTES, LEAST_VOLUME, MARGIN, MARKS, Nodes, SIGNED_ZERO};
 use glam::{DMat3, DVec3, Vec3};
 
 use super::VolumeError;
@@ -31,6 +31,7 @@ pub(crate) fn encode(
         shape.corners.into_iter().for_each(|node| bytes.extend((node as u16).to_le_bytes()));
         shape.numbers(stretch).into_iter().for_each(|x| bytes.extend(x.to_le_bytes()));
     }
+    let mut marks = vec![0_u32; embedding.nodes.len().div_ceil(MARKS as usize)];
     for &vertex in order {
         let bound = &embedding.vertices[vertex as usize];
         bytes.extend((bound.tetrahedron as u16).to_le_bytes());
@@ -42,7 +43,13 @@ pub(crate) fn encode(
         [a, b, c]
             .into_iter()
             .for_each(|node| bytes.extend(embedding.stored(of(node)).to_le_bytes()));
+        for (node, weight) in corners.into_iter().zip(bound.weights) {
+            if weight != 0 {
+                marks[(node / MARKS) as usize] |= 1 << (node % MARKS);
+            }
+        }
     }
+    marks.into_iter().for_each(|word| bytes.extend(word.to_le_bytes()));
     Ok(bytes)
 }
 

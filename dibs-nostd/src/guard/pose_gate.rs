@@ -166,6 +166,10 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
         self.rows.ahead()
     }
 
+    fn counts(&self, row: u32) -> bool {
+        self.rows.counts(row)
+    }
+
     fn surface_facts(&self) -> SurfaceFacts {
         self.rows.surface_facts()
     }

@@ -64,6 +64,20 @@ pub enum NodesError {
         /// too large.
         sum: u32,
     },
+    /// A vertex has a weight for a node that is not marked as carrying one.
+    Unmarked {
+        /// Row of the vertex.
+        vertex: u32,
+        /// The node.
+        node: u32,
+    },
+    /// A node that does not exist is marked as carrying a vertex.
+    Marked {
+        /// The number of the node.
+        node: u32,
+        /// Nodes of the surface.
+        nodes: u32,
+    },
 }
 
 impl fmt::Display for NodesError {
@@ -86,6 +100,12 @@ impl fmt::Display for NodesError {
             }
             Self::Binding { vertex, element, elements } => {
                 write!(f, "vertex {vertex} is bound to element {element}, there are {elements}")
+            }
+            Self::Unmarked { vertex, node } => {
+                write!(f, "node {node} carries vertex {vertex} without a mark")
+            }
+            Self::Marked { node, nodes } => {
+                write!(f, "node {node} is marked as carrying a vertex, there are {nodes}")
             }
             Self::Weights { vertex, sum } => {
                 write!(f, "the absolute weights of vertex {vertex} sum up to {sum} parts of 65536")

@@ -13,6 +13,8 @@ pub const NODE_BYTES: usize = 12;
 pub const ELEMENT_BYTES: usize = 36;
 /// Bytes of one vertex's binding.
 pub const BINDING_BYTES: usize = 8;
+/// Nodes in a word of marks: a bit is set where the node carries a vertex.
+pub const MARKS: u32 = u32::BITS;
 /// The sum of a vertex's four weights.
 pub const WHOLE: u32 = 1 << 16;
 /// The stored number of a weight of zero if vertices may lie outside of their elements: weights are then signed, in
@@ -36,6 +38,17 @@ pub(super) struct Parts<'a> {
     pub nodes: &'a [[u8; NODE_BYTES]],
     pub elements: &'a [[u8; ELEMENT_BYTES]],
     pub bindings: &'a [[u8; BINDING_BYTES]],
+    /// A bit for each node that carries a vertex.
+    pub marks: &'a [[u8; 4]],
+}
+
+impl Parts<'_> {
+    /// Whether a vertex has a weight other than 0 for this node.
+    #[inline(always)]
+    pub fn carries(&self, node: u32) -> bool {
+        let word = self.marks.get((node / MARKS) as usize);
+        word.is_some_and(|&word| u32::from_le_bytes(word) >> (node % MARKS) & 1 != 0)
+    }
 }
 
 /// How weights are stored.
@@ -122,15 +135,21 @@ pub(super) fn parts(bytes: &[u8], vertices: u32) -> Result<Parts<'_>, NodesError
     if let Some(offset) = fields.find(|&offset| is_wrong(offset)) {
         return Err(NodesError::Field { offset, value: word(offset.into()) });
     }
-    let sizes = [(nodes, NODE_BYTES), (elements, ELEMENT_BYTES), (vertices, BINDING_BYTES)];
+    let sizes = [
+        (nodes, NODE_BYTES),
+        (elements, ELEMENT_BYTES),
+        (vertices, BINDING_BYTES),
+        (nodes.div_ceil(MARKS), size_of::<u32>()),
+    ];
     let lengths = sizes.map(|(rows, stride)| u64::from(rows) * stride as u64);
     let expected = HEADER_BYTES as u64 + lengths.iter().sum::<u64>();
     if bytes.len() as u64 != expected {
         return Err(wrong_length(expected));
     }
-    let [of_nodes, of_elements, _] = lengths.map(|length| length as usize);
+    let [of_nodes, of_elements, of_bindings, _] = lengths.map(|length| length as usize);
     let (nodes, tables) = tables.split_at_checked(of_nodes).unwrap_or_default();
-    let (elements, bindings) = tables.split_at_checked(of_elements).unwrap_or_default();
+    let (elements, tables) = tables.split_at_checked(of_elements).unwrap_or_default();
+    let (bindings, marks) = tables.split_at_checked(of_bindings).unwrap_or_default();
     let mut parts = Parts {
         extent,
         edge,
@@ -139,6 +158,7 @@ pub(super) fn parts(bytes: &[u8], vertices: u32) -> Result<Parts<'_>, NodesError
         nodes: nodes.as_chunks().0,
         elements: elements.as_chunks().0,
         bindings: bindings.as_chunks().0,
+        marks: marks.as_chunks().0,
     };
     parts.amplification = check(&parts)?;
     Ok(parts)
@@ -193,6 +213,16 @@ fn check(parts: &Parts<'_>) -> Result<f32, NodesError> {
             return Err(NodesError::Weights { vertex, sum });
         }
         largest = largest.max(sum);
+        // A node without its mark would move the vertex unseen.
+        let record = parts.elements.get(binding.element as usize);
+        let corners = record.map_or([0; 4], corners);
+        let unmarked = |&(node, weight): &(u32, i32)| weight != 0 && !parts.carries(node);
+        if let Some((node, _)) = corners.into_iter().zip(weights).find(unmarked) {
+            return Err(NodesError::Unmarked { vertex, node });
+        }
+    }
+    if let Some(node) = (nodes..nodes.next_multiple_of(MARKS)).find(|&node| parts.carries(node)) {
+        return Err(NodesError::Marked { node, nodes });
     }
     // The sum itself is exact: the factor covers the rounding of products with it.
     let above = if largest > WHOLE { 1.0 + 1.0 / 65_536.0 } else { 1.0 };

@@ -24,6 +24,8 @@ mod measure;
 mod monitor;
 mod surface;
 
+use core::ops::Range;
+
 use glam::Vec3;
 use kernel::Now;
 use layout::Parts;
@@ -32,7 +34,8 @@ pub use error::NodesError;
 /// The layout of the nodes' bytes, for their builder.
 #[doc(hidden)]
 pub use layout::{
-    BINDING_BYTES, ELEMENT_BYTES, HEADER_BYTES, MOST_SIZES, NODE_BYTES, SIGNED_ZERO, STEP, WHOLE,
+    BINDING_BYTES, ELEMENT_BYTES, HEADER_BYTES, MARKS, MOST_SIZES, NODE_BYTES, SIGNED_ZERO, STEP,
+    WHOLE,
 };
 use measure::Pass;
 pub use monitor::NodeMonitor;
@@ -169,11 +172,12 @@ impl<'a> Nodes<'a> {
     /// Bytes of the section in flash.
     #[must_use]
     pub const fn flash_bytes(&self) -> usize {
-        let Parts { nodes, elements, bindings, .. } = &self.parts;
+        let Parts { nodes, elements, bindings, marks, .. } = &self.parts;
         HEADER_BYTES
             + NODE_BYTES * nodes.len()
             + ELEMENT_BYTES * elements.len()
             + BINDING_BYTES * bindings.len()
+            + size_of::<u32>() * marks.len()
     }
 
     /// Position of a node at rest (mm); `None` outside the table.
@@ -267,6 +271,16 @@ impl<'a> Nodes<'a> {
             return Err(StretchError::VertexCount { expected, found: found as u32 });
         }
         Ok(())
+    }
+
+    /// Whether a vertex has a weight other than 0 for this node: the motion of the others moves no part of the surface.
+    fn carries(&self, node: u32) -> bool {
+        self.parts.carries(node)
+    }
+
+    /// Those of these nodes that carry a vertex.
+    fn carrying(&self, nodes: Range<u32>) -> impl Iterator<Item = u32> {
+        nodes.filter(|&node| self.carries(node))
     }
 
     /// Number of elements in a range whose size is limited together.

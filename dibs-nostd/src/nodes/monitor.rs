@@ -98,15 +98,16 @@ impl<'a, const SURFACES: usize> NodeMonitor<'a, SURFACES> {
         }
         if let Some(Compared { largest, rows: [first, end], .. }) = compared {
             if !(largest <= limit * limit) {
-                return Err(too_fast(surface, before, first..end, limit));
+                return Err(too_fast(surface, before, self.nodes.carrying(first..end), limit));
             }
             return Ok((work, true));
         }
         let waiting = ready.saturating_sub(self.next_row);
         let rows = if waiting < work { waiting } else { work };
         let range = self.next_row..self.next_row.saturating_add(rows);
-        if !(largest_step(surface, before, range.clone(), 0.0) <= limit * limit) {
-            return Err(too_fast(surface, before, range, limit));
+        let carrying = || self.nodes.carrying(range.clone());
+        if !(largest_step(surface, before, carrying(), 0.0) <= limit * limit) {
+            return Err(too_fast(surface, before, carrying(), limit));
         }
         self.next_row = range.end;
         Ok((work.saturating_sub(rows), self.next_row >= self.nodes.count()))
@@ -161,6 +162,10 @@ impl<const SURFACES: usize> Gate for NodeMonitor<'_, SURFACES> {
 
     fn motion_unit(&self) -> Option<MotionUnit> {
         Some(self.nodes.motion)
+    }
+
+    fn counts(&self, row: u32) -> bool {
+        self.nodes.carries(row)
     }
 
     fn surface_facts(&self) -> SurfaceFacts {

@@ -33,7 +33,7 @@ impl<'n, 'a, V: VertexTable + ?Sized> EmbeddedSurface<'n, 'a, V> {
     }
 
     /// The step from this surface to a later one, for a [`Sweep`](crate::Sweep) and a [`Tracker`](crate::Tracker), by the
-    /// motion of the nodes. `odometer` is from [`Nodes::odometer`]; one that counts otherwise is replaced by that. Between
+    /// motion of the nodes that carry a vertex. `odometer` is from [`Nodes::odometer`]; one that counts otherwise is replaced by that. Between
     /// the two surfaces a vertex is computed from both.
     ///
     /// Cost: one pass over the nodes of both.
@@ -45,7 +45,8 @@ impl<'n, 'a, V: VertexTable + ?Sized> EmbeddedSurface<'n, 'a, V> {
         if !odometer.counts(self.nodes.motion) {
             *odometer = self.nodes.odometer();
         }
-        let step = odometer.step(self.table, after.table);
+        let carries = |node| self.nodes.carries(node);
+        let step = odometer.step_of(self.table, after.table, carries);
         step.carried(self, after, self.nodes.parts.amplification)
     }
 

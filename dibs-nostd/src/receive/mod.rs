@@ -398,7 +398,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
                 let step = LastStep::between(before, last)?;
                 Some(Earlier { frame: before, units: step.units(), t: step.ahead(age) })
             });
-            work = self.step.compare(&back, front, earlier.as_ref(), ready, work);
+            work = self.step.compare(&self.gate, (&back, front), earlier.as_ref(), ready, work);
             if frame.is_complete && self.step.rows() < ready {
                 return Ok(Advance::Pending);
             }

@@ -4,7 +4,7 @@
 //! published: so no gate and no user can understate the motion.
 
 use crate::math::sqrt::sqrt;
-use crate::stretch::{Compared, largest_change, largest_step};
+use crate::stretch::{Compared, Gate, largest_change, largest_step};
 use crate::surface::{MotionReading, MotionUnit, PredictionCheck, VertexTable};
 
 /// Most units of an extrapolated step: more than 32 times the root sphere's radius.
@@ -37,11 +37,11 @@ impl StepMeter {
     }
 
     /// Compares at most `work` of the rows below `ready` with the published ones, and with their extrapolation from an
-    /// earlier frame, if there is one. Returns the work left.
-    pub fn compare<V: VertexTable + ?Sized>(
+    /// earlier frame, if there is one; of these rows only those whose motion the gate counts. Returns the work left.
+    pub fn compare<V: VertexTable + ?Sized, G: Gate>(
         &mut self,
-        now: &V,
-        before: &V,
+        gate: &G,
+        (now, before): (&V, &V),
         earlier: Option<&Earlier<'_, V>>,
         ready: u32,
         work: u32,
@@ -49,13 +49,14 @@ impl StepMeter {
         let waiting = ready.saturating_sub(self.rows);
         let rows = if waiting < work { waiting } else { work };
         let end = self.rows.saturating_add(rows);
-        let (range, largest) = (self.rows..end, self.largest);
+        let counted = (self.rows..end).filter(|&row| gate.counts(row));
+        let largest = self.largest;
         (self.largest, self.off) = match earlier {
             Some(&Earlier { frame, units, t }) => {
                 (self.units, self.t) = (units, t);
-                largest_change((now, before, frame), t, range, (self.largest, self.off))
+                largest_change((now, before, frame), t, counted, (self.largest, self.off))
             }
-            None => (largest_step(now, before, range, self.largest), f32::NAN),
+            None => (largest_step(now, before, counted, self.largest), f32::NAN),
         };
         if !(self.largest <= largest) {
             self.fastest = [self.rows, end];

@@ -188,6 +188,13 @@ pub trait Gate {
         None
     }
 
+    /// Whether the motion of this row moves the surface.
+    #[doc(hidden)]
+    fn counts(&self, row: u32) -> bool {
+        let _ = row;
+        true
+    }
+
     /// The stretch at the end of the frame's extrapolation, once the frame is admitted. `None` if the gate does not
     /// measure it, or it is beyond the limit.
     #[doc(hidden)]

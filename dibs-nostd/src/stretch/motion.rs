@@ -2,8 +2,6 @@
 
 // Requirement: F-03
 
-use core::ops::Range;
-
 #[cfg(feature = "bus")]
 use glam::Vec3;
 
@@ -26,7 +24,7 @@ pub(crate) const fn farthest(speed: f32, recovery: f32, elapsed: Millis) -> f32 
 pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
     now: &V,
     before: &W,
-    rows: Range<u32>,
+    rows: impl Iterator<Item = u32>,
     mut largest: f32,
 ) -> f32 {
     for row in rows {
@@ -50,7 +48,7 @@ pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
 pub(crate) fn largest_change<V: VertexTable + ?Sized>(
     (now, before, earlier): (&V, &V, &V),
     t: f32,
-    rows: Range<u32>,
+    rows: impl Iterator<Item = u32>,
     (mut largest, mut off): (f32, f32),
 ) -> (f32, f32) {
     for row in rows {
@@ -75,10 +73,10 @@ pub(crate) fn largest_change<V: VertexTable + ?Sized>(
 pub(crate) fn too_fast<V: VertexTable + ?Sized>(
     now: &V,
     before: &V,
-    rows: Range<u32>,
+    rows: impl Iterator<Item = u32>,
     limit: f32,
 ) -> StretchError {
-    let mut found = StretchError::TooFast { vertex: rows.start, step: f32::INFINITY, limit };
+    let mut found = StretchError::TooFast { vertex: 0, step: f32::INFINITY, limit };
     for vertex in rows {
         let step = largest_step(now, before, vertex..vertex.saturating_add(1), 0.0);
         if !(step <= limit * limit) {

@@ -374,6 +374,16 @@ impl Odometer {
         before: &'v W,
         after: &'v V,
     ) -> Step<'v, W, V> {
+        self.step_of(before, after, |_| true)
+    }
+
+    /// The same where only the motion of some rows counts.
+    pub(crate) fn step_of<'v, V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
+        &mut self,
+        before: &'v W,
+        after: &'v V,
+        counts: impl Fn(u32) -> bool,
+    ) -> Step<'v, W, V> {
         let (mut from, mut to) = (Digest::new(), Digest::new());
         let mut largest = 0.0_f32;
         let mut is_measured = before.len() == self.vertices && after.len() == self.vertices;
@@ -385,7 +395,7 @@ impl Odometer {
             from.add(vertex, old);
             to.add(vertex, new);
             let squared = new.distance_squared(old);
-            if squared > largest {
+            if squared > largest && counts(vertex) {
                 largest = squared;
             }
             // False for NaN too.

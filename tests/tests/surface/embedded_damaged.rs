@@ -77,6 +77,18 @@ fn damaged_nodes_are_refused() {
     assert_eq!(error, Some(NodesError::Binding { vertex: 9, element: 72, elements: 72 }));
     let error = defect(&built, |bytes| put(bytes, bindings + 8 * 9 + 2, &[0xFF; 6]));
     assert_eq!(error, Some(NodesError::Weights { vertex: 9, sum: 6 * 65_535 - 65_536 }));
+    // The marks of nodes that carry a vertex are the last two words.
+    let end = |bytes: &[u8]| bytes.len();
+    let error = defect(&built, |bytes| {
+        let at = end(bytes) - 8;
+        put(bytes, at, &[0; 8]);
+    });
+    assert!(matches!(error, Some(NodesError::Unmarked { vertex: 0, .. })), "{error:?}");
+    let error = defect(&built, |bytes| {
+        let at = end(bytes) - 1;
+        put(bytes, at, &[0x80]);
+    });
+    assert_eq!(error, Some(NodesError::Marked { node: 63, nodes }));
 }
 
 /// Trees whose radii are lengths of paths through a volume must have nodes, and other trees must not; trees with nodes

@@ -6,6 +6,7 @@ mod embedded_climbed;
 mod embedded_contacts;
 mod embedded_damaged;
 mod embedded_limits;
+mod embedded_marks;
 mod embedded_outside;
 mod embedded_radii;
 mod facts;

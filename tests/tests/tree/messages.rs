@@ -73,6 +73,8 @@ fn of_trees() {
         (NodesError::Inverted { element: 701 }, &["701"]),
         (NodesError::Binding { vertex: 701, element: 702, elements: 703 }, &["701", "702", "703"]),
         (NodesError::Weights { vertex: 701, sum: 702 }, &["701", "702"]),
+        (NodesError::Unmarked { vertex: 701, node: 702 }, &["701", "702"]),
+        (NodesError::Marked { node: 701, nodes: 702 }, &["701", "702"]),
     ]);
 }
 
