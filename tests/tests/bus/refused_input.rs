@@ -35,7 +35,9 @@ fn a_frame_that_cannot_be_sent_is_named() {
 #[test]
 fn counts_beyond_24_bits_are_unknown() {
     let positions = surface(1);
-    for (triangles, sent) in [((1 << 24) - 1, (1 << 24) - 1), (1 << 24, 0), (u32::MAX, 0)] {
+    for (triangles, sent) in
+        [((1 << 24) - 1, (1 << 24) - 1), (1 << 24, 0), ((1 << 24) + 5, 0), (u32::MAX, 0)]
+    {
         let facts = SurfaceFacts { unit: Some(Unit::Metre), vertices: N as u32, triangles };
         let encoder = FrameEncoder::<_, 64>::new(id(1), Encoding::Float, &positions[..]);
         let packets = collect(encoder.expect("valid").with_surface(facts));
