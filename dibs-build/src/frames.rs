@@ -2,6 +2,8 @@
 
 // Requirement: M-06
 
+use std::collections::HashMap;
+
 use dibs_nostd::format::Unit;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree, TriangleRow};
@@ -117,12 +119,7 @@ pub struct FrameCheck {
     is_of_nodes: bool,
     /// Vertices of the mesh's file.
     vertices: usize,
-    unit: Option<Unit>,
-    /// The sum of the squares of all edges at rest, if the tree has its rest shape.
-    rest: Option<f64>,
-    most: f64,
-    /// The volume at rest, if the surface is closed and the volume's sign is significant.
-    volume: Option<f64>,
+    rest: AtRest,
 }
 
 impl FrameCheck {
@@ -142,18 +139,14 @@ impl FrameCheck {
         let has_neighbours =
             |row| (0..3).all(|edge| tree.neighbour(TriangleRow(row), edge).is_some());
         let is_closed = (0..tree.triangle_count()).all(has_neighbours);
-        let volume = is_closed.then(|| volume(&rows, at_rest)).flatten();
-        let has_sign = |&(volume, terms): &(f64, f64)| volume.abs() > LEAST_VOLUME * terms;
+        let most = (2.0 * f64::from(tree.stretch())).max(MOST);
         Self {
             triangles: rows.iter().map(|corners| corners.map(number)).collect(),
             is_of_nodes: false,
             order,
             vertices: if has_order { tree.file_vertex_count() } else { tree.vertex_count() }
                 as usize,
-            unit: tree.unit(),
-            rest: squares(&rows, at_rest),
-            most: (2.0 * f64::from(tree.stretch())).max(MOST),
-            volume: volume.filter(has_sign).map(|(volume, _)| volume),
+            rest: AtRest::of(&rows, at_rest, is_closed, most, tree.unit()),
         }
     }
 
@@ -161,16 +154,15 @@ impl FrameCheck {
         let elements = (0..nodes.element_count()).filter_map(|element| nodes.element(element));
         let triangles: Vec<[u32; 3]> =
             elements.flat_map(|[a, b, c, d]| [[a, b, c], [b, c, d]]).collect();
+        let most = (2.0 * f64::from(nodes.stretch_limit())).max(MOST);
+        let at_rest = |node| nodes.rest_position(node);
         Self {
             order: (0..nodes.count()).collect(),
-            rest: squares(&triangles, |node| nodes.rest_position(node)),
+            // The check tests each tetrahedron's sign by itself.
+            rest: AtRest::of(&triangles, at_rest, false, most, unit),
             triangles,
             is_of_nodes: true,
             vertices: nodes.count() as usize,
-            unit,
-            most: (2.0 * f64::from(nodes.stretch_limit())).max(MOST),
-            // The check tests each tetrahedron's sign by itself.
-            volume: None,
         }
     }
 
@@ -217,16 +209,7 @@ impl FrameCheck {
             });
         }
         let at = |vertex: u32| positions.get(vertex as usize).copied();
-        if let (Some(rest), Some(now)) = (self.rest, squares(&self.triangles, at)) {
-            check_size(rest, now, self.most, self.unit)?;
-        }
-        if let (Some(rest), Some((now, _))) = (self.volume, volume(&self.triangles, at)) {
-            let part = now / rest;
-            // False for NaN, so that positions that are not finite are left to their own error.
-            if part < -FLAT {
-                return Err(FrameError::InsideOut { part });
-            }
-        }
+        self.rest.check(&self.triangles, at)?;
         rows.extend(self.order.iter().filter_map(|&vertex| at(vertex)));
         if rows.len() != self.order.len() {
             let (expected, found) = (self.vertices, positions.len());
@@ -261,22 +244,83 @@ pub(crate) fn check_faces(
     }
 }
 
-/// Checks the size of a frame against the mesh that it is of.
-pub(crate) fn check_mesh_size(mesh: &Mesh, frame: &[Vec3]) -> Result<(), FrameError> {
-    let of = |positions: &[Vec3]| squares(&mesh.triangles, |v| positions.get(v as usize).copied());
-    match (of(&mesh.positions), of(frame)) {
-        (Some(rest), Some(now)) => check_size(rest, now, MOST_LEARNED, None),
-        _ => Ok(()),
+/// What frames are compared with: size and volume of the rest shape.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct AtRest {
+    /// The sum of the squares of all edges, if the rest shape is known.
+    squares: Option<f64>,
+    /// The volume, if the surface is closed and the volume's sign is significant.
+    volume: Option<f64>,
+    /// Largest length of a frame's edges over their length at rest.
+    most: f64,
+    /// The unit of the mesh's file, if known.
+    unit: Option<Unit>,
+}
+
+impl AtRest {
+    fn of(
+        triangles: &[[u32; 3]],
+        at: impl Fn(u32) -> Option<Vec3> + Copy,
+        is_closed: bool,
+        most: f64,
+        unit: Option<Unit>,
+    ) -> Self {
+        let volume = is_closed.then(|| volume(triangles, at)).flatten();
+        let has_sign = |&(volume, terms): &(f64, f64)| volume.abs() > LEAST_VOLUME * terms;
+        let volume = volume.filter(has_sign).map(|(volume, _)| volume);
+        Self { squares: squares(triangles, at), volume, most, unit }
+    }
+
+    /// The shape of a mesh, before there is a tree: for frames that limits and modes are learned from.
+    pub(crate) fn of_mesh(mesh: &Mesh) -> Self {
+        let is_closed = is_closed(&mesh.triangles);
+        Self::of(
+            &mesh.triangles,
+            |v| Some(mesh.positions[v as usize]),
+            is_closed,
+            MOST_LEARNED,
+            None,
+        )
+    }
+
+    /// The shape of a volume's nodes: each tetrahedron's sign has a check of its own.
+    pub(crate) fn of_skeleton(skeleton: &Mesh) -> Self {
+        Self { volume: None, ..Self::of_mesh(skeleton) }
+    }
+
+    /// Checks a frame's size, and that it does not turn a closed surface inside out. Positions that are not finite are
+    /// left to their own error.
+    pub(crate) fn check(
+        &self,
+        triangles: &[[u32; 3]],
+        at: impl Fn(u32) -> Option<Vec3> + Copy,
+    ) -> Result<(), FrameError> {
+        if let (Some(rest), Some(now)) = (self.squares, squares(triangles, at)) {
+            let ratio = (now / rest).sqrt();
+            if ratio < LEAST || ratio > self.most && ratio.is_finite() {
+                return Err(FrameError::Size { ratio, unit: self.unit });
+            }
+        }
+        if let (Some(rest), Some((now, _))) = (self.volume, volume(triangles, at)) {
+            let part = now / rest;
+            if part < -FLAT {
+                return Err(FrameError::InsideOut { part });
+            }
+        }
+        Ok(())
     }
 }
 
-fn check_size(rest: f64, now: f64, most: f64, unit: Option<Unit>) -> Result<(), FrameError> {
-    let ratio = (now / rest).sqrt();
-    // Positions that are not finite are left to their own error.
-    if ratio < LEAST || ratio > most && ratio.is_finite() {
-        return Err(FrameError::Size { ratio, unit });
+/// Whether triangles run along every edge as often in one direction as in the other.
+fn is_closed(triangles: &[[u32; 3]]) -> bool {
+    let mut balance: HashMap<(u32, u32), i32> = HashMap::with_capacity(2 * triangles.len());
+    for &[a, b, c] in triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            *balance.entry((from.min(to), from.max(to))).or_default() +=
+                if from < to { 1 } else { -1 };
+        }
     }
-    Ok(())
+    balance.into_values().all(|balance| balance == 0)
 }
 
 /// The sum of the squares of all triangles' edges; `None` where a position is missing.

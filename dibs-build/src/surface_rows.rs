@@ -45,11 +45,17 @@ impl SurfaceRows {
     }
 
     /// The message for a frame that [`stretch`](Self::stretch) refuses: the error, and `remedy`, the user's way to allow
-    /// more stretch. No limit admits an inverted element: there the message names its nodes instead, by their numbers in
-    /// the volume's file.
+    /// more stretch, where that helps. No limit admits an inverted element: there the message names its nodes instead,
+    /// by their numbers in the volume's file.
     #[must_use]
     pub fn refusal<I: Index>(tree: &Tree<'_, I>, error: StretchError, remedy: &str) -> String {
-        let StretchError::Inverted { element } = error else { return format!("{error}; {remedy}") };
+        let element = match error {
+            StretchError::Inverted { element } => element,
+            StretchError::Exceeded { .. } | StretchError::ElementExceeded { .. } => {
+                return format!("{error}; {remedy}");
+            }
+            _ => return error.to_string(),
+        };
         let nodes = Nodes::of(tree).ok().and_then(|nodes| nodes.element(element));
         let nodes = nodes.map_or_else(String::new, |nodes| format!(" (nodes {})", numbers(&nodes)));
         format!(

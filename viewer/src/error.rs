@@ -26,10 +26,8 @@ pub enum SessionError {
     /// A tree without rest positions, for a page without a motion.
     #[error("the tree has no rest shape; give a motion")]
     NoRest,
-    /// A frame stretched beyond the tree's limit.
-    #[error(
-        "frame {frame}: {error}; build the tree with a larger --stretch, or with --limits that allow it"
-    )]
+    /// A frame stretched beyond the tree's limit, or with an inverted element.
+    #[error("frame {frame}: {error}{}", remedy(error))]
     Stretch {
         /// Its number, from 0.
         frame: usize,
@@ -45,4 +43,15 @@ pub enum SessionError {
     /// The query.
     #[error("{0}")]
     Query(#[from] QueryError),
+}
+
+/// What to do about a frame that is refused. No limit admits an inverted element.
+const fn remedy(error: &StretchError) -> &'static str {
+    match error {
+        StretchError::Exceeded { .. } | StretchError::ElementExceeded { .. } => {
+            "; build the tree with a larger --stretch, or with --limits that allow it"
+        }
+        StretchError::Inverted { .. } => ": no stretch limit admits that, mend the frame",
+        _ => "",
+    }
 }

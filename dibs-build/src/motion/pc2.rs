@@ -4,7 +4,7 @@
 //! samples, then samples x points x 3 f32. The format does not state the frames a second. So this crate's own files
 //! append them after the last sample, where other readers do not look: `DIBSRATE`, f32 frames a second.
 
-use crate::frames::{check_faces, check_mesh_size};
+use crate::frames::{AtRest, check_faces};
 use crate::read::{FileCoordinates, ReadError, ReadErrorKind, file};
 use crate::write::{WriteErrorKind, write_atomically};
 use crate::{FrameError, Mesh, Motion, Unit, WriteError};
@@ -48,7 +48,7 @@ pub enum MotionMismatchError {
         /// Points of the frame.
         found: usize,
     },
-    /// A frame is far smaller or larger than the mesh, has other triangles, or an inverted tetrahedron.
+    /// A frame is far smaller or larger than the mesh, inside out, has other triangles, or an inverted tetrahedron.
     #[error("frame {frame} of the motion: {error}")]
     Frame {
         /// The first such frame, counted from 0.
@@ -124,27 +124,31 @@ impl Motion {
     }
 
     /// Checks that every frame has one position for each of the mesh's vertices, relative to the mesh's origin, is a
-    /// quarter to eight times its size, and has the mesh's triangles where its files have faces.
+    /// quarter to eight times its size, does not turn a closed surface inside out, and has the mesh's triangles where
+    /// its files have faces.
     ///
     /// # Errors
     /// [`MotionMismatchError`] for another origin, or the first frame that does not fit.
     pub fn check_fits(&self, mesh: &Mesh) -> Result<(), MotionMismatchError> {
-        self.check_positions(mesh)?;
+        self.check_count(mesh)?;
+        // Before the shape, so that another numbering is not taken for a surface that is inside out.
         check_faces(&mesh.triangles, mesh.positions.len(), &self.faces)
-            .map_err(|error| MotionMismatchError::Frame { frame: 0, error })
+            .map_err(|error| MotionMismatchError::Frame { frame: 0, error })?;
+        self.check_shape(mesh, &AtRest::of_mesh(mesh))
     }
 
     /// The same of the nodes of a volume with this skeleton: the faces in the files of a volume are its border.
     pub(crate) fn check_fits_nodes(&self, skeleton: &Mesh) -> Result<(), MotionMismatchError> {
-        self.check_positions(skeleton).map_err(|error| match error {
+        self.check_count(skeleton).map_err(|error| match error {
             MotionMismatchError::Vertices { frame, expected, found } => {
                 MotionMismatchError::Nodes { frame, expected, found }
             }
             other => other,
-        })
+        })?;
+        self.check_shape(skeleton, &AtRest::of_skeleton(skeleton))
     }
 
-    fn check_positions(&self, mesh: &Mesh) -> Result<(), MotionMismatchError> {
+    fn check_count(&self, mesh: &Mesh) -> Result<(), MotionMismatchError> {
         if self.origin != mesh.origin {
             let (expected, found) = (mesh.origin, self.origin);
             return Err(MotionMismatchError::Origin { expected, found });
@@ -154,11 +158,15 @@ impl Motion {
             let found = self.frames[frame].len();
             return Err(MotionMismatchError::Vertices { frame, expected, found });
         }
-        let sizes = self.frames.iter().map(|positions| check_mesh_size(mesh, positions).err());
-        match (0..).zip(sizes).find_map(|(frame, error)| Some((frame, error?))) {
-            Some((frame, error)) => Err(MotionMismatchError::Frame { frame, error }),
-            None => Ok(()),
+        Ok(())
+    }
+
+    fn check_shape(&self, mesh: &Mesh, rest: &AtRest) -> Result<(), MotionMismatchError> {
+        for (frame, positions) in self.frames.iter().enumerate() {
+            rest.check(&mesh.triangles, |vertex| positions.get(vertex as usize).copied())
+                .map_err(|error| MotionMismatchError::Frame { frame, error })?;
         }
+        Ok(())
     }
 }
 

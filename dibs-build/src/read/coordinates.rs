@@ -92,7 +92,7 @@ impl FileCoordinates {
         {
             let value = positions[vertex].into_iter().find(|value| !is_finite(value));
             return Err(ReadErrorKind::NonFinite {
-                vertex: format!("vertex {vertex} (counted from 0) in frame {number}"),
+                vertex: format!("position {vertex} (counted from 0) of frame {number}"),
                 value: value.map_or(f64::NAN, |value| (value as f32).into()),
             });
         }

@@ -41,9 +41,16 @@ impl<'a> Surface<'a> {
         limit: Option<f32>,
     ) -> Result<Self> {
         let tree = tree_file::validate(bytes, path)?;
+        let name = path.display();
+        // What a refused surface is called: the tree's file at rest, otherwise the file of its positions.
+        let shown = match (vertices, frame) {
+            (None, _) => name.to_string(),
+            (Some(path), None) => path.display().to_string(),
+            (Some(path), Some(frame)) => format!("{}, frame {frame}", path.display()),
+        };
         let (rows, measured) = match &tree {
-            AnyTree::Narrow(tree) => measured(tree, path, vertices, frame, lengths)?,
-            AnyTree::Wide(tree) => measured(tree, path, vertices, frame, lengths)?,
+            AnyTree::Narrow(tree) => measured(tree, path, vertices, frame, lengths, &shown)?,
+            AnyTree::Wide(tree) => measured(tree, path, vertices, frame, lengths, &shown)?,
         };
         let largest = match &tree {
             AnyTree::Narrow(tree) => largest_stretch(tree, rows.positions()),
@@ -51,7 +58,6 @@ impl<'a> Surface<'a> {
         };
         // Without a rest shape only the factor for radii is known, which is at least as large.
         let stretch = measured.map(|measured| largest.unwrap_or(measured.sigma().into()));
-        let name = path.display();
         let mut options = Options::cold();
         if let Some(limit) = limit {
             let (Some(measured), Some(sigma)) = (measured, stretch) else {
@@ -60,7 +66,7 @@ impl<'a> Surface<'a> {
             // The measurement's own rounding is allowed.
             if sigma > f64::from(limit) * (1.0 + 1e-5) || limit.is_nan() {
                 bail!(
-                    "{name}: the surface is stretched by {sigma}, more than the {limit} of --stretch"
+                    "{shown}: the surface is stretched by {sigma}, more than the {limit} of --stretch"
                 );
             }
             options = options.stretch(measured);
@@ -71,15 +77,11 @@ impl<'a> Surface<'a> {
     /// The surface of a tree at a frame in the mesh's order, or of its nodes.
     pub fn of_frame(tree: AnyTree<'a>, name: &str, frame: &[Vec3]) -> Result<Self> {
         let of = |error| anyhow!("{name}: {error}");
-        let (rows, largest) = match &tree {
+        let (rows, largest, measured) = match &tree {
             AnyTree::Narrow(tree) => framed(tree, frame).map_err(of)?,
             AnyTree::Wide(tree) => framed(tree, frame).map_err(of)?,
         };
-        let stretch = match &rows.stretch {
-            Ok(measured) => Some(largest.unwrap_or(measured.sigma().into())),
-            Err(StretchError::NoMetric) => None,
-            Err(error) => bail!("{name}: {error}"),
-        };
+        let stretch = measured.map(|measured| largest.unwrap_or(measured.sigma().into()));
         Ok(Self { name: name.to_owned(), tree, rows, stretch, options: Options::cold() })
     }
 
@@ -239,32 +241,41 @@ fn measured<I: Index>(
     vertices: Option<&PathBuf>,
     frame: Option<usize>,
     lengths: &Lengths,
+    shown: &str,
 ) -> Result<(SurfaceRows, Option<MeasuredStretch>)> {
     let name = path.display();
-    let shown = match (vertices, frame) {
-        (None, _) => name.to_string(),
-        (Some(path), None) => path.display().to_string(),
-        (Some(path), Some(frame)) => format!("{}, frame {frame}", path.display()),
-    };
     let frame = match vertices {
         None => SurfaceRows::rest_frame(tree)
             .ok_or_else(|| anyhow!("{name}: the tree has no rest shape, give --vertices"))?,
         Some(path) => current(tree, path, frame, lengths)?,
     };
-    // Beyond the stretch limit a distance could be wrong, so the surface is refused.
     let rows = SurfaceRows::of(tree, frame).map_err(|error| anyhow!("{name}: {error}"))?;
+    let measured = within_limit(tree, &rows).map_err(|error| anyhow!("{shown}: {error}"))?;
+    Ok((rows, measured))
+}
+
+/// The measured stretch; `None` if the tree has no rest metric to measure it with. Beyond the stretch limit a distance
+/// could be wrong, so the surface is refused.
+fn within_limit<I: Index>(
+    tree: &Tree<'_, I>,
+    rows: &SurfaceRows,
+) -> Result<Option<MeasuredStretch>> {
     match rows.stretch {
-        Ok(measured) => Ok((rows, Some(measured))),
-        Err(StretchError::NoMetric) => Ok((rows, None)),
-        Err(error) => bail!("{shown}: {}", SurfaceRows::refusal(tree, error, ALLOW)),
+        Ok(measured) => Ok(Some(measured)),
+        Err(StretchError::NoMetric) => Ok(None),
+        Err(error) => bail!(SurfaceRows::refusal(tree, error, ALLOW)),
     }
 }
 
-/// The rows of a frame in the mesh's order, and their largest stretch.
-fn framed<I: Index>(tree: &Tree<'_, I>, frame: &[Vec3]) -> Result<(SurfaceRows, Option<f64>)> {
+/// The rows of a frame in the mesh's order, the largest stretch of a triangle, and the measured stretch.
+fn framed<I: Index>(
+    tree: &Tree<'_, I>,
+    frame: &[Vec3],
+) -> Result<(SurfaceRows, Option<f64>, Option<MeasuredStretch>)> {
     let rows = SurfaceRows::of(tree, FrameCheck::of(tree).to_rows(frame)?)?;
     let largest = largest_stretch(tree, rows.positions());
-    Ok((rows, largest))
+    let measured = within_limit(tree, &rows)?;
+    Ok((rows, largest, measured))
 }
 
 /// Positions in the order of the tree's rows, relative to its origin.

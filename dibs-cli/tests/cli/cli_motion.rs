@@ -142,6 +142,49 @@ fn limits_are_learned_from_a_motion_and_hold_it() {
     assert_eq!(one["separation"], other["separation"]);
 }
 
+/// A controller refuses such a frame whatever its limits, so none are learned from it.
+#[test]
+fn a_frame_that_is_inside_out_is_named_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
+    let mut motion = Motion::read(folder.join("heart.pc2")).unwrap();
+    motion.frames.truncate(5);
+    motion.frames[3].iter_mut().for_each(|at| at.x = -at.x);
+    motion.write_pc2(folder.join("mirrored.pc2")).unwrap();
+    for line in [
+        "stretch heart.ply --motion mirrored.pc2 --limits new.limits --picture new.svg",
+        "build heart.ply -o new.dibs --stretch 9 --motion mirrored.pc2",
+        "build heart.ply -o new.dibs --stretch 9 --motion mirrored.pc2 --modes 2",
+    ] {
+        let error = fails(folder, line);
+        let part = "mirrored.pc2: frame 3 of the motion: is inside out: its volume is -0.9";
+        assert!(error.starts_with(part), "{line}: {error}");
+        for output in ["new.limits", "new.svg", "new.dibs"] {
+            assert!(!folder.join(output).exists(), "{line}: {output}");
+        }
+    }
+}
+
+/// Whichever limit refuses a frame, the error names the file of the frame.
+#[test]
+fn a_frame_beyond_a_limit_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeeds(folder, "generate heart --triangles 320 -o heart.ply --motion heart.pc2");
+    succeeds(folder, "build heart.ply -o heart.dibs --stretch 1.5");
+    succeeds(folder, "build heart.ply -o narrow.dibs --stretch 1.001");
+    let ask = "--tool sphere:0,0,150,5 --vertices heart.pc2 --frame 9";
+    let by_option = fails(folder, &format!("query heart.dibs {ask} --stretch 1.001"));
+    assert!(by_option.starts_with("heart.pc2, frame 9: the surface is stretched"), "{by_option}");
+    let by_tree = fails(folder, &format!("query narrow.dibs {ask}"));
+    assert!(by_tree.starts_with("heart.pc2, frame 9: triangle"), "{by_tree}");
+    assert!(by_tree.contains("a larger --stretch"), "{by_tree}");
+    let at_rest = "query heart.dibs --tool sphere:0,0,150,5 --stretch 0.9";
+    let error = fails(folder, at_rest);
+    assert!(error.starts_with("heart.dibs: the surface is stretched"), "{error}");
+}
+
 #[test]
 fn limits_that_cannot_be_used_are_named() {
     let folder = tempfile::tempdir().unwrap();

@@ -4,7 +4,7 @@
 
 use std::collections::HashSet;
 
-use dibs_build::{Builder, generate};
+use dibs_build::{Builder, Volume, generate};
 use dibs_nostd::Capsule;
 use dibs_nostd::format::Link;
 
@@ -150,7 +150,6 @@ fn contacts_move_as_the_surface_does() {
 /// vertices are.
 #[test]
 fn nodes_move_the_surface() {
-    use dibs_build::Volume;
     use dibs_nostd::nodes::Nodes;
 
     let mesh = generate::heart(1_000).unwrap().mesh;
@@ -200,4 +199,22 @@ fn nodes_move_the_surface() {
     assert_eq!(session.positions().len(), 3 * nodes.vertex_count() as usize);
     let rest = Running::new(tree, &[], 1.0).unwrap();
     assert_eq!(rest.motion.frames.len(), 1);
+}
+
+/// A larger limit helps a stretched frame, and never an inverted element.
+#[test]
+fn a_refused_frame_is_told_with_its_remedy() {
+    let mesh = generate::heart(1_000).unwrap().mesh;
+    let lattice = Volume::lattice(&mesh, [3, 3, 4]).unwrap();
+    let built = Builder::new().stretch(1.5).nodes(&lattice).build(&mesh).unwrap();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let refused = |by: Vec3| {
+        let frame = lattice.nodes().iter().map(|at| at.as_vec3() * by).collect();
+        Motion::new(&tree, &pack(&[frame]), 30.0).unwrap_err().to_string()
+    };
+    let inverted = refused(Vec3::new(-1.0, 1.0, 1.0));
+    assert!(inverted.ends_with("no stretch limit admits that, mend the frame"), "{inverted}");
+    assert!(!inverted.contains("--"), "{inverted}");
+    let stretched = refused(Vec3::splat(2.0));
+    assert!(stretched.contains("a larger --stretch"), "{stretched}");
 }

@@ -12,7 +12,7 @@ use dibs_build::glam::Vec3;
 use dibs_build::{Builder, Mesh};
 use dibs_stream::SurfaceOrder;
 use fastrand::Rng;
-use std::path::{Path, PathBuf};
+use xtask::workspace;
 
 /// Messages between two changes of the topology.
 const RUN: u64 = 50;
@@ -169,10 +169,7 @@ fn no_vertex_is_taken_for_another() {
     }
     println!("{HEAD}{table}");
     if std::env::var_os("DIBS_WRITE").is_some() {
-        let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let evidence = std::env::var_os("DIBS_EVIDENCE").map(PathBuf::from);
-        let evidence = evidence.unwrap_or_else(|| repository.join("docs").join("evidence"));
-        let page = evidence.join("bridge.md");
+        let page = workspace::evidence().join("bridge.md");
         let old = std::fs::read_to_string(&page).expect("the page");
         let before = old.split("\n## Correspondences").next().unwrap_or_default();
         std::fs::write(page, format!("{before}{HEAD}{table}")).expect("writable");

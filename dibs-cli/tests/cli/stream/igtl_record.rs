@@ -13,6 +13,7 @@ use std::{env, fs};
 
 use dibs_build::glam::Vec3;
 use dibs_build::{Format, Volume, generate};
+use xtask::workspace;
 
 use super::igtl::accepted;
 use super::igtl_messages::{array, message, poly_data};
@@ -164,9 +165,7 @@ fn the_bridge_is_recorded() {
     page += "\n`cargo xtask demo --bridge` is the same to the emulated board: a [run](demo/bridge/report.json).\n";
     println!("{page}");
     if env::var_os("DIBS_WRITE").is_some() {
-        let evidence = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/evidence").into();
-        let evidence = env::var_os("DIBS_EVIDENCE").unwrap_or(evidence);
-        let at = Path::new(&evidence).join("bridge.md");
+        let at = workspace::evidence().join("bridge.md");
         // The last section is the record of another test, in `src/stream/igtl/tests.rs`.
         let old = fs::read_to_string(&at).unwrap_or_default();
         let kept = old.find("\n## Correspondences").and_then(|start| old.get(start..));

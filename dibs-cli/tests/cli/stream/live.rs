@@ -174,7 +174,7 @@ fn wrong_frames_are_one_sentence() {
         (
             "",
             [first.clone(), raw(&with_nan)].concat(),
-            "vertex 17 (counted from 0) in frame 1 has the coordinate NaN",
+            "position 17 (counted from 0) of frame 1 has the coordinate NaN",
         ),
         (
             "",
@@ -193,12 +193,12 @@ fn wrong_frames_are_one_sentence() {
         (
             "--format json --unit m",
             lines("[[1,2,null]]"),
-            "vertex 0 (counted from 0) in frame 1 has the coordinate NaN",
+            "position 0 (counted from 0) of frame 1 has the coordinate NaN",
         ),
         (
             "--format json --unit m",
             lines("[[1,2,1e39]]"),
-            "vertex 0 (counted from 0) in frame 1 has the coordinate inf",
+            "position 0 (counted from 0) of frame 1 has the coordinate inf",
         ),
         (
             "--format json --unit m",

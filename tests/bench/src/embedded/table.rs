@@ -9,17 +9,18 @@ use super::{CONDITIONS, EXPERIMENT, FRAME, RUN};
 
 const HEAD: &str = "\n## Table 7: surfaces that nodes move\n\n\
     A frame brings the nodes of a lattice around the brain, which pulses in long waves, in quantised packets. All \
-    methods *receive* it alike, by this library's receiver: peers get nodes, too, not the vertices that their trees are \
-    of. Each total includes that (where its time is not given, receiving was in no total) and all work from there to \
-    the answers, in µs a tick. DIBS checks every element, measures the nodes' motion, and computes the vertices that a \
-    query reads. Refitted trees have all vertices moved by four nodes each, in their own order and layout, once a frame \
-    where the surface is held and at every tick where it is continuous. *Boxes over the elements* move no vertex before \
-    a query reads it: their boxes are around nodes, and what is below is moved and refitted when a query enters it; \
-    they check nothing. (Static trees below, mapped by their element, were built and timed before, and were slower: \
-    half of the triangles lie across elements.) *Boxes over both frames* are refitted once a frame. *Ratio* is the \
-    peer's total over that of the tracker; in brackets the 95 % interval of the median of each period's. All searches \
-    start from the last answer's triangle. Answers are compared at every tick, and the run stops if two differ by more \
-    than 0.001 mm.\n\n";
+    searches start from the last answer's triangle. Answers are compared at every tick, and the run stops if two \
+    differ by more than 0.001 mm.\n\n\
+    A total is the work from the packets to the answers, in µs a tick: every method *receives* nodes by this \
+    library's receiver. (Where no time of receiving is given, the totals are without it.)\n\n\
+    - DIBS checks every element, measures the nodes' motion, and computes the vertices that a query reads.\n\
+    - Refitted trees move all vertices by four nodes each, in their own order and layout: once a frame where the \
+    surface is held, at every tick where it is continuous.\n\
+    - *Boxes over the elements* are around nodes. When a query enters one, the vertices below it are moved and their \
+    boxes refitted. Nothing is checked. (A static tree in each element was slower: half of the triangles lie across \
+    elements.)\n\
+    - *Boxes over both frames* are refitted once a frame.\n\
+    - *Ratio* is the peer's total over the tracker's; in brackets the 95 % interval of the median of each period's.\n\n";
 
 /// The part, where the experiment was run.
 pub fn table(page: &mut String, records: &Records) {

@@ -2,8 +2,8 @@
 
 use probe::{Fault, Machine};
 
-use crate::exit::exit;
-use crate::{clock, files};
+use super::exit::exit;
+use super::{clock, files};
 
 pub struct Board {
     script: files::Input,

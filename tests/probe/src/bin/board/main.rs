@@ -3,14 +3,8 @@
 #![no_std]
 #![no_main]
 
-#[cfg(not(m55))]
-mod clock;
-#[cfg(m55)]
-#[path = "clock_m55.rs"]
-mod clock;
-mod exit;
-mod files;
-mod machine;
+#[path = "mod.rs"]
+mod board;
 
 use core::cell::RefCell;
 
@@ -22,7 +16,7 @@ static MEMORY: Mutex<RefCell<Memory>> = Mutex::new(RefCell::new(Memory::new()));
 
 #[entry]
 fn main() -> ! {
-    machine::answer(|board| {
+    board::answer(|board| {
         interrupt::free(|section| {
             let mut memory = MEMORY.borrow(section).try_borrow_mut().map_err(|_| Fault)?;
             run(&mut memory, board)

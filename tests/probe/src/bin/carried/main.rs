@@ -3,14 +3,8 @@
 #![no_std]
 #![no_main]
 
-#[path = "../board/clock.rs"]
-mod clock;
-#[path = "../board/exit.rs"]
-mod exit;
-#[path = "../board/files.rs"]
-mod files;
-#[path = "../board/machine.rs"]
-mod machine;
+#[path = "../board/mod.rs"]
+mod board;
 
 use cortex_m_rt::entry;
 use dibs_nostd::nodes::Nodes;
@@ -20,5 +14,5 @@ use probe::track::{Memory, Trackers, run};
 fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
-    machine::answer(|board| run::<Nodes, { u32::MAX }>(MEMORY, TRACKERS, board))
+    board::answer(|board| run::<Nodes, { u32::MAX }>(MEMORY, TRACKERS, board))
 }

@@ -3,14 +3,8 @@
 #![no_std]
 #![no_main]
 
-#[path = "../board/clock.rs"]
-mod clock;
-#[path = "../board/exit.rs"]
-mod exit;
-#[path = "../board/files.rs"]
-mod files;
-#[path = "../board/machine.rs"]
-mod machine;
+#[path = "../board/mod.rs"]
+mod board;
 
 use cortex_m_rt::entry;
 use probe::filter::{OPENED, Trackers, run};
@@ -21,5 +15,5 @@ fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut SMALL: Trackers<{ OPENED[0] }> = Trackers::new();
     static mut LARGE: Trackers<{ OPENED[1] }> = Trackers::new();
-    machine::answer(|board| run(MEMORY, SMALL, LARGE, board))
+    board::answer(|board| run(MEMORY, SMALL, LARGE, board))
 }

@@ -2,14 +2,8 @@
 #![no_std]
 #![no_main]
 
-#[path = "../board/clock.rs"]
-mod clock;
-#[path = "../board/exit.rs"]
-mod exit;
-#[path = "../board/files.rs"]
-mod files;
-#[path = "../board/machine.rs"]
-mod machine;
+#[path = "../board/mod.rs"]
+mod board;
 
 use cortex_m_rt::entry;
 use probe::nodes::{HEART, Memory, TREE_BYTES, run};
@@ -18,5 +12,5 @@ use probe::nodes::{HEART, Memory, TREE_BYTES, run};
 fn main() -> ! {
     static mut TREE: [u8; TREE_BYTES] = [0; TREE_BYTES];
     static mut MEMORY: Memory = Memory::new();
-    machine::answer(|board| run(TREE, &HEART, MEMORY, board))
+    board::answer(|board| run(TREE, &HEART, MEMORY, board))
 }

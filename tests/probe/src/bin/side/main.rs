@@ -3,14 +3,8 @@
 #![no_std]
 #![no_main]
 
-#[path = "../board/clock.rs"]
-mod clock;
-#[path = "../board/exit.rs"]
-mod exit;
-#[path = "../board/files.rs"]
-mod files;
-#[path = "../board/machine.rs"]
-mod machine;
+#[path = "../board/mod.rs"]
+mod board;
 
 use cortex_m_rt::entry;
 use probe::rows::Vertices;
@@ -20,7 +14,7 @@ use probe::track::{Memory, Trackers, run, tick};
 fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
-    machine::answer(|board| {
+    board::answer(|board| {
         run::<Vertices, { tick::INTERPOLATED | tick::SIDE }>(MEMORY, TRACKERS, board)
     })
 }

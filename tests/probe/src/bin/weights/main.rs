@@ -3,14 +3,8 @@
 #![no_std]
 #![no_main]
 
-#[path = "../board/clock.rs"]
-mod clock;
-#[path = "../board/exit.rs"]
-mod exit;
-#[path = "../board/files.rs"]
-mod files;
-#[path = "../board/machine.rs"]
-mod machine;
+#[path = "../board/mod.rs"]
+mod board;
 
 use cortex_m_rt::entry;
 use probe::weights::{Memory, TREE_BYTES, run};
@@ -21,7 +15,7 @@ fn main() -> ! {
     static mut TREE: [u8; TREE_BYTES] = [0; TREE_BYTES];
     static mut EIGHT: Memory<8> = Memory::new();
     static mut TWENTY_FOUR: Memory<24> = Memory::new();
-    machine::answer(|board| {
+    board::answer(|board| {
         let mut modes = [0; 4];
         board.read(&mut modes)?;
         match u32::from_le_bytes(modes) {
