@@ -166,8 +166,8 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
         self.rows.ahead()
     }
 
-    fn counts(&self, row: u32) -> bool {
-        self.rows.counts(row)
+    fn carries(&self, row: u32) -> bool {
+        self.rows.carries(row)
     }
 
     fn surface_facts(&self) -> SurfaceFacts {

@@ -164,7 +164,7 @@ impl<const SURFACES: usize> Gate for NodeMonitor<'_, SURFACES> {
         Some(self.nodes.motion)
     }
 
-    fn counts(&self, row: u32) -> bool {
+    fn carries(&self, row: u32) -> bool {
         self.nodes.carries(row)
     }
 

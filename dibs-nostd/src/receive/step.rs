@@ -49,7 +49,7 @@ impl StepMeter {
         let waiting = ready.saturating_sub(self.rows);
         let rows = if waiting < work { waiting } else { work };
         let end = self.rows.saturating_add(rows);
-        let counted = (self.rows..end).filter(|&row| gate.counts(row));
+        let counted = (self.rows..end).filter(|&row| gate.carries(row));
         let largest = self.largest;
         (self.largest, self.off) = match earlier {
             Some(&Earlier { frame, units, t }) => {

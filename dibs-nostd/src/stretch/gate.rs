@@ -188,9 +188,9 @@ pub trait Gate {
         None
     }
 
-    /// Whether the motion of this row moves the surface.
+    /// Whether this row carries a part of the surface: if not, its motion does not count.
     #[doc(hidden)]
-    fn counts(&self, row: u32) -> bool {
+    fn carries(&self, row: u32) -> bool {
         let _ = row;
         true
     }
