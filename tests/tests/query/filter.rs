@@ -168,8 +168,9 @@ fn bad_input_is_named() {
     bench.uncertainty = Uncertainty::NONE;
     bench.own = vec![MotionRow::along(Vec3::X, -9.0); 9];
     assert_eq!(bench.ask(&tool, &step), Err(FilterError::Rows { found: 9, most: 8 }));
-    let none: &mut [(&mut Tracker<'_, u16, MAX_STACK, 256>, &MovingTable<'_, [Vec3]>, &Capsule)] =
-        &mut [];
+    type Pair<'p> =
+        (&'p mut Tracker<'p, u16, MAX_STACK, 256>, &'p MovingTable<'p, [Vec3]>, &'p Capsule);
+    let none: &mut [Pair<'_>] = &mut [];
     let refused = bench.filter.admit(none, &step, 0.001, &Uncertainty::NONE, &[]);
     assert_eq!(refused, Err(FilterError::Pairs { found: 0, most: Filter::MOST_PAIRS }));
     // A large command is shortened to the robot's speed.

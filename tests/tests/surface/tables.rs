@@ -30,7 +30,7 @@ fn every_table_ends_after_its_last_row() {
 /// A surface that is borrowed has the surface's motion, from frame to frame another.
 #[test]
 fn a_borrowed_surface_has_its_motion() {
-    fn motion<S: MovingSurface>(surface: S) -> String {
+    fn motion<S: MovingSurface>(surface: &S) -> String {
         format!("{:?}", surface.motion().expect("it moves"))
     }
     let heart = generate::heart(320).expect("a valid size").mesh;
@@ -41,6 +41,6 @@ fn a_borrowed_surface_has_its_motion() {
     let mut odometer = Odometer::new(&tree);
     let first = odometer.start(rows.as_slice());
     let second = odometer.step(rows.as_slice(), later.as_slice()).after();
-    assert_eq!([motion(&first), motion(&second)], [motion(first), motion(second)]);
+    assert_eq!([motion(&&first), motion(&&second)], [motion(&first), motion(&second)]);
     assert_ne!(motion(&first), motion(&second));
 }

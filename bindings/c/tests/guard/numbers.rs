@@ -1,5 +1,7 @@
 //! The header's numbers for the results of the Rust library.
 
+// Requirement: P-06
+
 use dibs_nostd::wire::Event;
 use dibs_nostd::{
     Advance, NoSide, Progress, QueryError, ReceiveError, Side, StretchError, Unavailable,

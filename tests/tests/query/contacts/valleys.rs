@@ -1,5 +1,7 @@
 //! The exhaustive list of contacts: every basin of the distance over the surface, in f64.
 
+// Requirement: S-04
+
 use std::collections::{HashMap, HashSet};
 
 use dibs_tests::oracle::closest_pair;
