@@ -5,7 +5,8 @@
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Capsule, Contacts, Interval, NoSide, Odometer, Options, Query, Side, Tool, Tracker,
+    Budget, Capsule, Contacts, Interval, NoSide, Odometer, Options, Proximity, Query, Side, Tool,
+    Tracker,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::surfaces::cuboid;
@@ -125,4 +126,41 @@ fn what_was_certain_a_tick_ago_stays_an_answer_under_any_budget() {
     let plate = ticks_hold(&plate, &frames, 40.0, ticks, 2);
     println!("{heart:?} {plate:?} sides, narrower, wide");
     assert!(heart[0] > ticks / 10 && heart[1] > ticks / 100, "{heart:?}");
+}
+
+/// A budget of three quarters of what ticks need, in every tick: the bounds near the tool run out in each of them, but no
+/// subtree waits for more than some ticks, so that the interval stays some motions wide.
+#[test]
+fn every_bound_has_its_turn_under_a_budget_that_is_always_too_small() {
+    const STEP: f32 = 0.3;
+    const TICKS: u32 = 400;
+    let heart = generate::heart(20_000).expect("a valid size").mesh;
+    let built = Builder::new().build(&heart).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&heart.positions);
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(rows.as_slice());
+    let tool = |tick: u32| {
+        let tip = Vec3::new(5.0, 0.0, 20.0) + Vec3::Y * STEP * (tick % 2) as f32;
+        Capsule::new(tip, tip + Vec3::Z * 30.0, 1.0).expect("finite")
+    };
+    let mut ask = |budget: Budget| {
+        let mut tracker = Tracker::<u16, MAX_STACK, 1_024>::new(&tree).expect("deep enough");
+        let options = Options::new().unsigned().budget(budget);
+        let mut answer = |tick: u32| {
+            let options = if tick == 0 { Options::new().unsigned() } else { options };
+            tracker.closest(&surface, &tool(tick), &options).expect("an answer").closest
+        };
+        (0..TICKS).map(|tick| answer(tick)).collect::<Vec<_>>()
+    };
+    let whole = ask(Budget::UNLIMITED);
+    let tests = whole.iter().skip(2).map(|found| found.node_tests + 8 * found.triangle_tests);
+    let mean = tests.sum::<u32>() / (TICKS - 2);
+    let cut = ask(Budget::new(mean * 3 / 4));
+    let width = |found: &Proximity| found.separation - found.lower;
+    let short = cut.iter().filter(|found| width(found) > STEP).count();
+    let widest = cut.iter().map(width).fold(0.0, f32::max);
+    println!("{mean} tests a tick; {short} of {TICKS} cut, {widest} mm wide at most");
+    assert!(short > TICKS as usize / 10, "the budget of {mean} is enough");
+    assert!(widest < 20.0 * STEP, "{widest}");
 }

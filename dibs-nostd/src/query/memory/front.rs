@@ -85,10 +85,12 @@ pub(in crate::query) struct Front<const OPENED: usize> {
     end: usize,
     /// The first free slot, counted from 1; [`NO_FREE`] if there is none.
     free: u16,
+    /// The slot at which the last tick's budget ended; zero after a complete one.
+    resume: u16,
     /// The closest triangle's place.
     pub best: Option<ChildSlot>,
     /// The clock hand: the slot last examined for closing.
-    hand: usize,
+    hand: u16,
 }
 
 impl<const OPENED: usize> Front<OPENED> {
@@ -100,6 +102,7 @@ impl<const OPENED: usize> Front<OPENED> {
             nodes: [Opened::NEVER_USED; OPENED],
             end: 0,
             free: NO_FREE,
+            resume: 0,
             best: None,
             hand: 0,
         }
@@ -113,15 +116,16 @@ pub(in crate::query) struct FrontMut<'f> {
     nodes: &'f mut [Opened],
     end: &'f mut usize,
     free: &'f mut u16,
+    pub resume: &'f mut u16,
     pub best: &'f mut Option<ChildSlot>,
-    hand: &'f mut usize,
+    hand: &'f mut u16,
 }
 
 impl<const OPENED: usize> Front<OPENED> {
     #[inline(always)]
     pub fn borrow(&mut self) -> FrontMut<'_> {
-        let Self { due, nodes, end, free, best, hand } = self;
-        FrontMut { due, nodes, end, free, best, hand }
+        let Self { due, nodes, end, free, resume, best, hand } = self;
+        FrontMut { due, nodes, end, free, resume, best, hand }
     }
 }
 
@@ -152,6 +156,7 @@ impl FrontMut<'_> {
     /// Frees all slots.
     pub fn clear(&mut self) {
         (*self.end, *self.free, *self.best, *self.hand) = (0, NO_FREE, None, 0);
+        *self.resume = 0;
     }
 
     pub fn is_empty(&self) -> bool {
@@ -256,10 +261,11 @@ impl FrontMut<'_> {
     /// Advances the clock hand by one slot. Returns the node there and its earliest deadline, if it may be closed:
     /// opened, below a root, all children with bounds.
     pub fn next_closable(&mut self) -> Option<(u16, Deadline)> {
-        *self.hand = if *self.hand + 1 < *self.end { *self.hand + 1 } else { 0 };
-        let node = self.nodes.get(*self.hand)?;
-        let &due = self.due.get(*self.hand)?;
+        let next = self.hand.saturating_add(1);
+        *self.hand = if usize::from(next) < *self.end { next } else { 0 };
+        let at = usize::from(*self.hand);
+        let (node, &due) = (self.nodes.get(at)?, self.due.get(at)?);
         (node.apart == 0 && node.link != UNUSED && node.parent != NOWHERE)
-            .then_some((*self.hand as u16, due))
+            .then_some((*self.hand, due))
     }
 }

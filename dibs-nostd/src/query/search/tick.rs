@@ -98,24 +98,33 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             }
         }
         // Nodes opened from here on are tested at once.
-        let (mut from, end) = (0, self.front.used());
-        while let Some(at) = self.front.next_due(from..end, self.threshold()) {
-            match self.visit(at as u16)? {
-                Visit::Done => from = at + 1,
-                Visit::OutOfBudget => {
-                    self.put_back_waiting().ok_or(corrupt)?;
-                    self.search.leave_unfinished();
-                    let least = self.clock.left(self.front.first(&self.clock));
-                    let lower = if least > 0.0 { least } else { 0.0 };
-                    return Ok(Outcome::Ended { lower, is_complete: false, restarted });
-                }
-                Visit::Full => {
-                    // The due bounds after this node would stay due, and the front full.
-                    self.front.clear();
-                    return Ok(Outcome::Full { tests: self.search.meter.made() });
+        let end = self.front.used();
+        // Where the last tick's budget ended: nodes near the tool are due in every tick, and the others would never have
+        // their turn.
+        let first = usize::from(*self.front.resume).min(end);
+        for places in [first..end, 0..first] {
+            let mut from = places.start;
+            while let Some(at) = self.front.next_due(from..places.end, self.threshold()) {
+                match self.visit(at as u16)? {
+                    Visit::Done => from = at + 1,
+                    Visit::OutOfBudget => {
+                        // A node that took a whole tick waits for its next turn.
+                        *self.front.resume = (at as u16).saturating_add(u16::from(at == first));
+                        self.put_back_waiting().ok_or(corrupt)?;
+                        self.search.leave_unfinished();
+                        let least = self.clock.left(self.front.first(&self.clock));
+                        let lower = if least > 0.0 { least } else { 0.0 };
+                        return Ok(Outcome::Ended { lower, is_complete: false, restarted });
+                    }
+                    Visit::Full => {
+                        // The due bounds after this node would stay due, and the front full.
+                        self.front.clear();
+                        return Ok(Outcome::Full { tests: self.search.meter.made() });
+                    }
                 }
             }
         }
+        *self.front.resume = 0;
         self.close_some(1)?;
         let is_beyond = self.limit < f32::INFINITY && self.search.is_beyond(self.limit);
         let lower = if is_beyond { self.limit } else { f32::INFINITY };
@@ -321,6 +330,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         corners: &[Vec3; 3],
         place: ChildSlot,
     ) -> Result<Option<f32>, QueryError> {
+        let before = self.search.best_squared;
         let (bound, is_closest) = self.search.bound_triangle(triangle, corners)?;
         if !is_closest {
             return Ok(Some(bound));
@@ -328,6 +338,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         self.facing = Facing::new(&self.search);
         let corrupt = QueryError::Corrupt { row: triangle };
         if let Some(place) = self.front.best.replace(place) {
+            // It was the closest in this tick, too: its bound is not older than that.
+            let deadline = self.deadline(sqrt(before));
+            *self.deadline_of(place).ok_or(corrupt)? = deadline;
             self.front.put_back(place).ok_or(corrupt)?;
         }
         self.front.node(place.node).ok_or(corrupt)?.apart |= 1 << place.slot;
