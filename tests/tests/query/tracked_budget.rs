@@ -144,14 +144,14 @@ fn every_bound_has_its_turn_under_a_budget_that_is_always_too_small() {
         let tip = Vec3::new(5.0, 0.0, 20.0) + Vec3::Y * STEP * (tick % 2) as f32;
         Capsule::new(tip, tip + Vec3::Z * 30.0, 1.0).expect("finite")
     };
-    let mut ask = |budget: Budget| {
+    let ask = |budget: Budget| {
         let mut tracker = Tracker::<u16, MAX_STACK, 1_024>::new(&tree).expect("deep enough");
         let options = Options::new().unsigned().budget(budget);
         let mut answer = |tick: u32| {
             let options = if tick == 0 { Options::new().unsigned() } else { options };
             tracker.closest(&surface, &tool(tick), &options).expect("an answer").closest
         };
-        (0..TICKS).map(|tick| answer(tick)).collect::<Vec<_>>()
+        (0..TICKS).map(&mut answer).collect::<Vec<_>>()
     };
     let whole = ask(Budget::UNLIMITED);
     let tests = whole.iter().skip(2).map(|found| found.node_tests + 8 * found.triangle_tests);
