@@ -102,25 +102,28 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         // Where the last tick's budget ended: nodes near the tool are due in every tick, and the others would never have
         // their turn.
         let first = usize::from(*self.front.resume).min(end);
-        for places in [first..end, 0..first] {
-            let mut from = places.start;
-            while let Some(at) = self.front.next_due(from..places.end, self.threshold()) {
-                match self.visit(at as u16)? {
-                    Visit::Done => from = at + 1,
-                    Visit::OutOfBudget => {
-                        // A node that took a whole tick waits for its next turn.
-                        *self.front.resume = (at as u16).saturating_add(u16::from(at == first));
-                        self.put_back_waiting().ok_or(corrupt)?;
-                        self.search.leave_unfinished();
-                        let least = self.clock.left(self.front.first(&self.clock));
-                        let lower = if least > 0.0 { least } else { 0.0 };
-                        return Ok(Outcome::Ended { lower, is_complete: false, restarted });
-                    }
-                    Visit::Full => {
-                        // The due bounds after this node would stay due, and the front full.
-                        self.front.clear();
-                        return Ok(Outcome::Full { tests: self.search.meter.made() });
-                    }
+        let (mut places, mut before) = (first..end, Some(0..first));
+        loop {
+            let Some(at) = self.front.next_due(places.clone(), self.threshold()) else {
+                let Some(next) = before.take() else { break };
+                places = next;
+                continue;
+            };
+            match self.visit(at as u16)? {
+                Visit::Done => places.start = at + 1,
+                Visit::OutOfBudget => {
+                    // A node that took a whole tick waits for its next turn.
+                    *self.front.resume = (at as u16).saturating_add(u16::from(at == first));
+                    self.put_back_waiting().ok_or(corrupt)?;
+                    self.search.leave_unfinished();
+                    let least = self.clock.left(self.front.first(&self.clock));
+                    let lower = if least > 0.0 { least } else { 0.0 };
+                    return Ok(Outcome::Ended { lower, is_complete: false, restarted });
+                }
+                Visit::Full => {
+                    // The due bounds after this node would stay due, and the front full.
+                    self.front.clear();
+                    return Ok(Outcome::Full { tests: self.search.meter.made() });
                 }
             }
         }
