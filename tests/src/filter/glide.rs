@@ -179,7 +179,7 @@ pub fn glide_told(
 }
 
 /// The largest speed (mm/s) of a vertex from frame to frame.
-fn fastest(motion: &Recorded) -> f32 {
+pub fn fastest(motion: &Recorded) -> f32 {
     let next = motion.frames.iter().cycle().skip(1);
     let steps = motion.frames.iter().zip(next).flat_map(|(a, b)| a.iter().zip(b));
     steps.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max) * motion.rate * 1.001

@@ -8,6 +8,6 @@ mod walk;
 mod world;
 
 pub use asked::{Asked, Listener, Settings};
-pub use glide::{Glided, glide, glide_told};
+pub use glide::{Glided, fastest, glide, glide_told};
 pub use walk::{Episode, Tally, walk, walk_by_label, walk_told};
 pub use world::{Course, Scene, labelled_scenes, scenes};

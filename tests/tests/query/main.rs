@@ -10,6 +10,7 @@ mod cut_short;
 mod differential;
 mod few_places;
 mod filter;
+mod filter_budget;
 mod filter_of_labels;
 mod filter_of_scene;
 mod flat;

@@ -42,6 +42,8 @@ pub(super) struct State {
     pub reach: f32,
     /// The least distance allowed during the motion.
     pub least: f32,
+    /// The distance of the closest pair found at the start, without its sign.
+    pub axis_distance: f32,
 }
 
 impl State {

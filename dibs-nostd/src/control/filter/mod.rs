@@ -59,7 +59,8 @@
 //! row, and the motion nearest to the command is computed. A query at that motion's end bounds the distance on the
 //! whole path; if it is too small, its pair becomes a further row, so that corners, gaps and folds are found as the
 //! motion reaches them. After four motions the next are shortened towards the smallest one that the rows allow, which
-//! is rest unless the surface approaches.
+//! is rest unless the surface approaches. So is a motion whose search would take more than is left of the budget: the
+//! tracker counts the bounds that would run out. So a budget that covers little more than the start slows the tool down.
 //!
 //! A label with a [stand-off of its own](Filter::stand_off_of) is searched as a surface of its own.
 //!
@@ -74,6 +75,7 @@ mod nearest;
 mod pair;
 mod part;
 mod path;
+mod proposal;
 mod row;
 mod session;
 mod uncertainty;
@@ -220,8 +222,9 @@ impl<const LABELS: usize> Filter<LABELS> {
     /// The pairs are the current parts of one rigid instrument, each with its own surface and tracker: a chain of two
     /// tools in a scene of two surfaces has four pairs. `rows` are up to 8 additional limits.
     ///
-    /// Cost: the [budget](Self::budget) at most, and for each tried motion a solution of up to 16 rows:
-    /// usually 1,000 instructions, at most 40,000.
+    /// Cost: the [budget](Self::budget) at most, and for each tried motion a solution of up to 16 rows: usually 1,000
+    /// instructions, at most 40,000; and one comparison for each opened node, up to nine more if the budget does not
+    /// cover the motion.
     ///
     /// # Errors
     /// [`FilterError`]: an argument that is not finite or out of range, or a query without an answer. The tool must

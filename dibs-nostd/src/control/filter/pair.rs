@@ -15,6 +15,9 @@ pub(super) trait Pair {
 
     fn radius(&self) -> f32;
 
+    /// Number of the tracker's nodes with a bound that a search within a distance (mm) of the axis would test.
+    fn due_within(&self, distance: f32) -> u32;
+
     /// The closest pair of the tool with its axis at other ends.
     fn closest(&mut self, ends: [Vec3; 2], options: &Options) -> Result<Proximity, QueryError>;
 
@@ -40,6 +43,10 @@ where
         self.2.radius()
     }
 
+    fn due_within(&self, distance: f32) -> u32 {
+        self.0.due_within(distance)
+    }
+
     fn closest(&mut self, ends: [Vec3; 2], options: &Options) -> Result<Proximity, QueryError> {
         let (tracker, surface, tool) = self;
         let tool = tool.with_axis(ends);
@@ -62,6 +69,8 @@ where
 pub(super) struct Found {
     /// A lower bound on the axis' distance; negative inside, and negative infinity where nothing is certain.
     pub distance: f32,
+    /// The pair's distance, without a sign.
+    pub axis_distance: f32,
     pub axis_parameter: f32,
     /// Out of the surface; zero where that is not known.
     pub direction: Vec3,
@@ -74,8 +83,9 @@ impl Found {
     #[inline(always)]
     pub fn of(found: &Proximity, radius: f32, is_outside: bool) -> Self {
         let distance = distance(found, radius, is_outside);
-        let &Proximity { axis_parameter, direction, node_tests, triangle_tests, .. } = found;
-        Self { distance, axis_parameter, direction, node_tests, triangle_tests }
+        let &Proximity { axis_distance, axis_parameter, direction, .. } = found;
+        let &Proximity { node_tests, triangle_tests, .. } = found;
+        Self { distance, axis_distance, axis_parameter, direction, node_tests, triangle_tests }
     }
 
     /// Of a label's part.
@@ -85,7 +95,8 @@ impl Found {
             let towards = pair.on_axis - pair.on_surface;
             (pair.axis_parameter, towards / sqrt(towards.length_squared()))
         });
-        Self { distance, axis_parameter, direction, node_tests, triangle_tests }
+        let axis_distance = distance;
+        Self { distance, axis_distance, axis_parameter, direction, node_tests, triangle_tests }
     }
 }
 

@@ -8,6 +8,7 @@ use super::motion::{inside, most_turn, shortened};
 use super::nearest::{Vector, add};
 use super::pair::{Found, Pair};
 use super::part::Part;
+use super::proposal::{Extent, Proposal};
 use super::row::Rows;
 use super::{
     Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty,
@@ -26,6 +27,9 @@ const ROUNDING: f32 = 16.0 / 16_777_216.0;
 /// With fewer node tests a query is not worth its base cost, but for the first of a pair: it also gives the last tick's
 /// interval, less the motion since.
 const LEAST_TESTS: u32 = 32;
+
+/// Node tests for each bound that runs out: 95 % of 4,868 searches at a beating heart took fewer.
+const TESTS_OF_DUE: u64 = 10;
 
 /// Motions (mm) of a period within which a wall is near.
 const NEAR: f32 = 4.0;
@@ -114,29 +118,36 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         }
         let stand_still = self.verify(pairs, &rest)?;
         let mut best = stand_still;
-        let mut fraction = 1.0;
+        let mut extent = Extent::WHOLE;
         for attempt in 0..=WHOLE + SHORTENED {
-            if attempt >= WHOLE {
-                fraction = if attempt < WHOLE + SHORTENED { fraction * 0.5 } else { 0.0 };
+            if attempt == WHOLE + SHORTENED {
+                extent = extent.to_smallest();
+            } else if attempt >= WHOLE {
+                extent = extent.shorter().unwrap_or(extent);
             }
-            let (point, is_command) = self.propose(fraction);
+            let proposal = self.propose();
+            let is_covered = self.shorten(pairs, &proposal, &mut extent);
+            if !is_covered && self.worthwhile().is_none() {
+                break;
+            }
+            let point = proposal.at(extent);
             let motion = Motion::from_vector(self.about, &point, self.lever);
             if !motion.is_finite() || !self.rows.allow(&point) {
                 continue;
             }
             let found = self.verify(pairs, &motion)?;
             if found.is_admissible {
-                let is_rest = point == [0.0; 6];
-                let reason = if is_command {
+                let is_whole = extent == Extent::WHOLE;
+                let reason = if is_whole && proposal.is_command {
                     Reason::Commanded
-                } else if is_rest {
+                } else if point == [0.0; 6] {
                     Reason::Stopped
-                } else if fraction == 0.0 || self.command == [0.0; 6] {
+                } else if extent.fraction == 0.0 || self.command == [0.0; 6] {
                     Reason::Retreating
-                } else if fraction < 1.0 {
-                    Reason::Shortened
-                } else {
+                } else if is_whole {
                     Reason::Nearest
+                } else {
+                    Reason::Shortened
                 };
                 return Ok(self.admitted(&found, reason));
             }
@@ -220,7 +231,8 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         // `wanted` has as many slots as there are pairs.
         let _ = self.wanted.push(wanted);
         let start = Known { ends, distance };
-        let _ = self.states.push(State { start, end: None, reach, least });
+        let axis_distance = found.map_or(f32::INFINITY, |found| found.axis_distance);
+        let _ = self.states.push(State { start, end: None, reach, least, axis_distance });
         Ok(())
     }
 
@@ -235,31 +247,38 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         self.rows.add_wall(number, on_axis, found.direction, distance, at);
     }
 
-    /// The motion at a fraction of the path from the smallest motion that the rows allow to the nearest one; and
-    /// whether it is the command.
-    fn propose(&self, fraction: f32) -> (Vector, bool) {
+    /// The smallest motion that the rows allow, and the nearest one.
+    fn propose(&self) -> Proposal {
         let least = self.rows.nearest(&[0.0; 6], &self.wanted).point;
         let least = self.within_speed(&least);
-        if fraction == 0.0 {
-            return (least, false);
-        }
         let nearest = self.rows.nearest(&self.command, &self.wanted);
-        if fraction == 1.0 && nearest.point == self.command {
-            return (self.command, !self.is_cut);
+        if nearest.point == self.command {
+            return Proposal { least, whole: self.command, is_command: !self.is_cut };
         }
-        if !nearest.is_inside {
-            return (least, false);
+        let mut whole = least;
+        if nearest.is_inside {
+            let mut step = nearest.point;
+            add(&mut step, &least, -1.0);
+            let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (least, step);
+            let turn = most_turn(self.most, self.lever) * self.lever;
+            let straight = inside(Vec3::new(a, b, c), Vec3::new(u, v, w), self.most);
+            let turned = inside(Vec3::new(d, e, f), Vec3::new(x, y, z), turn);
+            add(&mut whole, &step, if straight < turned { straight } else { turned });
         }
-        let mut step = nearest.point;
-        add(&mut step, &least, -1.0);
-        let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (least, step);
-        let turn = most_turn(self.most, self.lever) * self.lever;
-        let straight = inside(Vec3::new(a, b, c), Vec3::new(u, v, w), self.most);
-        let turned = inside(Vec3::new(d, e, f), Vec3::new(x, y, z), turn);
-        let whole = if straight < turned { straight } else { turned };
-        let mut point = least;
-        add(&mut point, &step, fraction * whole);
-        (point, false)
+        Proposal { least, whole, is_command: false }
+    }
+
+    /// Shortens a proposal until the budget left probably covers its searches: one that the budget ends admits nothing,
+    /// and its way there and back makes the next tick's dearer. Returns whether it does.
+    fn shorten<P: Pair>(&self, pairs: &[P], proposal: &Proposal, extent: &mut Extent) -> bool {
+        for _ in 0..Extent::SHORTER {
+            if self.covers(pairs, &proposal.at(*extent)) {
+                return true;
+            }
+            let Some(shorter) = extent.shorter() else { return false };
+            *extent = shorter;
+        }
+        self.covers(pairs, &proposal.at(*extent))
     }
 
     /// The motion, limited to the robot's speed.
@@ -308,16 +327,8 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let Some(&state) = self.states.get(at) else { return Ok(()) };
         let State { start, reach, least, .. } = state;
         let motion = found.motion;
-        let ends = start.ends.map(|end| motion.apply(end));
-        let moved = start.moved(&ends);
+        let (ends, moved, arc) = self.path(&start, &motion);
         found.moved = larger(found.moved, moved);
-        let mut arc = 0.0;
-        for end in start.ends {
-            let height = motion.arc(sqrt(end.distance_squared(self.about)));
-            if height > arc {
-                arc = height;
-            }
-        }
         let mut last = state.distance_at(&ends);
         if part.is_some()
             && let Some(whole) = self.states.get(number)
@@ -360,6 +371,38 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             found.separation = smaller(found.separation, nearest - reach);
         }
         Ok(())
+    }
+
+    /// Whether the budget left probably covers the searches at a motion's end.
+    fn covers<P: Pair>(&self, pairs: &[P], point: &Vector) -> bool {
+        let motion = Motion::from_vector(self.about, point, self.lever);
+        let mut needed = u64::from(self.instructions);
+        for (pair, state) in pairs.iter().zip(&self.states) {
+            let (ends, moved, arc) = self.path(&state.start, &motion);
+            let last = state.distance_at(&ends);
+            let nearest = path::least(state.start.distance, last, moved, self.grow) - arc;
+            if nearest >= state.least - EPSILON {
+                continue;
+            }
+            // Each bound falls by the motion, and the distance may grow by it.
+            let due = pair.due_within(state.axis_distance + 2.0 * moved);
+            let tests = TESTS_OF_DUE * u64::from(due);
+            needed += u64::from(self.cost.base) + tests * u64::from(self.cost.node_test);
+        }
+        needed <= u64::from(self.filter.instructions)
+    }
+
+    /// An axis' ends after a motion, an upper bound (mm) on the motion of its points, and the height of their arcs.
+    fn path(&self, start: &Known, motion: &Motion) -> ([Vec3; 2], f32, f32) {
+        let ends = start.ends.map(|end| motion.apply(end));
+        let mut arc = 0.0;
+        for end in start.ends {
+            let height = motion.arc(sqrt(end.distance_squared(self.about)));
+            if height > arc {
+                arc = height;
+            }
+        }
+        (ends, start.moved(&ends), arc)
     }
 
     /// The budget left for a query, less what is reserved for others (instructions); `None` if that is below the base

@@ -152,6 +152,19 @@ impl<const OPENED: usize> Front<OPENED> {
     }
 }
 
+#[cfg(feature = "control")]
+impl<const OPENED: usize> Front<OPENED> {
+    /// Number of nodes due.
+    pub fn count_due(&self, threshold: Deadline) -> usize {
+        due(self.due.get(..self.end).unwrap_or_default(), threshold)
+    }
+}
+
+/// Number of deadlines that are not later than a threshold.
+fn due(deadlines: &[Deadline], threshold: Deadline) -> usize {
+    deadlines.iter().filter(|&&due| !threshold.is_before(due)).count()
+}
+
 impl FrontMut<'_> {
     /// Frees all slots.
     pub fn clear(&mut self) {
@@ -191,8 +204,7 @@ impl FrontMut<'_> {
 
     /// Number of nodes due.
     pub fn count_due(&self, threshold: Deadline) -> usize {
-        let due = self.due.get(..*self.end).unwrap_or_default();
-        due.iter().filter(|&&due| !threshold.is_before(due)).count()
+        due(self.due.get(..*self.end).unwrap_or_default(), threshold)
     }
 
     /// The earliest deadline.

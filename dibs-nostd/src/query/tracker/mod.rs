@@ -197,6 +197,12 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         self.labels.contains(label)
     }
 
+    /// Number of the front's nodes that a search within a distance (mm) of the axis would test, if the tool moved there.
+    #[cfg(feature = "control")]
+    pub(crate) fn due_within(&self, distance: f32) -> u32 {
+        self.memory.front.count_due(self.memory.clock.within(distance)) as u32
+    }
+
     /// The tree that is searched.
     #[must_use]
     pub const fn tree(&self) -> &Tree<'t, I> {
