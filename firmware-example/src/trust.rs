@@ -58,6 +58,9 @@ impl Trust {
         tissue_speed: 0.05,
     };
 
+    /// A host's socket: frames in real time, between threads without deadlines.
+    pub const HOST: Self = Self { tissue_speed: Self::ETHERNET.tissue_speed, ..Self::SERIAL };
+
     /// The limits of the fail-safe machine.
     pub(crate) const fn limits(&self) -> Result<Limits, LimitError> {
         macro_rules! tri {

@@ -33,7 +33,7 @@ fn main() -> Result<()> {
     let ticks: u32 = argument("TICKS")?.to_str().and_then(|t| t.parse().ok()).context("TICKS")?;
     let robot = Either::new(arguments.next().is_some_and(|word| word == "hand"));
 
-    let (mut receiver, mut control) = start(&SURFACE, &BUS, &Trust::SERIAL, robot)?;
+    let (mut receiver, mut control) = start(&SURFACE, &BUS, &Trust::HOST, robot)?;
     bus.set_read_timeout(Some(Duration::from_millis(1)))?;
     thread::spawn(move || {
         let (mut buffer, mut line) = ([0; 1024], [0; STATUS_FRAMED]);
