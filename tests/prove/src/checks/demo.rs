@@ -162,6 +162,7 @@ pub struct Run {
 /// The report of a demo.
 pub fn report_of(Run { seconds, faults, c, hand, nodes }: Run) -> Result<Value> {
     let name = match (faults, c) {
+        (false, false) if hand && nodes => "demo-nodes-hand",
         (false, false) if hand => "demo-hand",
         (false, false) if nodes => "demo-nodes",
         (false, false) => "demo",

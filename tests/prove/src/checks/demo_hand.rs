@@ -3,6 +3,7 @@
 // Requirements: C-03, C-04, C-05, P-03
 
 use anyhow::Result;
+use serde_json::{Value, json};
 use xtask::steps::Outcome;
 
 use super::demo::{Run, keep, number, report_of};
@@ -99,27 +100,33 @@ pub const CHECK: Check = Check {
 /// Records the figures of the demo's report.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let report = report_of(Run { seconds: effort.demo_seconds, hand: true, ..Run::default() })?;
-    let mut note = |name: &str, value: &serde_json::Value| -> Result<()> {
-        figures.note(name, (number(value, name)? * 1e3).round() / 1e3);
-        Ok(())
-    };
-    let (pushed, commanded) = (&report["by_force"], &report["by_commands"]);
-    note("demo.hand.ticks", &report["ticks"])?;
-    note("demo.hand.misses", &report["deadline_misses"])?;
-    note("demo.hand.mismatches", &report["mismatches"])?;
-    note("demo.hand.commanded", &commanded["penetration_max_mm"])?;
-    note("demo.hand.commanded.least", &commanded["heart_separation_min_mm"])?;
-    note("demo.hand.commanded.ticks", &commanded["ticks"])?;
-    note("demo.hand.instants", &commanded["heart_instants"])?;
-    note("demo.hand.near", &report["admitted_too_near"])?;
-    note("demo.hand.pushed", &pushed["penetration_max_mm"])?;
-    note("demo.hand.pushed.least", &pushed["heart_separation_min_mm"])?;
-    note("demo.hand.given", &report["energy_given_max_mj"])?;
-    note("demo.hand.step", &report["push_force_step_max_n"])?;
-    note("demo.hand.filter.mean", &commanded["answer_instructions_mean"])?;
-    note("demo.hand.filter.largest", &commanded["answer_instructions_max"])?;
-    let unsafe_ticks = report["reasons"]["no safe motion"].as_f64().unwrap_or(0.0);
-    figures.note("demo.hand.unsafe", unsafe_ticks);
+    note_figures("demo.hand", &report, figures)?;
     keep(effort, "demo-hand", "hand")?;
     Ok(Outcome::Passed)
+}
+
+/// Records the figures of a hand's report, under names that begin with `of`.
+pub fn note_figures(of: &str, report: &Value, figures: &mut Figures) -> Result<()> {
+    let (pushed, commanded) = (&report["by_force"], &report["by_commands"]);
+    let unsafe_ticks = json!(report["reasons"]["no safe motion"].as_f64().unwrap_or(0.0));
+    for (name, value) in [
+        ("ticks", &report["ticks"]),
+        ("misses", &report["deadline_misses"]),
+        ("mismatches", &report["mismatches"]),
+        ("commanded", &commanded["penetration_max_mm"]),
+        ("commanded.least", &commanded["heart_separation_min_mm"]),
+        ("commanded.ticks", &commanded["ticks"]),
+        ("instants", &commanded["heart_instants"]),
+        ("near", &report["admitted_too_near"]),
+        ("pushed", &pushed["penetration_max_mm"]),
+        ("pushed.least", &pushed["heart_separation_min_mm"]),
+        ("given", &report["energy_given_max_mj"]),
+        ("step", &report["push_force_step_max_n"]),
+        ("filter.mean", &commanded["answer_instructions_mean"]),
+        ("filter.largest", &commanded["answer_instructions_max"]),
+        ("unsafe", &unsafe_ticks),
+    ] {
+        figures.note(&format!("{of}.{name}"), (number(value, name)? * 1e3).round() / 1e3);
+    }
+    Ok(())
 }

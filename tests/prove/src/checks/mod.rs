@@ -17,6 +17,7 @@ mod demo_c;
 mod demo_faults;
 mod demo_hand;
 mod demo_nodes;
+mod demo_nodes_hand;
 mod examples;
 mod filter;
 mod filter_board;
@@ -76,6 +77,7 @@ pub const CHECKS: &[Check] = &[
     demo::CHECK,
     demo_hand::CHECK,
     demo_nodes::CHECK,
+    demo_nodes_hand::CHECK,
     demo_faults::CHECK,
     flood::CHECK,
     demo_c::CHECK,
@@ -102,12 +104,13 @@ pub const CHECKS: &[Check] = &[
 
 /// Checks that `cargo xtask test` runs only with `--whole`: each builds one more program, or takes half a minute in
 /// addition to checks of the same parts, or runs the tests again under a sanitizer.
-pub const ON_REQUEST: [&str; 13] = [
+pub const ON_REQUEST: [&str; 14] = [
     dearer::CHECK.name,
     dearer::OF_HUMAN.name,
     listed::CHECK.name,
     tick_cost::CHECK.name,
     demo_nodes::CHECK.name,
+    demo_nodes_hand::CHECK.name,
     filter_board::CHECK.name,
     nodes::CHECK.name,
     flood::CHECK.name,
