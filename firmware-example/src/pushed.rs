@@ -132,6 +132,8 @@ impl Robot for Pushed {
             self.shaft = end - self.hand.at;
         }
         self.hand.velocity = (self.hand.at - at) * (1.0 / PERIOD);
+        // No force acts, so the last one does no work.
+        let _ = self.account.pass(Vec3::ZERO, Vec3::ZERO, PERIOD);
         self.record.filtered(admitted);
         self.next(answer, push);
     }
