@@ -16,7 +16,8 @@ use crate::math::sqrt::sqrt;
 /// that the account does not cover. A force against an inward motion is never reduced. The energy received from the
 /// hand is limited to the spring's own, so that a damper does not fill the account.
 ///
-/// Between two ticks the force changes by at most a largest step, unless the account or its end requires more.
+/// Between two ticks the force changes by at most a largest step, also where the account requires more: if the relative
+/// velocity leaps outwards at a large force, the account is overdrawn until the force has fallen.
 ///
 /// ```
 /// use dibs_nostd::constraint::EnergyAccount;

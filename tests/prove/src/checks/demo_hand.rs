@@ -108,6 +108,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
 /// Records the figures of a hand's report, under names that begin with `of`.
 pub fn note_figures(of: &str, report: &Value, figures: &mut Figures) -> Result<()> {
     let (pushed, commanded) = (&report["by_force"], &report["by_commands"]);
+    let mean = number(&commanded["answer_instructions_mean"], "mean")?.round();
     let unsafe_ticks = json!(report["reasons"]["no safe motion"].as_f64().unwrap_or(0.0));
     for (name, value) in [
         ("ticks", &report["ticks"]),
@@ -122,7 +123,7 @@ pub fn note_figures(of: &str, report: &Value, figures: &mut Figures) -> Result<(
         ("pushed.least", &pushed["heart_separation_min_mm"]),
         ("given", &report["energy_given_max_mj"]),
         ("step", &report["push_force_step_max_n"]),
-        ("filter.mean", &commanded["answer_instructions_mean"]),
+        ("filter.mean", &json!(mean)),
         ("filter.largest", &commanded["answer_instructions_max"]),
         ("unsafe", &unsafe_ticks),
     ] {
