@@ -33,8 +33,8 @@ impl<'n, 'a, V: VertexTable + ?Sized> EmbeddedSurface<'n, 'a, V> {
     }
 
     /// The step from this surface to a later one, for a [`Sweep`](crate::Sweep) and a [`Tracker`](crate::Tracker), by the
-    /// motion of the nodes that carry a vertex. `odometer` is from [`Nodes::odometer`]; one that counts otherwise is replaced by that. Between
-    /// the two surfaces a vertex is computed from both.
+    /// motion of the nodes that carry a vertex. `odometer` is from [`Nodes::odometer`]; one that counts otherwise is
+    /// replaced by that. Between the two surfaces a vertex is computed from both.
     ///
     /// Cost: one pass over the nodes of both.
     pub fn step<'s, W: VertexTable + ?Sized>(

@@ -377,12 +377,12 @@ impl Odometer {
         self.step_of(before, after, |_| true)
     }
 
-    /// The same where only the motion of some rows counts.
+    /// The same by the motion of the rows that carry a part of the surface.
     pub(crate) fn step_of<'v, V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
         &mut self,
         before: &'v W,
         after: &'v V,
-        counts: impl Fn(u32) -> bool,
+        carries: impl Fn(u32) -> bool,
     ) -> Step<'v, W, V> {
         let (mut from, mut to) = (Digest::new(), Digest::new());
         let mut largest = 0.0_f32;
@@ -395,7 +395,7 @@ impl Odometer {
             from.add(vertex, old);
             to.add(vertex, new);
             let squared = new.distance_squared(old);
-            if squared > largest && counts(vertex) {
+            if squared > largest && carries(vertex) {
                 largest = squared;
             }
             // False for NaN too.

@@ -1,4 +1,4 @@
-//! Nodes that carry no vertex: their motion is that of no surface.
+//! The motion of a surface is that of the nodes that carry a vertex; others may move as they like.
 
 // Requirement: F-07
 

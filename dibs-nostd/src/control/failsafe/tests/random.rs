@@ -1,4 +1,4 @@
-//! Random runs of the machine: what holds of every step, computed anew from all steps before it.
+//! Random runs of the machine: each step's state is compared with the one computed from all steps before it.
 
 use super::*;
 
