@@ -142,7 +142,7 @@ fn limits_are_learned_from_a_motion_and_hold_it() {
     assert_eq!(one["separation"], other["separation"]);
 }
 
-/// A frame that is inside out is refused by a controller whatever its limits, so none are learned from it.
+/// A controller refuses a frame that is inside out, whatever its limits: no limits are learned from it.
 #[test]
 fn a_frame_that_is_inside_out_is_named_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();

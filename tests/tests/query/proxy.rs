@@ -340,7 +340,7 @@ fn no_force_jumps_where_a_wall_begins_or_ends() {
     assert!(halved > 500);
 }
 
-/// A force that f32 does not hold is not applied, and walls that balance each other give none, whatever the speed.
+/// A force that is not finite is not applied. Walls that balance each other give none, whatever the speed.
 #[test]
 fn a_force_beyond_its_numbers_is_not_given() {
     let template = contact();

@@ -128,8 +128,8 @@ fn what_was_certain_a_tick_ago_stays_an_answer_under_any_budget() {
     assert!(heart[0] > ticks / 10 && heart[1] > ticks / 100, "{heart:?}");
 }
 
-/// A budget of three quarters of what ticks need, in every tick: the bounds near the tool run out in each of them, but no
-/// subtree waits for more than some ticks, so that the interval stays some motions wide.
+/// With three quarters of the instructions that a tick needs, the bounds near the tool run out in every tick. Each subtree
+/// is searched again within some ticks, so that the interval is at most some motions wide.
 #[test]
 fn every_bound_has_its_turn_under_a_budget_that_is_always_too_small() {
     const STEP: f32 = 0.3;

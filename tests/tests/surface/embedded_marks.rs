@@ -1,4 +1,4 @@
-//! The motion of a surface is that of the nodes that carry a vertex; others may move as they like.
+//! Nodes that carry no vertex do not count towards a surface's motion, and no limit on speed applies to them.
 
 // Requirement: F-07
 
