@@ -40,6 +40,10 @@ pub const DAMPING: f32 = 0.002;
 /// Largest force of the constraint, in N.
 pub const MAX_FORCE: f32 = 5.0;
 
+/// The constraint's spring.
+pub const SPRING: SpringDamper =
+    SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
+
 /// Distance from the surface at which the constraint begins, in mm.
 pub const MARGIN: f32 = 5.0;
 
@@ -74,8 +78,7 @@ pub fn start<R: Robot>(
         .ticks_a_second(TICK_RATE)
         .trust(trust.limits()?);
     let (receiver, guard) = surface::start(surface, limits)?;
-    let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
-    let wall = ForbiddenRegion::new(spring, MARGIN)?;
+    let wall = ForbiddenRegion::new(SPRING, MARGIN)?;
     let filter = Filter::new(STAND_OFF, ROBOT_SPEED)?.approach(APPROACH)?;
     let control = Control { guard, wall, filter, robot, bus, tick: Ticks(0) };
     Ok((Receiver::new(receiver, bus), control))

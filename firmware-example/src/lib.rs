@@ -32,13 +32,13 @@ use core::num::NonZeroU32;
 use dibs_nostd::{Millis, Ticks};
 
 pub use control::{
-    Control, DAMPING, MARGIN, MAX_FORCE, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS, instructions,
-    start,
+    Control, DAMPING, MARGIN, MAX_FORCE, SPRING, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS,
+    instructions, start,
 };
 pub use fingerprint::fingerprint;
 pub use hand::Hand;
 pub use instrument::instrument;
-pub use pushed::Pushed;
+pub use pushed::{ACCOUNT, Pushed};
 pub use receiver::{MTU, Receiver, STATUS_FRAMED, STATUS_MTU};
 pub use robot::{Either, Robot, Script};
 pub use status::BusStatus;

@@ -15,11 +15,11 @@ use crate::instrument::{LENGTH, RADIUS};
 use crate::robot::Robot;
 use crate::surface::{CENTRE, REACH};
 use crate::telemetry::Push;
-use crate::{PERIOD, STIFFNESS};
+use crate::{PERIOD, SPRING};
 
-/// Limits of the wall: the largest energy (mJ) that it gives to the hand, and the largest step of its force (N) from
-/// tick to tick.
-const ACCOUNT: EnergyAccount = match EnergyAccount::new(1.0, 0.5, STIFFNESS) {
+/// Limits of the wall: the energy (mJ) that it may give to the hand, the largest step of its force (N) from tick to tick,
+/// and the largest speed (mm/s) of the instrument relative to it.
+pub const ACCOUNT: EnergyAccount = match EnergyAccount::new(1.0, 0.5, &SPRING, 300.0) {
     Ok(account) => account,
     Err(_) => panic!("a constant is out of range"),
 };

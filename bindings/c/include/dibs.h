@@ -952,9 +952,10 @@ typedef uint32_t dibs_fallback;
 #endif // __cplusplus
 
 /**
- * An account of the energy that a wall's force gives to the hand, relative to the wall. It reduces the force where
- * the energy given would exceed the energy received by more than a stated tank, and limits the force's steps. A force
- * against an inward motion is never reduced by the account.
+ * An account of the energy that a wall's force gives to the hand, relative to the wall. It limits the force's steps, and
+ * reduces the force where the energy given would exceed the energy received by more than a stated tank. If the relative
+ * velocity leaps outwards, the force falls in steps: the wall then gives more, but never in all more than the tank and
+ * `speed * period * F * (F + step) / (2 * step)` for the largest force `F`.
  *
  * One context at a time.
  */
@@ -2162,9 +2163,12 @@ extern "C" {
  *
  * @param storage    `DIBS_ACCOUNT_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
  * @param size       Bytes of the storage.
- * @param tank       Largest difference (mJ) of the energy given and the energy received, above 0.
+ * @param tank       Energy (mJ) that may be given beyond the energy received, above 0.
  * @param step       Largest change of the force per tick (N), above 0.
  * @param stiffness  Stiffness of the wall (N/mm), above 0.
+ * @param max_force  Largest force of the wall (N), above 0.
+ * @param speed      Largest speed (mm/s) of the tool relative to the wall, above 0. A faster motion counts as one at
+ *                   this speed.
  * @param account    Receives the account's address.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_GAIN`, or a misuse.
  */
@@ -2173,13 +2177,15 @@ dibs_code dibs_account_init(void *storage,
                             float tank,
                             float step,
                             float stiffness,
+                            float max_force,
+                            float speed,
                             dibs_account **account);
 
 /**
  * The force to apply for the next period, for the force that `dibs_wall_force`, `dibs_wall_proxy_force` or
  * `dibs_answer_force` computed. Call it at every tick, during a hold too.
  *
- * If a number is not finite, the force falls to zero in steps.
+ * If a number or its square is not finite, the force falls to zero in steps.
  *
  * @param account   The account.
  * @param force     The computed force (N).
@@ -2195,9 +2201,7 @@ dibs_code dibs_account_pass(dibs_account *account,
                             dibs_vec3 *applied);
 
 /**
- * The energy (mJ) that may still be given.
- *
- * Below 0 after a tick whose motion took more than predicted from the last one.
+ * The energy (mJ) that may still be given; below 0 after an overdraft.
  *
  * @param account  The account.
  * @param balance  Receives it.

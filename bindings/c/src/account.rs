@@ -2,7 +2,7 @@
 
 use core::ffi::c_void;
 
-use dibs_nostd::constraint::EnergyAccount;
+use dibs_nostd::constraint::{EnergyAccount, SpringDamper};
 
 use crate::border::{Handle, Kind, Output, Storage};
 use crate::code::dibs_code;
@@ -11,9 +11,10 @@ use crate::tool::dibs_vec3;
 /// Bytes of an account's storage.
 pub const DIBS_ACCOUNT_SIZE: usize = 64;
 
-/// An account of the energy that a wall's force gives to the hand, relative to the wall. It reduces the force where
-/// the energy given would exceed the energy received by more than a stated tank, and limits the force's steps. A force
-/// against an inward motion is never reduced by the account.
+/// An account of the energy that a wall's force gives to the hand, relative to the wall. It limits the force's steps, and
+/// reduces the force where the energy given would exceed the energy received by more than a stated tank. If the relative
+/// velocity leaps outwards, the force falls in steps: the wall then gives more, but never in all more than the tank and
+/// `speed * period * F * (F + step) / (2 * step)` for the largest force `F`.
 ///
 /// One context at a time.
 pub struct dibs_account(EnergyAccount);
@@ -27,9 +28,12 @@ impl Kind for dibs_account {
 ///
 /// @param storage    `DIBS_ACCOUNT_SIZE` bytes, aligned to `DIBS_ALIGNMENT`.
 /// @param size       Bytes of the storage.
-/// @param tank       Largest difference (mJ) of the energy given and the energy received, above 0.
+/// @param tank       Energy (mJ) that may be given beyond the energy received, above 0.
 /// @param step       Largest change of the force per tick (N), above 0.
 /// @param stiffness  Stiffness of the wall (N/mm), above 0.
+/// @param max_force  Largest force of the wall (N), above 0.
+/// @param speed      Largest speed (mm/s) of the tool relative to the wall, above 0. A faster motion counts as one at
+///                   this speed.
 /// @param account    Receives the account's address.
 /// @return `DIBS_CODE_OK`, `DIBS_CODE_GAIN`, or a misuse.
 #[unsafe(no_mangle)]
@@ -39,17 +43,22 @@ pub extern "C" fn dibs_account_init(
     tank: f32,
     step: f32,
     stiffness: f32,
+    max_force: f32,
+    speed: f32,
     account: *mut *mut dibs_account,
 ) -> dibs_code {
     dibs_code::of(|| {
-        storage.make(size, account, || Ok(dibs_account(EnergyAccount::new(tank, step, stiffness)?)))
+        storage.make(size, account, || {
+            let spring = SpringDamper::stiffness(stiffness).max_force(max_force);
+            Ok(dibs_account(EnergyAccount::new(tank, step, &spring, speed)?))
+        })
     })
 }
 
 /// The force to apply for the next period, for the force that `dibs_wall_force`, `dibs_wall_proxy_force` or
 /// `dibs_answer_force` computed. Call it at every tick, during a hold too.
 ///
-/// If a number is not finite, the force falls to zero in steps.
+/// If a number or its square is not finite, the force falls to zero in steps.
 ///
 /// @param account   The account.
 /// @param force     The computed force (N).
@@ -72,9 +81,7 @@ pub extern "C" fn dibs_account_pass(
     })
 }
 
-/// The energy (mJ) that may still be given.
-///
-/// Below 0 after a tick whose motion took more than predicted from the last one.
+/// The energy (mJ) that may still be given; below 0 after an overdraft.
 ///
 /// @param account  The account.
 /// @param balance  Receives it.

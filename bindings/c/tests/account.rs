@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::fs;
 use std::process::Command;
 
-use dibs_nostd::constraint::EnergyAccount;
+use dibs_nostd::constraint::{EnergyAccount, SpringDamper};
 use dibs_nostd::glam::Vec3;
 
 use crate::programs::{compile, run};
@@ -30,7 +30,8 @@ fn ticks() -> impl Iterator<Item = [Vec3; 2]> {
 #[test]
 fn an_account_gives_the_same_bits() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut account = EnergyAccount::new(1.0, 0.5, 1.0).expect("in range");
+    let spring = SpringDamper::stiffness(1.0).max_force(5.0);
+    let mut account = EnergyAccount::new(1.0, 0.5, &spring, 300.0).expect("in range");
     let (mut lines, mut expected, mut reduced) = (String::new(), Vec::new(), 0);
     for [force, velocity] in ticks() {
         let numbers = [force, velocity].map(|of| of.to_array());

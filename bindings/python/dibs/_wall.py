@@ -128,13 +128,18 @@ class EnergyAccount(Remade):
 
     A wall that moves with its frames, the end of a hold and a saturation that yields give energy. The account sums force
     times relative velocity, and removes from the force the part along an outward motion that would give more than
-    received and a `tank` (mJ). A force against an inward motion is never reduced by it. From tick to tick the force
-    changes by at most `step` (N). `stiffness` (N/mm) is the wall's: no more than its spring can hold is received.
+    received and a `tank` (mJ). From tick to tick the force changes by at most `step` (N): where the relative velocity
+    leaps outwards, the wall gives more until the force has fallen, but in all never more than the tank and
+    `speed * period * F * (F + step) / (2 * step)` for the wall's largest force `F` (`max_force`, N). `stiffness` (N/mm)
+    is the wall's, `speed` (mm/s) the tool's largest relative to it; a faster motion counts as one at this speed.
     """
 
-    def __init__(self, tank: float, step: float, stiffness: float) -> None:
-        names = ("tank", "step", "stiffness")
-        self._native = _dibs.EnergyAccount(*map(_arrays.number, names, (tank, step, stiffness)))
+    def __init__(
+        self, tank: float, step: float, stiffness: float, max_force: float, speed: float
+    ) -> None:
+        names = ("tank", "step", "stiffness", "max_force", "speed")
+        values = (tank, step, stiffness, max_force, speed)
+        self._native = _dibs.EnergyAccount(*map(_arrays.number, names, values))
 
     def limit(
         self, force: npt.ArrayLike, velocity: npt.ArrayLike, period: float
@@ -152,7 +157,7 @@ class EnergyAccount(Remade):
 
     @property
     def balance(self) -> float:
-        """The energy (mJ) that may still be given. Below 0 after a tick whose motion took more than predicted."""
+        """The energy (mJ) that may still be given; below 0 after an overdraft."""
         return self._native.balance()
 
 

@@ -130,8 +130,10 @@ impl EnergyAccount {
 #[pymethods]
 impl EnergyAccount {
     #[new]
-    fn new(tank: f32, step: f32, stiffness: f32) -> PyResult<Self> {
-        let account = constraint::EnergyAccount::new(tank, step, stiffness).map_err(invalid)?;
+    fn new(tank: f32, step: f32, stiffness: f32, max_force: f32, speed: f32) -> PyResult<Self> {
+        let spring = SpringDamper::stiffness(stiffness).max_force(max_force);
+        let account = constraint::EnergyAccount::new(tank, step, &spring, speed);
+        let account = account.map_err(invalid)?;
         Ok(Self(Mutex::new(account)))
     }
 

@@ -81,12 +81,13 @@ class Proxies(unittest.TestCase):
             ("stiffness", ValueError, lambda: dibs.Proxy(0, 0, 5, 5)),
             ("margin", ValueError, lambda: dibs.Proxy(1, 0, 5, 0)),
             ("margin", TypeError, lambda: dibs.Proxy(1, 0, 5, "far")),
-            ("tank", ValueError, lambda: dibs.EnergyAccount(0, 0.5, 1)),
-            ("step", ValueError, lambda: dibs.EnergyAccount(1, np.nan, 1)),
-            ("stiffness", ValueError, lambda: dibs.EnergyAccount(1, 0.5, -1)),
-            ("force", ValueError, lambda: dibs.EnergyAccount(1, 0.5, 1).limit([1, 2], [0, 0, 0], PERIOD)),
-            ("velocity", TypeError, lambda: dibs.EnergyAccount(1, 0.5, 1).limit([0, 0, 0], None, PERIOD)),
-            ("period", ValueError, lambda: dibs.EnergyAccount(1, 0.5, 1).limit([0, 0, 0], [0, 0, 0], 0)),
+            ("tank", ValueError, lambda: dibs.EnergyAccount(0, 0.5, 1, 5, 300)),
+            ("step", ValueError, lambda: dibs.EnergyAccount(1, np.nan, 1, 5, 300)),
+            ("stiffness", ValueError, lambda: dibs.EnergyAccount(1, 0.5, -1, 5, 300)),
+            ("speed", ValueError, lambda: dibs.EnergyAccount(1, 0.5, 1, 5, 0)),
+            ("force", ValueError, lambda: dibs.EnergyAccount(1, 0.5, 1, 5, 300).limit([1, 2], [0, 0, 0], PERIOD)),
+            ("velocity", TypeError, lambda: dibs.EnergyAccount(1, 0.5, 1, 5, 300).limit([0, 0, 0], None, PERIOD)),
+            ("period", ValueError, lambda: dibs.EnergyAccount(1, 0.5, 1, 5, 300).limit([0, 0, 0], [0, 0, 0], 0)),
             ("tissue_speed", ValueError, lambda: dibs.Uncertainty(-1).stand_off(PERIOD)),
             ("error", ValueError, lambda: dibs.Uncertainty(1, np.nan).after(1)),
             ("ms", TypeError, lambda: dibs.Uncertainty(1).after(0.5)),
@@ -100,10 +101,10 @@ class Proxies(unittest.TestCase):
 
 class Accounts(unittest.TestCase):
     def test_a_jump_comes_in_steps_and_a_push_is_met_whole(self):
-        account = dibs.EnergyAccount(tank=1.0, step=0.5, stiffness=1.0)
+        account = dibs.EnergyAccount(tank=1.0, step=0.5, stiffness=1.0, max_force=5.0, speed=300.0)
         forces = [account.limit([5.0, 0, 0], [0, 0, 0], PERIOD)[0] for _ in range(12)]
         np.testing.assert_allclose(forces, np.minimum(0.5 * np.arange(1, 13), 5.0), atol=1e-4)
-        pushed = dibs.EnergyAccount(1.0, 0.5, 1.0)
+        pushed = dibs.EnergyAccount(1.0, 0.5, 1.0, 5.0, 300.0)
         for tick in range(100):
             wanted = [0.04 * tick, 0, 0]
             np.testing.assert_array_equal(pushed.limit(wanted, [-40.0, 0, 0], PERIOD), np.float32(wanted))
@@ -134,7 +135,7 @@ class Accounts(unittest.TestCase):
 
         exceeded = 0
         for seed in range(6):
-            most, largest = given(dibs.EnergyAccount(1.0, 0.5, 1.0), seed)
+            most, largest = given(dibs.EnergyAccount(1.0, 0.5, 1.0, 5.0, 300.0), seed)
             self.assertTrue(most <= 1.0 + 1e-3 and largest <= 0.5 + 1e-4, (most, largest))
             most, largest = given(None, seed)
             exceeded += most > 2 and largest > 2

@@ -5,7 +5,7 @@
 use std::fmt::Display;
 
 use dibs_build::{Builder, generate};
-use dibs_nostd::constraint::EnergyAccount;
+use dibs_nostd::constraint::{EnergyAccount, SpringDamper};
 use dibs_nostd::failsafe::{FailSafe, Limits, Watch};
 use dibs_nostd::filter::Reason;
 use dibs_nostd::format::Unit;
@@ -86,7 +86,9 @@ fn a_unit_has_its_millimetres() {
 
 #[test]
 fn errors_that_are_structs_say_their_values() {
-    states(EnergyAccount::new(1.0, -2.5, 1.0).expect_err("negative"), "step cannot be -2.5");
+    let spring = SpringDamper::stiffness(1.0).max_force(5.0);
+    let account = EnergyAccount::new(1.0, -2.5, &spring, 300.0);
+    states(account.expect_err("negative"), "step cannot be -2.5");
     let corner = QuantisedBox::new(Vec3::new(701.0, 0.0, 0.0), Vec3::new(1.0, -2.5, 1.0));
     states(
         corner.expect_err("a negative step"),

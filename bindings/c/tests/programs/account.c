@@ -19,12 +19,13 @@ static void misuse(void) {
     dibs_account *account = (dibs_account *)(void *)other;
     EXPECT(NOT_INITIALISED, dibs_account_pass(account, zero, zero, 0.001f, &applied));
     EXPECT(NOT_INITIALISED, dibs_account_balance(account, &balance));
-    EXPECT(GAIN, dibs_account_init(other, sizeof other, 0.0f, 0.5f, 1.0f, &account));
-    EXPECT(GAIN, dibs_account_init(other, sizeof other, 1.0f, -0.5f, 1.0f, &account));
-    EXPECT(STORAGE_SIZE, dibs_account_init(other, sizeof other - 1, 1.0f, 0.5f, 1.0f, &account));
-    EXPECT(STORAGE_ALIGNMENT, dibs_account_init(other + 4, sizeof other, 1.0f, 0.5f, 1.0f, &account));
-    EXPECT(NULL, dibs_account_init(other, sizeof other, 1.0f, 0.5f, 1.0f, NULL));
-    EXPECT(OK, dibs_account_init(other, sizeof other, 1.0f, 0.5f, 1.0f, &account));
+    EXPECT(GAIN, dibs_account_init(other, sizeof other, 0.0f, 0.5f, 1.0f, 5.0f, 300.0f, &account));
+    EXPECT(GAIN, dibs_account_init(other, sizeof other, 1.0f, -0.5f, 1.0f, 5.0f, 300.0f, &account));
+    EXPECT(GAIN, dibs_account_init(other, sizeof other, 1.0f, 0.5f, 1.0f, 5.0f, -300.0f, &account));
+    EXPECT(STORAGE_SIZE, dibs_account_init(other, sizeof other - 1, 1.0f, 0.5f, 1.0f, 5.0f, 300.0f, &account));
+    EXPECT(STORAGE_ALIGNMENT, dibs_account_init(other + 4, sizeof other, 1.0f, 0.5f, 1.0f, 5.0f, 300.0f, &account));
+    EXPECT(NULL, dibs_account_init(other, sizeof other, 1.0f, 0.5f, 1.0f, 5.0f, 300.0f, NULL));
+    EXPECT(OK, dibs_account_init(other, sizeof other, 1.0f, 0.5f, 1.0f, 5.0f, 300.0f, &account));
     EXPECT(NULL, dibs_account_pass(account, zero, zero, 0.001f, NULL));
     EXPECT(NULL, dibs_account_pass(NULL, zero, zero, 0.001f, &applied));
     EXPECT(NULL, dibs_account_balance(account, NULL));
@@ -38,7 +39,7 @@ int main(int argc, char **argv) {
         return 2;
     }
     misuse();
-    EXPECT(OK, dibs_account_init(memory, sizeof memory, 1.0f, 0.5f, 1.0f, &account));
+    EXPECT(OK, dibs_account_init(memory, sizeof memory, 1.0f, 0.5f, 1.0f, 5.0f, 300.0f, &account));
     while (fgets(line, sizeof line, forces) != NULL) {
         char *rest = line;
         float numbers[6];

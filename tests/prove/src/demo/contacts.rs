@@ -3,8 +3,8 @@
 
 use anyhow::Result;
 use controller::telemetry::Tick;
-use controller::{DAMPING, MARGIN, MAX_FORCE, STIFFNESS, TICK_RATE};
-use dibs_nostd::constraint::{Proxy, SpringDamper};
+use controller::{DAMPING, MARGIN, MAX_FORCE, SPRING, STIFFNESS, TICK_RATE};
+use dibs_nostd::constraint::Proxy;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Contacts, Index, Options, Query, Tree, Unavailable};
@@ -66,8 +66,7 @@ impl Touches {
         link: &Link,
         ticks: &[Tick],
     ) -> Result<Self> {
-        let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
-        let proxy = Proxy::new(spring, MARGIN)?;
+        let proxy = Proxy::new(SPRING, MARGIN)?;
         let mut query = Query::<I, MAX_STACK>::new(tree)?;
         let mut list = Contacts::<MOST>::new();
         let mut touches = Self::default();

@@ -10,7 +10,7 @@ mod faults;
 pub mod flood;
 mod forces;
 pub mod freshness;
-mod hand;
+pub mod hand;
 mod hand_plot;
 pub mod machine;
 mod plot;

@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result};
 use controller::telemetry::Tick;
-use controller::{DAMPING, MARGIN, MAX_FORCE, STIFFNESS, TICK_RATE};
-use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
+use controller::{MARGIN, SPRING, TICK_RATE};
+use dibs_nostd::constraint::ForbiddenRegion;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Index, Options, Query, Tool, Tree};
@@ -49,8 +49,7 @@ impl Steps {
         link: &Link,
         ticks: &[Tick],
     ) -> Result<Self> {
-        let spring = SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
-        let wall = ForbiddenRegion::new(spring, MARGIN)?;
+        let wall = ForbiddenRegion::new(SPRING, MARGIN)?;
         let mut query = Query::<I, MAX_STACK>::new(tree)?;
         let mut held = |before: &Tick, tick: &Tick| -> Result<(f32, bool)> {
             let rows = link.frame(tick.epoch).context("a frame that was never sent")?;

@@ -132,11 +132,4 @@ pub const ANOMALIES: &[Anomaly] = &[
         "A larger budget, or a coarser surface: the tool is slower, and stays outside.",
         "firmware-example/src/control.rs",
     ),
-    anomaly(
-        "K-23",
-        "An energy account limits the force's steps first: where the relative velocity leaps outwards at a large force, the wall gives \
-         more than the tank until the force has fallen. Some of the runs of `demo --nodes` say so.",
-        "A larger step, or a smaller tank.",
-        "dibs-nostd/src/control/constraint/account.rs",
-    ),
 ];

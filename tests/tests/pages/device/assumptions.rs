@@ -190,7 +190,7 @@ pub const ASSUMPTIONS: &[Assumption] = &[
     ),
     yours(
         "U-27",
-        "The device damps more than `SpringDamper::device_damping` says, or the wall has an `EnergyAccount`.",
+        "The device damps more than `SpringDamper::device_damping` says, or the wall has an `EnergyAccount` for the tool's largest speed.",
         "Measure the damping of the hand's axis.",
     ),
     yours(
