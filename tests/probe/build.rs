@@ -1,5 +1,5 @@
-//! Passes the board's memory map to the linker, as the firmware's build script does. It also fits the board with a
-//! Cortex-M55, whose RAM is smaller.
+//! Passes the board's memory map to the linker, as the firmware's build script does, with more memory on the board with a
+//! Cortex-M55.
 
 use std::path::PathBuf;
 use std::{env, fs, io};
@@ -11,6 +11,8 @@ fn main() -> io::Result<()> {
         let out = PathBuf::from(env::var_os("OUT_DIR").unwrap_or_default());
         if env::var("TARGET").is_ok_and(|target| target.starts_with("thumbv8m")) {
             println!("cargo:rustc-cfg=m55");
+            println!("cargo:rerun-if-changed=m55.x");
+            println!("cargo:rustc-link-arg-bin=probe=-T{}/m55.x", env!("CARGO_MANIFEST_DIR"));
         }
         fs::copy("../../memory.x", out.join("memory.x"))?;
         println!("cargo:rustc-link-search={}", out.display());

@@ -63,12 +63,10 @@ pub const QUERY_WORDS: usize = 12;
 pub const ANSWER_WORDS: usize = 25;
 /// Margin of the contacts, in mm.
 pub const MARGIN: f32 = 5.0;
-/// Largest tree, in bytes. A Cortex-M55's board has RAM for the heart and no more.
-pub const TREE_BYTES: usize = if cfg!(m55) { 368 << 10 } else { 1 << 20 };
+/// Largest tree, in bytes.
+pub const TREE_BYTES: usize = 1 << 20;
 /// Most vertices.
-pub const VERTICES: usize = if cfg!(m55) { 5_400 } else { 1 << 15 };
-/// Most vertices of a surface that moves between two frames, which a Cortex-M55's board does not have.
-const MOVING: usize = if cfg!(m55) { 0 } else { VERTICES };
+pub const VERTICES: usize = 1 << 15;
 
 /// Entries of the query's stack: more than the scripts' trees need.
 const STACK: usize = 128;
@@ -118,14 +116,14 @@ pub struct Fault;
 pub struct Memory {
     tree: [u8; TREE_BYTES],
     rows: [Vec3; VERTICES],
-    before: [Vec3; MOVING],
+    before: [Vec3; VERTICES],
 }
 
 impl Memory {
     /// Empty.
     #[must_use]
     pub const fn new() -> Self {
-        Self { tree: [0; TREE_BYTES], rows: [Vec3::ZERO; VERTICES], before: [Vec3::ZERO; MOVING] }
+        Self { tree: [0; TREE_BYTES], rows: [Vec3::ZERO; VERTICES], before: [Vec3::ZERO; VERTICES] }
     }
 }
 

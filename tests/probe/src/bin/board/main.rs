@@ -12,6 +12,8 @@ use cortex_m::interrupt::{self, Mutex};
 use cortex_m_rt::entry;
 use probe::{Fault, Memory, run};
 
+// SAFETY: m55.x places this section in memory that nothing else uses.
+#[cfg_attr(m55, unsafe(link_section = ".sram"))]
 static MEMORY: Mutex<RefCell<Memory>> = Mutex::new(RefCell::new(Memory::new()));
 
 #[entry]
