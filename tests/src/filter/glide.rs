@@ -3,10 +3,10 @@
 use dibs_build::{Builder, Mesh, Motion as Recorded};
 use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, Contacts, Odometer, Options, Query, Tracker, measure_stretch};
+use dibs_nostd::{Capsule, Contacts, Options, Query, Tracker, measure_stretch};
 use glam::Vec3;
 
-use super::{Asked, Listener, Settings};
+use super::{Asked, Beat, Listener, Moment, Settings};
 use crate::deform::unit;
 use fastrand::Rng;
 
@@ -98,24 +98,15 @@ pub fn glide_told(
     let mut outward = unit(&mut rng);
     let mut joints = [100.0, 112.0, 182.0].map(|far| middle + outward * far);
     let mut glided = Glided { least_along: f32::INFINITY, ..Glided::default() };
-    let mut odometer = Odometer::new(&tree);
+    let mut beat = Beat::new(&tree, &frames, motion.rate);
     listener.frame(&frames[0]);
-    let mut step = None;
     let mut goal = middle;
     for tick in 0..ticks {
-        let time = tick as f32 * TICK * motion.rate;
-        let (at, share) = (time as usize, time.fract());
-        let [from, to] = [at, at + 1].map(|at| at % frames.len());
+        let Moment { surface, frames: [from, to], share, is_next } = beat.at(tick as f32 * TICK);
+        if is_next {
+            listener.frame(&frames[to]);
+        }
         let measured = stretches[from].or_larger(stretches[to]).expect("one tree");
-        let step = match &mut step {
-            Some((number, step)) if *number == at => step,
-            _ => {
-                listener.frame(&frames[to]);
-                let (from, to) = (frames[from].as_slice(), frames[to].as_slice());
-                &mut step.insert((at, odometer.step(from, to))).1
-            }
-        };
-        let surface = step.at(share);
         let uncertainty = Uncertainty::new(tissue);
         if tick % 700 == 0 {
             // Towards it, along it, away from it.

@@ -6,9 +6,9 @@
 use dibs_build::{Builder, generate};
 use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, Odometer, Options, Query, Tracker};
+use dibs_nostd::{Capsule, Options, Query, Tracker};
 use dibs_tests::deform::unit;
-use dibs_tests::filter::fastest;
+use dibs_tests::filter::{Beat, fastest};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -18,7 +18,7 @@ const ROBOT: f32 = 300.0;
 const TICKS: u32 = 3_000;
 
 #[derive(Debug, Default)]
-struct Pushed {
+struct Run {
     ticks: u32,
     held: u32,
     unsafe_ticks: u32,
@@ -30,7 +30,7 @@ struct Pushed {
 }
 
 /// Pushes a capsule against a beating heart, and along it.
-fn push(instructions: u32, seed: u64) -> Pushed {
+fn push(instructions: u32, seed: u64) -> Run {
     let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a valid size");
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
@@ -39,23 +39,15 @@ fn push(instructions: u32, seed: u64) -> Pushed {
     let uncertainty = Uncertainty::new(fastest(&motion));
     let mut tracker = Tracker::<_, MAX_STACK, 512>::new(&tree).expect("deep enough");
     let mut query = Query::<_, MAX_STACK>::new(&tree).expect("deep enough");
-    let mut odometer = Odometer::new(&tree);
+    let mut beat = Beat::new(&tree, &frames, motion.rate);
     let mut rng = Rng::with_seed(seed);
     let middle = mesh.positions.iter().sum::<Vec3>() / mesh.positions.len() as f32;
     let outward = unit(&mut rng);
     let mut ends = [100.0, 160.0].map(|far| middle + outward * far);
     let mut along = unit(&mut rng);
-    let mut pushed = Pushed { nearest: f32::INFINITY, ..Pushed::default() };
-    let mut step = None;
+    let mut pushed = Run { nearest: f32::INFINITY, ..Run::default() };
     for tick in 0..TICKS {
-        let time = tick as f32 * TICK * motion.rate;
-        let (at, share) = (time as usize, time.fract());
-        let [from, to] = [at, at + 1].map(|at| frames[at % frames.len()].as_slice());
-        let step = match &mut step {
-            Some((number, step)) if *number == at => step,
-            _ => &mut step.insert((at, odometer.step(from, to))).1,
-        };
-        let surface = step.at(share);
+        let surface = beat.at(tick as f32 * TICK).surface;
         let outward = (ends[0] - middle).normalize();
         let tool = Capsule::new(ends[0], ends[1], 2.5).expect("finite");
         if tick % 100 == 0 {
