@@ -42,7 +42,7 @@ impl<'n, 'a, V: VertexTable + ?Sized> EmbeddedSurface<'n, 'a, V> {
         after: &'s EmbeddedSurface<'n, 'a, W>,
         odometer: &mut Odometer,
     ) -> Step<'s, Self, EmbeddedSurface<'n, 'a, W>> {
-        if !odometer.counts(self.nodes.motion) {
+        if !odometer.counts(self.nodes.count() as usize, self.nodes.motion) {
             *odometer = self.nodes.odometer();
         }
         let carries = |node| self.nodes.carries(node);

@@ -351,10 +351,12 @@ impl Odometer {
         Self { unit, tree, vertices, surface, motion: None, digest: 0 }
     }
 
-    /// Whether it counts motion in this unit, which rows that move more than themselves have for their own.
+    /// Whether it counts the motion of this many rows, in this unit, which rows that move more than themselves have for
+    /// their own.
     #[cfg(feature = "nodes")]
-    pub(crate) fn counts(&self, unit: MotionUnit) -> bool {
-        self.tree == unit.tree && self.unit.length == unit.unit.length
+    pub(crate) fn counts(&self, rows: usize, unit: MotionUnit) -> bool {
+        let is_of_tree = self.tree == unit.tree && self.unit.length == unit.unit.length;
+        is_of_tree && self.vertices == rows
     }
 
     /// Starts anew with a frame.

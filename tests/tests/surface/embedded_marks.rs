@@ -7,8 +7,8 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::{NodeMonitor, Nodes};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Assembler, Frames, Millis, Options, ReceiveError, Sphere, StretchError, SurfaceLimits,
-    Tracker,
+    Advance, Assembler, Frames, Millis, Odometer, Options, ReceiveError, Sphere, StretchError,
+    SurfaceLimits, Tracker,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::embedded::rest;
@@ -67,6 +67,9 @@ fn only_nodes_that_carry_a_vertex_count() {
         assert!(carries || moved < 0.01, "{node} {moved}");
         let (from, to) = (nodes.surface(&rest[..]), nodes.surface(&near[..]));
         assert_eq!(from.step(&to, &mut odometer).length() > 0.4, carries, "{node}");
+        // An odometer of vertices is replaced.
+        let mut other = Odometer::new(&tree);
+        assert_eq!(from.step(&to, &mut other).length() > 0.4, carries, "{node}");
         publish(&rest).expect("good");
         match publish(&far) {
             Ok(_) => assert!(!carries, "{node}"),
