@@ -248,7 +248,7 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
     assert!(near.bound() < MARGIN);
     holds(&near.iter().map(|c| c.separation).collect::<Vec<_>>(), near.bound());
     let mut cut_short = 0;
-    for node_tests in (0..4_000).step_by(23) {
+    for node_tests in (0..4_000).step_by(23).chain(0..200) {
         let options = Options::cold().budget(Budget::new(node_tests));
         query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut near).expect("an answer");
         cut_short += usize::from(near.bound() < MARGIN);
@@ -344,6 +344,9 @@ fn what_cannot_be_asked_is_named() {
     let mut none = Contacts::<0>::new();
     let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut none);
     assert_eq!(refused.err(), Some(QueryError::Contacts { capacity: 0, near: 512 }));
+    let mut none = Contacts::<4, 0>::new();
+    let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut none);
+    assert_eq!(refused.err(), Some(QueryError::Contacts { capacity: 4, near: 0 }));
     let mut contacts = Contacts::<4>::new();
     for margin in [-1.0, f32::NAN, f32::INFINITY] {
         let refused =

@@ -257,6 +257,48 @@ fn rows_of_the_caller_hold() {
     assert!(moved > 100 && walls > 20, "{moved} {walls}");
 }
 
+/// Sixteen rows are kept: beside eight of the caller and eight pairs' a new wall replaces the one that is farthest from
+/// the motion. The caller's still hold, and no motion is admitted that is not verified.
+#[test]
+fn a_wall_beyond_the_sixteenth_row_replaces_another() {
+    let mesh = ball(3);
+    let bench = Bench::new(&mesh, 1.0);
+    let tree = bench.built.tree::<u16>().expect("16-bit indices");
+    let surface = Odometer::new(&tree).start(bench.rows.as_slice());
+    let mut rng = Rng::with_seed(5);
+    let filter = bench.filter.budget(2_000_000);
+    let (mut kept, mut walls) = (0, 0);
+    for _ in 0..40 {
+        let tools: [Capsule; Filter::<0>::MOST_PAIRS] = std::array::from_fn(|_| {
+            let outward = (Vec3::Z + unit(&mut rng) * 0.3).normalize();
+            capsule(outward * rng.f32().mul_add(0.1, 42.05), outward * 90.0)
+        });
+        let mut trackers =
+            tools.map(|_| Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough"));
+        let pairs = trackers.iter_mut().zip(&tools);
+        let mut pairs: Vec<_> = pairs.map(|(tracker, tool)| (tracker, &surface, tool)).collect();
+        let own: [MotionRow; 8] = std::array::from_fn(|_| MotionRow::along(unit(&mut rng), -0.15));
+        let push = (Vec3::NEG_Z + unit(&mut rng) * 0.5).normalize() * 0.2;
+        let command = Motion::new(Vec3::Z * 42.0, push, unit(&mut rng) * 0.002);
+        let admitted = filter.admit(&mut pairs, &command, 0.001, &Uncertainty::NONE, &own);
+        let admitted = admitted.expect("an answer");
+        let moved = admitted.motion.translation;
+        for row in &own {
+            assert!(Vec3::from(row.linear).dot(moved) > -0.15 - 1e-3, "{admitted:?}");
+        }
+        for tool in &tools {
+            let [start, end] = [tool.start(), tool.end()].map(|end| admitted.motion.apply(end));
+            let tool = Instrument::capsule(start, end, 1.0);
+            let truth = exhaustive(&mesh.positions, &mesh.triangles, &tool).expect("triangles");
+            let is_clear = truth.separation > 1.0 - 0.02;
+            assert!(is_clear || admitted.reason == Reason::NoSafeMotion, "{admitted:?}");
+        }
+        kept += usize::from(admitted.reason != Reason::NoSafeMotion);
+        walls += usize::from(admitted.reason == Reason::Nearest);
+    }
+    assert!(kept > 10 && walls > 5, "{kept} {walls}");
+}
+
 /// Without a budget nothing is admitted.
 #[test]
 fn nothing_unverified_is_admitted() {

@@ -339,4 +339,13 @@ fn the_monitor_compares_frames_itself() {
     assert!(slices >= work / 25 && slices <= work / 25 + 2, "{slices} {work}");
     let too_fast = decide(&moved, Millis(2));
     assert!(matches!(too_fast, Err(StretchError::TooFast { vertex: 57, .. })), "{too_fast:?}");
+    // Of a frame that changes some rows the others are there before it: it is not judged earlier.
+    monitor.begin(FrameExtent::Partial);
+    for (ready, is_pending) in [(0, true), (nodes.count() - 1, true), (nodes.count(), false)] {
+        let incoming = IncomingSurface::new(&moved[..], ready);
+        let admission = monitor.advance(incoming, u32::MAX).expect("no speed is known");
+        assert_eq!(admission == Admission::Pending, is_pending, "{ready}");
+    }
+    assert_eq!(monitor.nodes().count(), nodes.count());
+    assert_eq!(monitor.whole_work(), work);
 }

@@ -115,6 +115,17 @@ mod tests {
 
     use super::*;
 
+    #[test]
+    fn a_point_that_starts_too_far_goes_nowhere() {
+        assert_eq!(inside(Vec3::X, Vec3::X * 2.0, 2.0), (1.0 - 8.0 * f32::EPSILON) * 0.5);
+        assert_eq!(inside(Vec3::X * 3.0, Vec3::X, 2.0), 0.0);
+        // It leads in.
+        assert_eq!(inside(Vec3::X * 3.0, Vec3::X * -2.0, 2.0), 1.0);
+        // No step, and one whose square's square f32 does not hold.
+        assert_eq!(inside(Vec3::X * 3.0, Vec3::ZERO, 2.0), 1.0);
+        assert_eq!(inside(Vec3::ZERO, Vec3::X * 1e-20, 1e-21), 0.0);
+    }
+
     proptest! {
         /// Against f64, and on its whole path no farther from the straight line than the arc's height.
         #[test]

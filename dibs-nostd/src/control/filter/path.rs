@@ -57,6 +57,9 @@ mod tests {
     fn a_path_along_a_wall_loses_little() {
         let lost = 3.0 - least(3.0, 3.0, 0.2, 0.0);
         assert!((lost - 0.04 / 24.0).abs() < 2e-5, "{lost}");
+        // Out of the surface, the start is nearest; into it, the end.
+        assert!((least(-1.0, 5.0, 0.0, 0.0) + 1.0).abs() < 2e-5);
+        assert!((least(1.0, -1.0, 2.0, 0.0) + 1.0).abs() < 2e-5);
         // An approaching surface is nearest at the end.
         assert!((least(3.0, 3.0, 0.2, 0.3) - 2.7).abs() < 2e-5);
         assert!(least(f32::NAN, 3.0, 0.2, 0.0).is_nan() && least(3.0, f32::NAN, 0.2, 0.0).is_nan());

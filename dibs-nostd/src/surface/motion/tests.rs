@@ -10,7 +10,7 @@ use dibs_build::{Builder, generate};
 use fastrand::Rng;
 use glam::Vec3;
 
-use super::Odometer;
+use super::{MotionReading, Odometer};
 use crate::{MovingSurface, Tree};
 
 /// A change of a frame.
@@ -63,5 +63,30 @@ fn an_odometer_starts_anew_with_any_other_frame() {
         let copy = next.clone();
         let step = odometer.step(copy.as_slice(), rows.as_slice());
         assert!(step.after().motion().unwrap().since(&before).is_some_and(|units| units > 0));
+    }
+}
+
+#[test]
+fn tables_of_another_length_are_not_measured() {
+    let mesh = generate::heart(320).unwrap().mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).unwrap();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let rows = built.to_rows(&mesh.positions);
+    let short = &rows[1..];
+    for (before, after) in [(short, &rows[..]), (&rows[..], short), (short, short)] {
+        let mut odometer = Odometer::new(&tree);
+        let first = odometer.start(rows.as_slice()).motion().unwrap();
+        let step = odometer.step(before, after);
+        assert_eq!(step.length(), f32::INFINITY);
+        assert_eq!(step.after().motion().unwrap().since(&first), None);
+    }
+}
+
+#[test]
+fn readings_of_other_trees_and_runs_have_no_difference() {
+    let one = MotionReading::start(1);
+    assert_eq!((one.since(&one), one.after(&one)), (Some(0), Some(0)));
+    for other in [MotionReading::start(2), MotionReading::start(1)] {
+        assert_eq!((one.since(&other), one.after(&other)), (None, None));
     }
 }
