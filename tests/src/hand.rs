@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use controller::{Hand, MARGIN, PERIOD as TICK, SPRING};
+use controller::{ACCOUNT, Hand, MARGIN, PERIOD as TICK, SPRING};
 use dibs_build::{Builder, Mesh, Motion as Recorded, generate};
-use dibs_nostd::constraint::{EnergyAccount, ForbiddenRegion, Proxy, VelocityRow};
+use dibs_nostd::constraint::{ForbiddenRegion, Proxy, VelocityRow};
 use dibs_nostd::filter::{Filter, Motion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Contacts, Odometer, Options, Query, Sphere, Tracker, Unavailable};
@@ -14,12 +14,6 @@ use crate::surfaces::{ball, sheet};
 
 /// Ticks of a push.
 const TICKS: u32 = 4_000;
-
-/// The largest energy (mJ) and the largest step of the force (N) that the account allows, and the largest speed (mm/s)
-/// of the instrument relative to the wall.
-const TANK: f32 = 1.0;
-const STEP: f32 = 0.5;
-const SPEED: f32 = 300.0;
 
 /// The instrument's radius (mm).
 const RADIUS: f32 = 1.0;
@@ -110,7 +104,7 @@ impl Scene {
         let mut contacts = Contacts::<8>::new();
         let proxy = Proxy::new(SPRING, MARGIN).expect("a valid margin");
         let alone = ForbiddenRegion::new(SPRING, MARGIN).expect("a valid margin");
-        let mut account = EnergyAccount::new(TANK, STEP, &SPRING, SPEED).expect("in range");
+        let mut account = ACCOUNT;
         let (mut hand, mut given) = (Hand::new(self.from), 0.0);
         let mut pushed = Pushed { least: f32::INFINITY, step: 0.0, given: 0.0 };
         let mut before: Option<Vec3> = None;

@@ -954,8 +954,9 @@ typedef uint32_t dibs_fallback;
 /**
  * An account of the energy that a wall's force gives to the hand, relative to the wall. It limits the force's steps, and
  * reduces the force where the energy given would exceed the energy received by more than a stated tank. If the relative
- * velocity leaps outwards, the force falls in steps: the wall then gives more, but never in all more than the tank and
- * `speed * period * F * (F + step) / (2 * step)` for the largest force `F`.
+ * velocity leaps outwards, the force falls in steps, and the wall gives more. At speeds up to the stated one, all this
+ * together is at most `speed * period * (F + step / 2)^2 / (2 * step)` for the largest force `F`. An account that has
+ * used it up recovers by a tenth of the tank per second, up to an eighth, so that the wall keeps a force.
  *
  * One context at a time.
  */
@@ -2167,8 +2168,8 @@ extern "C" {
  * @param step       Largest change of the force per tick (N), above 0.
  * @param stiffness  Stiffness of the wall (N/mm), above 0.
  * @param max_force  Largest force of the wall (N), above 0.
- * @param speed      Largest speed (mm/s) of the tool relative to the wall, above 0. A faster motion counts as one at
- *                   this speed.
+ * @param speed      Largest speed (mm/s) of the tool relative to the wall, above 0. Of a faster motion only this speed
+ *                   is counted.
  * @param account    Receives the account's address.
  * @return `DIBS_CODE_OK`, `DIBS_CODE_GAIN`, or a misuse.
  */
@@ -2185,7 +2186,8 @@ dibs_code dibs_account_init(void *storage,
  * The force to apply for the next period, for the force that `dibs_wall_force`, `dibs_wall_proxy_force` or
  * `dibs_answer_force` computed. Call it at every tick, during a hold too.
  *
- * If a number or its square is not finite, the force falls to zero in steps.
+ * If a number or its square is not finite, the force falls to zero in steps; a velocity that is not counts as one
+ * along the force at the largest speed.
  *
  * @param account   The account.
  * @param force     The computed force (N).

@@ -129,9 +129,11 @@ class EnergyAccount(Remade):
     A wall that moves with its frames, the end of a hold and a saturation that yields give energy. The account sums force
     times relative velocity, and removes from the force the part along an outward motion that would give more than
     received and a `tank` (mJ). From tick to tick the force changes by at most `step` (N): where the relative velocity
-    leaps outwards, the wall gives more until the force has fallen, but in all never more than the tank and
-    `speed * period * F * (F + step) / (2 * step)` for the wall's largest force `F` (`max_force`, N). `stiffness` (N/mm)
-    is the wall's, `speed` (mm/s) the tool's largest relative to it; a faster motion counts as one at this speed.
+    leaps outwards, the wall gives more until the force has fallen. At speeds up to `speed` (mm/s, of the tool relative to
+    the wall; of a faster motion only this is counted) all this together is at most
+    `speed * period * (F + step / 2)**2 / (2 * step)` for the wall's largest force `F` (`max_force`, N). An account that
+    has used it up recovers by a tenth of the tank per second, up to an eighth, so that the wall keeps a force.
+    `stiffness` (N/mm) is the wall's.
     """
 
     def __init__(
@@ -147,7 +149,8 @@ class EnergyAccount(Remade):
         """The force (N) to apply for the next `period` (s), for the `force` of a wall.
 
         Call it at every tick, during a hold too. `velocity` (mm/s) is the tool's relative to the wall since the last tick.
-        If a number of the two is not finite, as the velocity without a tool, the force falls to zero in steps.
+        If a number of the two is not finite, as the velocity without a tool, the force falls to zero in steps; such a
+        velocity counts as one along the force at the largest speed.
         """
         period = _arrays.number("period", period)
         if period <= 0:

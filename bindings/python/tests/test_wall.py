@@ -84,6 +84,7 @@ class Proxies(unittest.TestCase):
             ("tank", ValueError, lambda: dibs.EnergyAccount(0, 0.5, 1, 5, 300)),
             ("step", ValueError, lambda: dibs.EnergyAccount(1, np.nan, 1, 5, 300)),
             ("stiffness", ValueError, lambda: dibs.EnergyAccount(1, 0.5, -1, 5, 300)),
+            ("max_force", ValueError, lambda: dibs.EnergyAccount(1, 0.5, 1, -5, 300)),
             ("speed", ValueError, lambda: dibs.EnergyAccount(1, 0.5, 1, 5, 0)),
             ("force", ValueError, lambda: dibs.EnergyAccount(1, 0.5, 1, 5, 300).limit([1, 2], [0, 0, 0], PERIOD)),
             ("velocity", TypeError, lambda: dibs.EnergyAccount(1, 0.5, 1, 5, 300).limit([0, 0, 0], None, PERIOD)),

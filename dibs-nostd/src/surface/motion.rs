@@ -351,8 +351,7 @@ impl Odometer {
         Self { unit, tree, vertices, surface, motion: None, digest: 0 }
     }
 
-    /// Whether it counts the motion of this many rows, in this unit, which rows that move more than themselves have for
-    /// their own.
+    /// Whether it measures this many rows in this unit: an odometer of a surface's vertices does not measure its nodes.
     #[cfg(feature = "nodes")]
     pub(crate) fn counts(&self, rows: usize, unit: MotionUnit) -> bool {
         let is_of_tree = self.tree == unit.tree && self.unit.length == unit.unit.length;

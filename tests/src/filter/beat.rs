@@ -15,11 +15,11 @@ pub struct Beat<'f> {
 
 /// The surface at a time.
 pub struct Moment<'f> {
-    /// It.
+    /// Its vertices, blended from two frames.
     pub surface: SurfaceBlend<'f, [Vec3], [Vec3]>,
-    /// Numbers of the frames around the time, and the fraction of the step between them.
+    /// Numbers of the frame before the time and of the one after it.
     pub frames: [usize; 2],
-    /// See there.
+    /// The time since the frame before, as a fraction of the step between the two.
     pub share: f32,
     /// Whether the last time was in another step.
     pub is_next: bool,

@@ -13,18 +13,18 @@ use crate::math::sqrt::sqrt;
 /// A spring in continuous time returns the energy that it received. Sampling, a frame that moves the wall in one tick,
 /// the end of a hold and a saturation that yields give more. The account sums force times relative velocity (a
 /// passivity observer: Hannaford & Ryu, IEEE T-RA 2002) and removes from the force the part along an outward motion
-/// that the account does not cover. The energy received from the hand is limited to the spring's own, so that a damper
-/// does not fill the account.
+/// that the account does not cover. The energy received from the hand counts up to the elastic energy of the spring, so
+/// that a damper does not fill the account.
 ///
 /// Between two ticks the force changes by at most a largest step, also where the account requires more: if the relative
 /// velocity leaps outwards at a large force, the wall gives more than the tank until the force has fallen. All these
 /// overdrafts together are at most what the largest force gives while it falls once, at the largest speed: the force is
-/// limited to one whose fall the remainder covers. So no wall gives more than [`most`](Self::most), however often and
-/// fast it moves; a motion faster than stated counts as one at that speed. A force against an inward motion is not
-/// reduced before the tank is overdrawn.
+/// limited to one whose fall the remainder covers. So no wall gives more than [`most`](Self::most), however often it
+/// moves, at speeds up to the stated one; of a faster motion only this speed is counted. A force against an inward
+/// motion is not reduced before the tank is overdrawn.
 ///
-/// If the remainder is used up, too, it recovers by a tenth of the tank per second up to an eighth of it, which a wall
-/// may give in addition; from there the work of inward motions makes the wall stiff again.
+/// An overdraft that is used up recovers by a tenth of the tank per second up to an eighth of the tank, which a wall may
+/// give in addition; from there the work of inward motions makes the wall stiff again.
 ///
 /// ```
 /// use dibs_nostd::constraint::{EnergyAccount, SpringDamper};
@@ -89,8 +89,9 @@ impl EnergyAccount {
         Ok(Self { tank, step, stiffness, fall, speed, balance: tank, force: Vec3::ZERO })
     }
 
-    /// The most energy (mJ) that a wall gives beyond what it received, at this period (s): the tank, and the fall of the
-    /// largest force `F`, about `speed period F (F + step) / (2 step)`.
+    /// The most energy (mJ) that a wall gives beyond what it received and what recovered, at this period (s) and speeds
+    /// up to the stated one: the tank, and what the largest force `F` gives while it falls to zero, at most
+    /// `speed period (F + step / 2)^2 / (2 step)`.
     #[must_use]
     pub const fn most(&self, period: f32) -> f32 {
         self.tank + self.fall * (self.speed * period)
@@ -136,8 +137,8 @@ impl EnergyAccount {
         if given > tick && square >= f32::MIN_POSITIVE {
             wanted -= moved * ((given - tick) / square);
         }
-        // Towards zero as far as required, then towards the wanted force: both ends have a size that is covered, and
-        // so has what is between them.
+        // Towards zero as far as required, then towards the wanted force. Both are covered, so each force on the line
+        // between them is.
         let covered = self.covered((self.balance - lowest) / farthest);
         let size = length(self.force);
         let step = (self.step - size * f32::EPSILON) * ROUNDING;
