@@ -11,6 +11,7 @@ use dibs_nostd::{
 };
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive, least_distance};
+use dibs_tests::sample;
 use dibs_tests::sides::winding_number;
 use dibs_tests::surfaces::{self, ball, cuboid};
 use fastrand::Rng;
@@ -57,7 +58,7 @@ fn at_the_surface(
         let mut odometer = Odometer::new(&tree);
         let surface = odometer.start(rows.as_slice());
         let mut list = Contacts::<32>::new();
-        for number in 0..if cfg!(debug_assertions) { 2_000 } else { 20_000 } {
+        for number in 0..if cfg!(debug_assertions) { 2_000 } else { sample(20_000) } {
             let [a, b, c] = triangles[rng.usize(..triangles.len())].map(|v| rows[v as usize]);
             let across = (b - a).cross(c - a).normalize();
             let at = a.lerp(b, rng.f32()).lerp(c, rng.f32()) + across * (rng.f32() - 0.5) * 3e-3;
@@ -104,7 +105,7 @@ fn no_contact_is_less_deep_than_the_axis_may_be() {
         tight += usize::from(deepest > truth);
     });
     println!("{undefined} below the accuracy");
-    assert!(undefined > 1_000 && tight > 100, "{undefined} {tight}");
+    assert!(undefined > sample(1_000) && tight > sample(100), "{undefined} {tight}");
 }
 
 /// A tool on a neighbour of the part has the same distance from the part as beside the surface.
@@ -151,7 +152,7 @@ fn a_tool_without_a_direction_is_held() {
     let proxy = Proxy::new(spring, MARGIN).expect("a valid margin");
     let mut list = Contacts::<32>::new();
     let (mut rng, mut without) = (Rng::with_seed(7), 0);
-    for _ in 0..if cfg!(debug_assertions) { 4_000 } else { 40_000 } {
+    for _ in 0..if cfg!(debug_assertions) { 4_000 } else { sample(40_000) } {
         let turn =
             glam::Quat::from_rotation_y(6.0 * rng.f32()) * glam::Quat::from_rotation_x(rng.f32());
         let (positions, _) = plate(1e-6 * rng.f32());

@@ -10,6 +10,7 @@ use dibs_nostd::{Capsule, Cost, Millis, MovingTable, Odometer, Tracker};
 use dibs_tests::deform::unit;
 use dibs_tests::filter::{Episode, Tally, glide, scenes, walk};
 use dibs_tests::oracle::{Instrument, exhaustive};
+use dibs_tests::sample;
 use dibs_tests::surfaces::{ball, sheet};
 use fastrand::Rng;
 use glam::Vec3;
@@ -17,7 +18,8 @@ use rayon::prelude::*;
 
 /// Walks of 400 ticks: `DIBS_FILTER_WALKS`, if set.
 fn walks() -> u64 {
-    std::env::var("DIBS_FILTER_WALKS").map_or(100, |text| text.parse().expect("a number"))
+    std::env::var("DIBS_FILTER_WALKS")
+        .map_or(sample(100) as u64, |text| text.parse().expect("a number"))
 }
 
 #[test]

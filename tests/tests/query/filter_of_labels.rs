@@ -7,6 +7,7 @@ use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, Reason, Uncertai
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Odometer, Tracker};
 use dibs_tests::filter::{Episode, Tally, labelled_scenes, walk_by_label};
+use dibs_tests::sample;
 use dibs_tests::surfaces::sheet;
 use fastrand::Rng;
 use glam::Vec3;
@@ -33,7 +34,7 @@ fn tissue(from_middle: Vec3) -> u8 {
 #[test]
 fn no_walk_comes_nearer_than_a_label_s_stand_off() {
     let scenes = labelled_scenes(tissue);
-    let tallies: Vec<Tally> = (0..60_u64)
+    let tallies: Vec<Tally> = (0..sample(60) as u64)
         .into_par_iter()
         .map(|seed| {
             let scene = &scenes[seed as usize % scenes.len()];

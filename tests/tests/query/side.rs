@@ -17,14 +17,14 @@ use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::side_poses::{POSES_OF_A_FRAME, Tally, bent, closed, judge, point};
 use dibs_tests::surfaces::{self, ball, cuboid, slivers};
 use dibs_tests::tree_bytes::{reseal, section};
-use dibs_tests::{is_whole, sides};
+use dibs_tests::{is_whole, sample, sides};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
 
 /// The total number of poses on all surfaces.
 fn poses() -> usize {
     let asked = std::env::var("DIBS_POSES").ok().map(|n| n.parse().expect("a number of poses"));
-    asked.unwrap_or(if cfg!(debug_assertions) { 400 } else { 10_000 })
+    asked.unwrap_or(if cfg!(debug_assertions) { 400 } else { sample(10_000) })
 }
 
 #[test]
@@ -329,7 +329,7 @@ fn a_tree_with_adjacency_takes_at_most_16_bytes_a_triangle() {
 fn no_side_is_wrong_next_to_a_saddle() {
     let mut rng = Rng::with_seed(21);
     let (mut stated, mut undefined, mut wrong) = (0, 0, 0);
-    for _ in 0..if cfg!(debug_assertions) { 20 } else { 4_000 } {
+    for _ in 0..if cfg!(debug_assertions) { 20 } else { sample(4_000) } {
         let apex = Vec3::new(40.0, -17.0, 16.0);
         let mut between = |from: f32, to: f32| from + (to - from) * rng.f32();
         let flat = [between(-1e-3, 1e-3), between(-1e-3, 1e-3)];
@@ -378,7 +378,7 @@ fn no_side_is_wrong_next_to_a_saddle() {
     }
     println!("{stated} sides stated, {undefined} undefined, {wrong} wrong");
     assert_eq!(wrong, 0);
-    assert!(cfg!(debug_assertions) || stated > 2_000, "{stated}");
+    assert!(cfg!(debug_assertions) || stated > sample(2_000), "{stated}");
 }
 
 /// A path may lead around an open surface: an axis without intersection may have points on both sides.

@@ -14,6 +14,7 @@ use dibs_nostd::{
 };
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
+use dibs_tests::sample;
 use dibs_tests::sides::{is_inside, winding_number};
 use dibs_tests::surfaces::{ball, cuboid, joined, triangles};
 use fastrand::Rng;
@@ -302,7 +303,7 @@ fn no_side_is_wrong_in_any_unit() {
 
 /// With this many units a millimetre.
 fn climb_everywhere(unit: f32) {
-    let climbs = std::env::var("DIBS_CLIMBS").map_or(12, |n| n.parse().expect("a number"));
+    let climbs = std::env::var("DIBS_CLIMBS").map_or(sample(12), |n| n.parse().expect("a number"));
     let (mut ties, mut asked) = (0, 0);
     for (seed, mut subject) in (1..).zip(subjects()) {
         let mut rng = Rng::with_seed(seed);

@@ -14,6 +14,7 @@ use dibs_nostd::{
 };
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{closest_pair, least_distance};
+use dibs_tests::sample;
 use dibs_tests::surfaces::{self, ball};
 use fastrand::Rng;
 use glam::{DVec3, Vec3};
@@ -142,7 +143,7 @@ fn no_wall_is_missing_from_a_list_of_contacts() {
         ("groove", groove(0.8)),
         ("organ", generate::heart(1_000).expect("a valid size").mesh),
     ];
-    let starts = if cfg!(debug_assertions) { 12 } else { 100 };
+    let starts = if cfg!(debug_assertions) { 12 } else { sample(100) };
     let (mut checked, mut several, mut cut) = (0, 0, 0);
     for (seed, (name, mesh)) in (1..).zip(meshes) {
         let mut rng = Rng::with_seed(seed);
@@ -340,7 +341,7 @@ fn the_force_between_two_walls_is_continuous() {
             proxy.wrench(all, list.accuracy(), at, Vec3::ZERO, Vec3::ZERO).force
         };
         let mut rng = Rng::with_seed(7);
-        for _ in 0..if cfg!(debug_assertions) { 20 } else { 200 } {
+        for _ in 0..if cfg!(debug_assertions) { 20 } else { sample(200) } {
             let depth = 0.5 + 4.5 * rng.f32();
             // Upwards in the groove's middle, at this distance from both walls.
             let mut at = Vec3::new(0.0, depth / angle.cos(), 20.0 * rng.f32());
@@ -399,7 +400,7 @@ fn a_label_keeps_its_margin_beside_a_nearer_part() {
         let mut rng = Rng::with_seed(seed);
         let (mut list, mut own) = (Contacts::<16>::new(), Contacts::<16>::new());
         let border: Vec<Vec3> = rows.iter().copied().filter(|at| at.x.abs() < 12.0).collect();
-        for _ in 0..if cfg!(debug_assertions) { 150 } else { 2_000 } {
+        for _ in 0..if cfg!(debug_assertions) { 150 } else { sample(2_000) } {
             let at = border[rng.usize(..border.len())] + unit(&mut rng) * 9.0 * rng.f32();
             let tool = Sphere::new(at, RADIUS).expect("valid");
             let options = Options::new().contacts_of(ARTERY);
@@ -445,7 +446,7 @@ fn the_bound_of_a_list_leaves_room_for_a_ridge() {
     let (mut all, mut few) = (Contacts::<128, 4096>::new(), Contacts::<128, 8>::new());
     let mut rng = Rng::with_seed(3);
     let (mut bounded, mut closest_call) = (0, f32::INFINITY);
-    for _ in 0..if cfg!(debug_assertions) { 400 } else { 5_000 } {
+    for _ in 0..if cfg!(debug_assertions) { 400 } else { sample(5_000) } {
         let at = rows[rng.usize(..rows.len())] * (1.0 + 0.2 * rng.f32());
         let tool = Capsule::new(at, at + unit(&mut rng) * 20.0, 1.0).expect("valid");
         let margin = 20.0;
