@@ -218,19 +218,19 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let corrupt = QueryError::Corrupt { row: u32::from(at) };
         let threshold = self.threshold();
         let opened = self.front.node(at).ok_or(corrupt)?;
+        if self.is_priced && self.search.meter.nodes(VISIT).is_none() {
+            return Ok(Expansion::OutOfBudget);
+        }
         let (step, count) = match Link::decode(opened.link) {
             // A free slot becomes due after `FAR` units of motion; it is rescheduled.
             _ if opened.link == UNUSED => (Expansion::Done, 0),
             Link::Children { first, count } => {
                 let due = opened.due(count, threshold);
-                if self.is_priced && self.search.meter.nodes(VISIT).is_none() {
-                    return Ok(Expansion::OutOfBudget);
-                }
                 (self.test_children(at, first, due)?, count)
             }
             Link::Leaf { first, count } => {
                 let due = opened.due(count, threshold);
-                let price = VISIT + TRIANGLE * due.count_ones();
+                let price = TRIANGLE * due.count_ones();
                 if self.is_priced && self.search.meter.nodes(price).is_none() {
                     return Ok(Expansion::OutOfBudget);
                 }
