@@ -211,7 +211,10 @@ fn recovery_takes_its_frames_in_a_row_and_from_safe_an_acknowledgement() {
                 machine.acknowledge().unwrap();
                 let verdict = machine.step(&seen(now + 1, 500, 0));
                 assert_eq!((verdict.state, verdict.cause), (State::Nominal, None));
-                assert!(machine.acknowledge().is_err(), "there is nothing to acknowledge");
+                let refused = machine.acknowledge().unwrap_err();
+                let words = "the state is not safe: there is nothing to acknowledge";
+                assert_eq!(refused.state, State::Nominal);
+                assert_eq!(std::format!("{refused}"), words);
             }
         }
     }
