@@ -256,6 +256,21 @@ fn what_is_not_finite_is_not_used() {
     assert!(matches!(wall().force(&Ok(long), Vec3::ZERO).state, ConstraintState::Safe(_)));
 }
 
+/// A contact that is not finite is not left out of a list: the tool is held.
+#[test]
+fn a_contact_that_is_not_finite_gives_the_hold() {
+    let proxy = Proxy::new(SPRING, 3.0).unwrap();
+    let good = contact(1.0);
+    let askew = Contact { normal: Vec3::new(1.0, f32::NAN, 0.0), ..good };
+    for bad in [contact(f32::NAN), contact(f32::NEG_INFINITY), askew] {
+        for contacts in [[bad, good], [good, bad]] {
+            let held = proxy.wrench(Ok(contacts.iter()), 0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+            let safe = ConstraintState::Safe(Unavailable::NotFinite);
+            assert_eq!(held, Wrench { state: safe, ..Wrench::NONE }, "{contacts:?}");
+        }
+    }
+}
+
 #[test]
 fn gains_out_of_range_are_named() {
     let named = |spring| {
