@@ -195,6 +195,15 @@ mod tests {
         assert!(!nearest(&[none].into_iter(), &[0.0; 6]).is_inside);
     }
 
+    /// So far away that f32 is coarser than the tolerance, no point is inside, and the steps end.
+    #[test]
+    fn a_point_too_far_away_is_not_reached() {
+        let row = HalfSpace { factors: [0.6, 0.8, 0.0, 0.0, 0.0, 0.0], least: 1.0 };
+        let from = |x: f32, y: f32| nearest(&[row].into_iter(), &[x, y, 0.0, 0.0, 0.0, 0.0]);
+        assert!(from(-1e6, -3e5).is_inside);
+        assert!(!from(-1e9, -3e8).is_inside);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
 

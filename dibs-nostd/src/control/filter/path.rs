@@ -65,6 +65,24 @@ mod tests {
         assert!(least(f32::NAN, 3.0, 0.2, 0.0).is_nan() && least(3.0, f32::NAN, 0.2, 0.0).is_nan());
     }
 
+    /// Where two balls barely overlap, the square of the distance in between is so small that rounding may leave nothing
+    /// of it, or some more: the root is known to a thousandth of a millimetre.
+    #[test]
+    fn balls_that_barely_overlap_leave_a_narrow_neck() {
+        let sizes = || (1..40_u8).map(|sevenths| f32::from(sevenths) / 7.0);
+        for (start, end) in sizes().flat_map(|start| sizes().map(move |end| (start, end))) {
+            let mut moved = start + end;
+            for _ in 0..5 {
+                moved = moved.next_down();
+                let (a, b, length) = (f64::from(start), f64::from(end), f64::from(moved));
+                let beyond = (b - (length - a)) * (b + (length - a)) / (2.0 * length);
+                let neck = (beyond * (2.0 * a - beyond)).sqrt();
+                let bound = f64::from(least(start, end, moved, 0.0));
+                assert!(bound > -1e-3 && bound < neck + 1e-3, "{start} {end} {moved}: {bound}");
+            }
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
