@@ -259,6 +259,38 @@ fn rows_of_the_caller_hold() {
     assert!(moved > 100 && walls > 20, "{moved} {walls}");
 }
 
+/// Rows that no motion keeps leave the tool where it is: two that exclude each other, and one far beyond any motion.
+#[test]
+fn rows_that_no_motion_keeps_leave_the_tool_at_rest() {
+    let mut bench = Bench::new(&ball(2), 1.0);
+    let tool = capsule(Vec3::Z * 45.0, Vec3::Z * 80.0);
+    let apart = [Vec3::X, Vec3::NEG_X].map(|along| MotionRow::along(along, 0.05));
+    let far = MotionRow { linear: [0.0; 3], angular: [0.0, 0.0, 1.0], least: 1e20 };
+    for own in [apart.to_vec(), vec![far]] {
+        bench.own = own;
+        let admitted = bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer");
+        assert_eq!(admitted.reason, Reason::Stopped, "{admitted:?}");
+        let Motion { translation, rotation, .. } = admitted.motion;
+        assert_eq!((translation, rotation), (Vec3::ZERO, Vec3::ZERO));
+    }
+}
+
+/// Without a command a tool leaves a surface that approaches; with one it keeps the command besides.
+#[test]
+fn a_tool_without_a_command_retreats_from_an_approaching_surface() {
+    let mut bench = Bench::new(&sheet(20, 60.0, |_, _| 0.0), 1.0);
+    // 0.1 mm in a period, half of which is left.
+    bench.uncertainty = Uncertainty::new(100.0);
+    let tip = Vec3::new(0.3, 0.2, 2.05);
+    let tool = capsule(tip, tip + Vec3::Z * 40.0);
+    for (step, reason) in [(Vec3::ZERO, Reason::Retreating), (Vec3::X * 0.1, Reason::Nearest)] {
+        let admitted = bench.ask(&tool, &Motion::new(tip, step, Vec3::ZERO)).expect("an answer");
+        assert_eq!(admitted.reason, reason, "{admitted:?}");
+        let off = admitted.motion.translation - step - Vec3::Z * 0.05;
+        assert!(off.length() < 5e-3, "{admitted:?}");
+    }
+}
+
 /// Sixteen rows are kept. Beside eight of the caller and those of eight pairs the wall that a motion meets at its end
 /// replaces another, so that the motion is led along it.
 #[test]
@@ -304,6 +336,29 @@ fn nothing_unverified_is_admitted() {
         admitted += usize::from(is_admitted);
     }
     assert!((1..5).contains(&admitted), "{admitted}");
+}
+
+/// Searches count against the budget at the cost that the filter was given: by default that of a tick. One that costs
+/// more than the budget is not made.
+#[test]
+fn a_search_costs_what_the_filter_was_told() {
+    let mut bench = Bench::new(&ball(3), 1.0);
+    let tool = capsule(Vec3::Z * 50.0, Vec3::Z * 90.0);
+    let ample = bench.filter.budget(2_000_000);
+    let mut asked = |filter: Filter| {
+        bench.filter = filter;
+        bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer")
+    };
+    let by_default = asked(ample);
+    assert_eq!(asked(ample.cost(Cost::M7_TICK)), by_default);
+    let Cost { base, node_test, triangle_test } = Cost::M7_TICK;
+    let (base, node_test, triangle_test) = (3 * base, 3 * node_test, 3 * triangle_test);
+    let dear = ample.cost(Cost { base, node_test, triangle_test });
+    let dearer = asked(dear);
+    assert_eq!((dearer.reason, dearer.queries), (by_default.reason, by_default.queries));
+    assert_eq!(dearer.instructions, 3 * by_default.instructions);
+    let none = asked(dear.budget(base - 1));
+    assert_eq!((none.reason, none.queries, none.instructions), (Reason::NoSafeMotion, 0, 0));
 }
 
 /// A budget for little more than the queries' base costs leaves no pair out: each has the last tick's interval, less the
