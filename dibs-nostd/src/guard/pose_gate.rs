@@ -178,3 +178,67 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
         self.rows.position_error()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+    use crate::guard::Shared;
+
+    /// Admits rows without work, up to this distance (mm).
+    struct AtOnce(f32);
+
+    impl Gate for AtOnce {
+        fn begin(&mut self, _: FrameExtent) {}
+
+        fn advance<V: VertexTable + ?Sized>(
+            &mut self,
+            _: IncomingSurface<'_, V>,
+            _: u32,
+        ) -> Result<Admission, StretchError> {
+            Ok(Admission::Admitted(None))
+        }
+
+        fn farthest(&self, _: Millis) -> f32 {
+            self.0
+        }
+    }
+
+    /// The verdict on a frame that turns by a tenth of a radian, row by row, and the number of slices.
+    fn turned(rows: &[Vec3], limit: f32) -> (Result<Admission, StretchError>, usize) {
+        let poses = Poses::NEW;
+        let mut gate = PoseGate::new(AtOnce(limit), &poses, Vec3::ZERO, 1.0);
+        let count = rows.len() as u32;
+        gate.begin(FrameExtent::Whole);
+        let first = gate.advance(IncomingSurface::new(rows, count), 1);
+        assert_eq!(first, Ok(Admission::Admitted(None)));
+        gate.published();
+        gate.begin(FrameExtent::Whole);
+        gate.place(RigidPose::new(Quat::from_rotation_z(0.1), Vec3::ZERO).expect("a rotation"));
+        let compared = Some(Compared { largest: 0.0, rows: [0, 0], t: f32::NAN });
+        let before = Some((rows, Millis(30)));
+        let mut verdicts = (1..=rows.len()).map(|slices| {
+            let next = IncomingSurface { before, compared, ..IncomingSurface::new(rows, count) };
+            (gate.advance(next, 1), slices)
+        });
+        verdicts.find(|(verdict, _)| *verdict != Ok(Admission::Pending)).expect("all is examined")
+    }
+
+    /// A turn moves the farthest row most, so a frame waits until all rows are examined.
+    #[test]
+    fn a_turn_is_judged_by_the_farthest_row() {
+        let rows = [Vec3::X, Vec3::X * 2.0, Vec3::X * 50.0, Vec3::Y];
+        let (verdict, slices) = turned(&rows, 4.0);
+        assert!(matches!(verdict, Err(StretchError::TooFast { vertex: 2, .. })), "{verdict:?}");
+        assert_eq!(slices, rows.len());
+        assert_eq!(turned(&rows, 6.0), (Ok(Admission::Admitted(None)), rows.len()));
+    }
+
+    /// No later row hides one that is not a number.
+    #[test]
+    fn a_row_that_is_not_a_number_is_too_fast() {
+        let (verdict, _) = turned(&[Vec3::X, Vec3::NAN, Vec3::Y * 2.0, Vec3::X], 4.0);
+        assert!(matches!(verdict, Err(StretchError::TooFast { vertex: 1, .. })), "{verdict:?}");
+    }
+}
