@@ -283,6 +283,46 @@ mod tests {
         assert!(outcomes.iter().all(|&count| count > 20), "{outcomes:?}");
     }
 
+    /// A table without a position for one of its nodes.
+    struct Gap<'f>(&'f [Vec3], u32);
+
+    impl VertexTable for Gap<'_> {
+        fn len(&self) -> usize {
+            self.0.len()
+        }
+
+        fn position(&self, vertex: u32) -> Option<Vec3> {
+            if vertex == self.1 { None } else { self.0.position(vertex) }
+        }
+    }
+
+    /// A node without a position is named, and a last element that does not exist is no start.
+    #[test]
+    fn what_is_not_there_is_not_measured() {
+        let mut frames = 0;
+        around_rest(64, |nodes, frame, _| {
+            frames += 1;
+            // The first is at rest.
+            if frames > 1 {
+                return;
+            }
+            let whole = nodes.measure(frame);
+            let last = whole.expect("at rest");
+            let [start, ..] = nodes.element(last.triangle().0).expect("an element");
+            for gap in [start, 0, nodes.count() - 1] {
+                let missing = Err(StretchError::Corrupt { row: gap });
+                assert_eq!(nodes.measure(&Gap(frame, gap)), missing);
+                assert_eq!(nodes.measure_after(&Gap(frame, gap), &last), missing);
+            }
+            let none = [u8::MAX; REGIONS];
+            for row in [nodes.element_count(), u32::MAX >> 1] {
+                let other = MeasuredStretch::new(1.5, nodes.motion.tree, row, None, none);
+                assert_eq!(nodes.element(other.triangle().0), None);
+                assert_eq!(nodes.measure_after(frame, &other), whole);
+            }
+        });
+    }
+
     /// Wherever a measurement starts, it gives the same stretch to its rounding, and the same refusals.
     #[test]
     fn a_start_from_the_last_frame_changes_a_measurement_by_its_rounding() {
