@@ -8,10 +8,10 @@ use dibs_nostd::failsafe::{LimitError, Limits, State, Watch};
 use dibs_nostd::filter::{Filter, FilterError, Motion, Reason};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
-use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, enframe};
+use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, Freshness, enframe};
 use dibs_nostd::{
-    Advance, Capsule, Error, Millis, Options, Query, QueryError, SurfaceLimits, Tree, TreeBytes,
-    Unavailable,
+    Advance, Budget, Capsule, Cost, Error, Millis, Options, Proximity, Query, QueryError,
+    SurfaceLimits, Tree, TreeBytes, Unavailable, VertexTable,
 };
 use dibs_tests::bus::collect;
 
@@ -230,6 +230,51 @@ fn a_start_names_what_is_wrong() {
     let twice = || once.start::<u16, 64, 96>(TreeBytes::new(built.blob()), limits).err();
     assert_eq!(twice(), None);
     assert!(matches!(twice(), Some(Error::Split(_))));
+}
+
+/// A tick's work is limited in instructions, by the cost of a tick on its tree, or in tests; the last limit counts.
+#[test]
+fn a_tick_ends_within_its_instructions() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().build(&heart).expect("a valid mesh");
+    let cost = Cost::of_tick(&built.tree::<u16>().expect("16-bit indices"));
+    let limits = GuardLimits::new(20.0, Millis(100)).automatic();
+    let asked = |limits: GuardLimits| {
+        let mut world = World::new(&built, &heart.positions, limits);
+        world.frame();
+        world.tick(Vec3::new(75.0, 0.0, 20.0)).tracked.expect("an answer").closest
+    };
+    let instructions = cost.base + 15 * cost.node_test;
+    let budget = Budget::for_instructions(instructions, &cost);
+    assert!((1..15).contains(&budget.tests()), "{budget:?}");
+    let (whole, cut) = (asked(limits), asked(limits.instructions(instructions)));
+    assert!(cut.node_tests < whole.node_tests && cut.lower < whole.lower, "{cut:?} {whole:?}");
+    let same = |one: Proximity, other: Proximity| format!("{one:?}") == format!("{other:?}");
+    assert!(same(cut, asked(limits.budget(budget))));
+    assert!(same(whole, asked(limits.instructions(instructions).budget(Budget::UNLIMITED))));
+    assert!(same(whole, asked(limits.budget(budget).instructions(u32::MAX))));
+}
+
+/// Bytes of a line that are no packet are counted, and the frames after them are published.
+#[test]
+fn bytes_that_are_no_packet_are_counted() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().build(&heart).expect("a valid mesh");
+    let mut world = World::new(&built, &heart.positions, GuardLimits::new(20.0, Millis(100)));
+    world.is_serial = true;
+    let (bus, now) = (&mut world.ends.0, Millis(world.now));
+    // It ends before the nine bytes that it announces.
+    bus.receive(&[10, 7, 7, 0], now);
+    assert_eq!(bus.counters().of(Event::Framing), 1);
+    // Longer than any packet: blocks of 254 bytes.
+    let mut long = [&[255_u8][..], &[7; 254]].concat().repeat(5);
+    long.push(0);
+    bus.receive(&long, now);
+    assert_eq!(bus.counters().of(Event::Framing), 2);
+    world.frame();
+    let bus = &world.ends.0;
+    assert_eq!(bus.counters().of(Event::Framing), 2);
+    assert_eq!(bus.surface().and_then(|frame| frame.epoch()), Some(world.now));
 }
 
 /// Only a command and a stand-off are given: speed, age and transit time of the tissue are the guard's.
