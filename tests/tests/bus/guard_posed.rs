@@ -143,6 +143,37 @@ impl Case {
     }
 }
 
+/// Frames that never had a pose give the answers of rows alone, to the bit: on frames, between them, and held.
+#[test]
+fn without_poses_the_answers_are_those_of_rows_alone() {
+    let heart = Heart::new(Vec3::new(20.0, 30.0, -10.0));
+    let tree = TreeBytes::<u16>::new(heart.built.blob());
+    let (surface, rows_alone): (Surface<ROWS, Posed>, Surface<ROWS>) =
+        (Surface::new(), Surface::new());
+    let (mut bus, mut guard): (TheBus<'_, '_>, TheGuard<'_, '_>) =
+        surface.start(tree, limits()).expect("valid");
+    let (mut other_bus, mut other_guard) =
+        rows_alone.start::<_, 64, 96>(tree, limits()).expect("valid");
+    let mut extrapolated = 0;
+    for now in 1_000..1_400_u32 {
+        if now % PERIOD == 0 && now < 1_300 {
+            let (rows, at) = (heart.grown(1e-4 * (now - 1_000) as f32), Millis(now));
+            bus.frame(&rows, at, at).expect("a good frame");
+            other_bus.frame(&rows, at, at).expect("a good frame");
+            work(&mut bus).expect("admitted");
+            while other_bus.work(50).expect("admitted") == Advance::Pending {}
+        }
+        let tip = heart.centre + Vec3::new(110.0, 9.0, 5.0);
+        let tool = Capsule::new(tip, tip + Vec3::X * 40.0, 2.0).expect("valid");
+        let answer = guard.closest(&tool, Millis(now));
+        let alone = other_guard.closest(&tool, Millis(now));
+        assert_eq!(format!("{answer:?}"), format!("{alone:?}"), "{now}");
+        let searched = answer.searched.filter(|searched| searched.t > 1.0);
+        extrapolated += u32::from(searched.is_some());
+    }
+    assert!(extrapolated > 200, "{extrapolated}");
+}
+
 /// Cold ticks on frames and between them: no error exceeds the accuracy, even after hill climbing towards large errors.
 #[test]
 fn answers_are_those_of_the_moved_mesh() {
