@@ -4,7 +4,7 @@
 
 use dibs_build::Builder;
 use dibs_build::modes::ModalFit;
-use dibs_nostd::guard::{GuardLimits, Surface};
+use dibs_nostd::guard::{GuardLimits, Posed, Surface};
 use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
@@ -15,7 +15,7 @@ use dibs_tests::bus::reseal;
 use dibs_tests::modal::{anywhere, positions, small};
 use dibs_tests::motions::trembling;
 use fastrand::Rng;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
 /// A receiver of weights, and the modes of its tree.
 struct Bus {
@@ -288,4 +288,44 @@ fn a_guard_takes_weights_by_a_call() {
     let others = Modes::of(&other).expect("has modes");
     let refused = bus.frame_of_weights(&others, &good[..3], now, now);
     assert_eq!(refused, Err(ReceiveError::WrongMesh { mesh_id: others.mesh_id() }));
+}
+
+/// Weights with a pose are the surface of those without, placed; a pose that is none is refused and counted.
+#[test]
+fn a_guard_takes_weights_with_a_pose() {
+    let (built, _) = small(4);
+    let tree = built.tree::<u16>().expect("valid");
+    let modes = Modes::of(&tree).expect("has modes");
+    let (plain, posed): (Surface<162>, Surface<162, Posed>) = (Surface::new(), Surface::new());
+    let limits = GuardLimits::new(1e5, Millis(1_000)).automatic();
+    let bytes = TreeBytes::<u16>::new(built.blob());
+    let (mut bus, mut guard) = plain.start::<_, 64, 96>(bytes, limits).expect("valid");
+    let (mut posed_bus, mut posed_guard) = posed.start::<_, 64, 96>(bytes, limits).expect("valid");
+    // Half a turn, which f32 holds exactly.
+    let (turn, shift) = (Quat::from_xyzw(0.0, 0.0, 1.0, 0.0), Vec3::new(200.0, 0.0, 30.0));
+    let placed = |at: Vec3| Vec3::new(-at.x, -at.y, at.z) + shift;
+    let at = Vec3::new(9.0, 4.0, 120.0);
+    let tool = Sphere::new(at, 3.0).expect("a tool");
+    let posed_tool = Sphere::new(placed(at), 3.0).expect("a tool");
+    let recorded = &built.modal_motion().expect("has modes").weights;
+    for (number, weights) in (0..).zip(recorded) {
+        let now = Millis(30 * number);
+        bus.frame_of_weights(&modes, weights, now, now).expect("recorded");
+        let taken = posed_bus.frame_of_weights_at(&modes, weights, (turn, shift), now, now);
+        assert!(taken.is_ok(), "frame {number}: {taken:?}");
+        assert!(matches!(bus.work(u32::MAX), Ok(Advance::Published { .. })), "frame {number}");
+        let published = posed_bus.work(u32::MAX);
+        assert!(matches!(published, Ok(Advance::Published { .. })), "frame {number}");
+        let found = guard.closest(&tool, now).tracked.expect("an answer").closest;
+        let there = posed_guard.closest(&posed_tool, now).tracked.expect("an answer").closest;
+        assert!((found.separation - there.separation).abs() < 1e-3, "frame {number}");
+        let away = there.point_on_surface.distance(posed_tool.centre()) - 3.0;
+        assert!((found.separation - away).abs() < 1e-3, "frame {number}: {there:?}");
+        assert!(there.accuracy > modes.position_error(), "frame {number}: {there:?}");
+    }
+    let (now, none) = (Millis(10_000), (Quat::from_xyzw(0.0, 0.0, 0.0, 0.5), shift));
+    let refused = posed_bus.frame_of_weights_at(&modes, &recorded[0], none, now, now);
+    let Err(refusal @ ReceiveError::Pose(_)) = refused else { panic!("{refused:?}") };
+    assert_eq!(posed_bus.counters().of(refusal.event()), 1);
+    assert_eq!(posed_bus.work(u32::MAX), Ok(Advance::Idle));
 }

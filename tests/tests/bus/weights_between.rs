@@ -186,6 +186,17 @@ fn the_surface_between_frames_of_weights_is_where_they_put_it() {
                 assert!(apart <= found.closest.accuracy + whole.accuracy, "{epoch}: {found:?}");
                 kept += u32::from(found.fallback.is_none());
             }
+            // Behind the present by its age; between frames by a whole interval; beyond the last frame not at all, up
+            // to two intervals.
+            let age = now.wrapping_sub(*received);
+            let interval = match known.as_slice() {
+                [.., (earlier, _), _] => received.wrapping_sub(*earlier),
+                _ => 0,
+            };
+            let is_ahead = surfaces[2].residual().is_some();
+            let beyond = if is_ahead { age.saturating_sub(2 * interval) } else { age };
+            let behind = [age, age.max(interval), beyond].map(|lag| Some(Millis(lag)));
+            assert_eq!(surfaces.map(|surface| surface.lag()), behind, "{epoch}");
             if let Some(shown) = surfaces[2].residual() {
                 let exact = errors[0].max(errors[1]);
                 let shown = f64::from(shown);
