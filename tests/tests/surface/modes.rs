@@ -169,7 +169,7 @@ fn weights_that_make_no_surface_are_refused() {
             assert_eq!(with(weight), [Err(WeightsError::NotFinite { mode }); 2]);
         }
     }
-    assert_eq!(modes.range(4), None);
+    assert_eq!((modes.range(4), modes.step(4), modes.displacement(4, 0)), (None, None, None));
 }
 
 /// The admitted range of a weight is its recorded range with the stated margin.

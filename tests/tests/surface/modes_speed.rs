@@ -117,7 +117,10 @@ fn the_limit_on_the_speed_of_modes_is_exact() {
         for (share, may_pass) in [(0.999, false), (1.001, true), (9.0, true)] {
             let limits = SurfaceLimits::reach_mm(1e4).speed(step * share / 5.0);
             let exact = monitor.clone().limits(limits);
+            let farthest = exact.farthest(Millis(4));
             let mut gate = ModalGate::<_, MODES>::new(&modes, exact).expect("four modes");
+            // A gate around it would ask it for the limit.
+            assert!(farthest < f32::INFINITY && gate.farthest(Millis(4)) == farthest);
             gate.begin(FrameExtent::Whole);
             let before = Some((&before[..], Millis(4)));
             let verdict = gate
