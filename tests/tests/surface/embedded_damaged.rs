@@ -5,7 +5,7 @@
 use dibs_build::{BuildError, Builder, BuiltTree, Mesh, Volume, VolumeError, generate};
 use dibs_nostd::nodes::{Nodes, NodesError};
 use dibs_nostd::{FormatError, PathKind, StretchError, Tree, measure_stretch};
-use dibs_tests::tree_bytes::{reseal, section};
+use dibs_tests::tree_bytes::{reseal, row_of_section, section, with_words};
 use glam::DVec3;
 
 fn heart() -> (Mesh, Volume) {
@@ -67,6 +67,18 @@ fn damaged_nodes_are_refused() {
         let error = defect(&built, |bytes| put(bytes, at, &f32::NAN.to_le_bytes()));
         assert_eq!(error, Some(NodesError::Element { element: 7 }), "{number}");
     }
+    // The squares of its first and last edge.
+    for (at, wrong) in [(8, 0.0_f32), (8, -1.0), (28, 0.0), (28, -1.0)] {
+        let at = elements + 36 * 7 + at;
+        let error = defect(&built, |bytes| put(bytes, at, &wrong.to_le_bytes()));
+        assert_eq!(error, Some(NodesError::Element { element: 7 }), "{wrong}");
+    }
+    // The first and the last exchanged: the second has an earlier latest node than the one before it.
+    let error = defect(&built, |bytes| {
+        let (first, last) = (elements, elements + 36 * 71);
+        (0..36).for_each(|at| bytes.swap(first + at, last + at));
+    });
+    assert_eq!(error, Some(NodesError::Element { element: 1 }));
     // Two of its nodes exchanged.
     let error = defect(&built, |bytes| {
         let at = elements + 36 * 7;
@@ -89,6 +101,11 @@ fn damaged_nodes_are_refused() {
         put(bytes, at, &[0x80]);
     });
     assert_eq!(error, Some(NodesError::Marked { node: 63, nodes }));
+    // A section shorter than its header.
+    let bytes = built.blob();
+    let short = with_words(bytes, &[(row_of_section(bytes, 11) + 8, 31)]);
+    let tree = Tree::<u16>::from_bytes(&short).expect("the tree itself is well formed");
+    assert_eq!(Nodes::of(&tree).err(), Some(NodesError::Length { expected: 32, found: 31 }));
 }
 
 /// Trees whose radii are lengths of paths through a volume must have nodes, and other trees must not; trees with nodes

@@ -3,6 +3,7 @@
 // Requirement: F-04
 
 use dibs_build::{Builder, generate};
+use dibs_nostd::modes::Memo;
 use dibs_nostd::{MovingSurface, Odometer, QuantisedVertices, Tree, VertexTable};
 use glam::Vec3;
 
@@ -25,6 +26,11 @@ fn every_table_ends_after_its_last_row() {
     let table = QuantisedVertices::new(&quantised, Vec3::ZERO, Vec3::ONE);
     assert_eq!(says(&table), expected);
     assert_eq!(says(&&table), expected);
+    assert_eq!(says(&Memo::<_, 2>::new(&rows)), expected);
+    assert_eq!(says(&Memo::<_, 0>::new(&rows)), expected);
+    // An empty slot has the number that is asked for here.
+    let none: [Vec3; 0] = [];
+    assert_eq!(says(&Memo::<_, 2>::new(&none)), (0, true, None, None));
 }
 
 /// A surface that is borrowed has the surface's motion, from frame to frame another.
