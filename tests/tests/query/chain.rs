@@ -11,6 +11,7 @@ use dibs_nostd::{
     Sphere, Tool, TriangleRow, Unavailable,
 };
 use dibs_tests::deform::{deformed, unit};
+use dibs_tests::surfaces::{Inexact, ball};
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -433,6 +434,104 @@ fn contacts_of_a_scene_refuse_what_those_of_a_pair_do() {
     let refused = Query::contacts_in_scene(&mut scene, &tools, 5.0, &Options::new(), &mut contacts);
     assert!(matches!(refused, Err(QueryError::VertexCount { .. })), "{refused:?}");
     assert!(contacts.is_empty() && contacts.within(0.0).is_err());
+}
+
+/// Contacts of a later pair replace farther ones of an earlier pair.
+#[test]
+fn a_full_list_of_a_scene_keeps_the_deepest() {
+    const MARGIN: f32 = 20.0;
+    let (built, organs) = organs(120.0);
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let mut rng = Rng::with_seed(9);
+    let mut queries = vec![Query::<u16, MAX_STACK>::new(&tree).expect("deep enough"); organs.len()];
+    let surfaces: Vec<&[Vec3]> = organs.iter().map(Vec::as_slice).collect();
+    let (mut whole, mut few) = (Contacts::<256, 4096>::new(), Contacts::<3, 4096>::new());
+    let mut full = 0;
+    for _ in 0..if cfg!(debug_assertions) { 20 } else { 200 } {
+        let near = organs[rng.usize(..organs.len())][rng.usize(..tree.vertex_count() as usize)];
+        let instrument = instrument(near + 20.0 * unit(&mut rng), unit(&mut rng), 25.0);
+        let options = Options::cold();
+        let mut scene: Vec<_> = queries.iter_mut().zip(surfaces.iter().copied()).collect();
+        Query::contacts_in_scene(&mut scene, &instrument, MARGIN, &options, &mut whole)
+            .expect("an answer");
+        Query::contacts_in_scene(&mut scene, &instrument, MARGIN, &options, &mut few)
+            .expect("an answer");
+        let all: Vec<f32> = whole.iter().map(|contact| contact.separation).collect();
+        let kept: Vec<f32> = few.iter().map(|contact| contact.separation).collect();
+        assert_eq!(kept.as_slice(), &all[..all.len().min(3)], "{all:?}");
+        // The nearest one that is left out is the bound.
+        let next = all.get(3).copied().unwrap_or(f32::INFINITY);
+        assert_eq!((few.bound(), few.is_full()), (whole.bound().min(next), all.len() > 3));
+        full += usize::from(few.is_full());
+    }
+    println!("{full} lists are full");
+    assert!(full > 5, "{full}");
+}
+
+/// A chain of more tools than may be passed over: those beyond are searched without a limit.
+#[test]
+fn a_tool_inside_is_found_anywhere_in_a_long_chain() {
+    let mesh = ball(3);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let sphere = |x: f32| Sphere::new(Vec3::X * x, 1.0).expect("finite");
+    for inside in [1, 63, 64, 69] {
+        let tools: [Sphere; 70] = std::array::from_fn(|number| match number {
+            0 => sphere(42.0),
+            _ if number == inside => sphere(5.0),
+            _ => sphere(100.0 + number as f32),
+        });
+        let alone = query.closest(rows.as_slice(), &tools[inside], &Options::cold());
+        let alone = alone.expect("an answer");
+        let found = query.closest_of(rows.as_slice(), &tools, &Options::cold());
+        let found = found.expect("an answer").expect("one");
+        assert_eq!((found.tool, found.proximity.side), (inside, Side::Inside));
+        let off = (found.proximity.separation - alone.separation).abs();
+        assert!(off <= 2.0 * found.proximity.accuracy, "{inside}: {found:?} {alone:?}");
+    }
+}
+
+/// Without adjacency no tool has a side, and the chain is searched as if none were asked for.
+#[test]
+fn a_chain_at_a_surface_without_sides_takes_the_tests_of_an_unsigned_one() {
+    let mesh = ball(3);
+    let built = Builder::new().with_adjacency(false).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let instrument = instrument(Vec3::X * 42.0, Vec3::NEG_X, 95.0);
+    let [mut bare, unsigned] = [Options::cold(), Options::cold().unsigned()].map(|options| {
+        let found = query.closest_of(rows.as_slice(), &instrument, &options);
+        found.expect("an answer").expect("one")
+    });
+    let sides = [NoSide::NoAdjacency, NoSide::NotAsked].map(Side::Undefined);
+    assert_eq!([bare.proximity.side, unsigned.proximity.side], sides);
+    assert_eq!(bare.tool, 3);
+    bare.proximity.side = unsigned.proximity.side;
+    assert_eq!(bare, unsigned);
+}
+
+/// A tool outside that is nearer to the surface than the error of its positions proves no other tool outside.
+#[test]
+fn a_link_beside_an_inexact_surface_does_not_hide_one_inside() {
+    let mesh = ball(4);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let [a, b, c] = mesh.triangles[7].map(|vertex| mesh.positions[vertex as usize]);
+    let (middle, outward) = ((a + b + c) / 3.0, (b - a).cross(c - a).normalize());
+    let sphere = |height: f32| Sphere::new(middle + outward * height, 0.25).expect("finite");
+    let tools = [sphere(0.5), sphere(-1.5)];
+    for error in [0.0, 3.0] {
+        let table = Inexact(&rows, error);
+        let found = query.closest_of(&table, &tools, &Options::cold());
+        let found = found.expect("an answer").expect("one");
+        assert_eq!((found.tool, found.proximity.side), (1, Side::Inside), "{error}: {found:?}");
+        assert!((found.proximity.separation + 1.75).abs() < 1e-3, "{error}: {found:?}");
+    }
 }
 
 /// Four capsules behind a tip, with this total length (mm).
