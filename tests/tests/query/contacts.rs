@@ -6,6 +6,8 @@
 
 mod valleys;
 
+use std::sync::Mutex;
+
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::format::MAX_STACK;
@@ -247,6 +249,14 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
     query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut near).expect("an answer");
     assert!(near.bound() < MARGIN);
     holds(&near.iter().map(|c| c.separation).collect::<Vec<_>>(), near.bound());
+    // With room for a single triangle no wall is known completely, but the closest pair is in the list.
+    let mut one = Contacts::<64, 1>::new();
+    let closest = query.contacts(rows.as_slice(), &tool, MARGIN, &Options::cold(), &mut one);
+    let closest = closest.expect("an answer");
+    let deepest = one.iter().next().expect("the closest pair").separation;
+    assert!((deepest - closest.lower).abs() <= 2.0 * closest.accuracy, "{deepest} {closest:?}");
+    assert!(one.bound() < MARGIN, "{}", one.bound());
+    holds(&one.iter().map(|c| c.separation).collect::<Vec<_>>(), one.bound());
     let mut cut_short = 0;
     for node_tests in (0..4_000).step_by(23).chain(0..200) {
         let options = Options::cold().budget(Budget::new(node_tests));
@@ -259,6 +269,17 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
         holds(&near.iter().map(|c| c.separation).collect::<Vec<_>>(), near.bound());
     }
     assert!(cut_short > 20, "{cut_short}");
+    // Without a side the closest pair may be open, but up to the bound it is known that nothing is missing.
+    let mut open = 0;
+    for node_tests in 0..200 {
+        let options = Options::cold().unsigned().budget(Budget::new(node_tests));
+        query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut near).expect("an answer");
+        if near.within(MARGIN).is_err() && near.bound().is_finite() {
+            assert!(near.within(near.bound()).is_ok_and(|list| list.is_complete()), "{near:?}");
+            open += 1;
+        }
+    }
+    assert!(open > 20, "{open}");
 }
 
 /// A contact at a vertex is found once its neighbours are seen, which a budget may prevent.
@@ -334,6 +355,36 @@ fn no_budget_turns_the_force_inwards() {
     assert!(held > 50 && pushed > 50, "{held} {pushed}");
 }
 
+/// The flood around a contact reads triangles that no search has seen.
+#[test]
+fn a_vertex_beyond_a_contacts_triangle_that_is_not_finite_is_named() {
+    // A long triangle whose tip is under the tool, and a small one at its far end.
+    let corners = [[0.0, -1.0, 0.0], [50.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-4.0, -4.0, 0.0]];
+    let positions = corners.map(Vec3::from).to_vec();
+    let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
+    let built = Builder::new().leaf_triangles(1).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let mut rows = built.to_rows(&mesh.positions);
+    let vertex = rows.iter().position(|&row| row == mesh.positions[3]).expect("a row");
+    rows[vertex].z = f32::NAN;
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut contacts = Contacts::<4>::new();
+    let tool = Sphere::new(Vec3::new(45.0, 0.0, 3.0), 1.0).expect("valid");
+    let closest = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("it is far away");
+    assert_eq!((closest.side, closest.separation), (Side::Outside, 2.0));
+    // Within the larger margin the search itself reads it.
+    for margin in [5.0, 60.0] {
+        let refused =
+            query.contacts(rows.as_slice(), &tool, margin, &Options::cold(), &mut contacts);
+        let vertex = vertex as u32;
+        assert_eq!(refused.err(), Some(QueryError::Position { vertex }), "{margin}");
+        assert!(contacts.is_empty());
+    }
+}
+
+/// More triangles than 16 bits can count. Its memory is too large for a test's stack.
+static TOO_MANY: Mutex<Contacts<4, 65_535>> = Mutex::new(Contacts::new());
+
 #[test]
 fn what_cannot_be_asked_is_named() {
     let mesh = ball(2);
@@ -347,6 +398,9 @@ fn what_cannot_be_asked_is_named() {
     let mut none = Contacts::<4, 0>::new();
     let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut none);
     assert_eq!(refused.err(), Some(QueryError::Contacts { capacity: 4, near: 0 }));
+    let mut many = TOO_MANY.lock().expect("no other user");
+    let refused = query.contacts(rows.as_slice(), &tool, 5.0, &Options::cold(), &mut many);
+    assert_eq!(refused.err(), Some(QueryError::Contacts { capacity: 4, near: 65_535 }));
     let mut contacts = Contacts::<4>::new();
     for margin in [-1.0, f32::NAN, f32::INFINITY] {
         let refused =
