@@ -489,6 +489,8 @@ fn an_edge_of_more_than_two_triangles_takes_no_side_from_the_rest() {
     assert!(matches!(check_winding(&wall), Err(WindingError::NonManifold { triangles: 3, .. })));
     let at_edge = ask(&wall, Vec3::new(13.0, 12.0, 5.0));
     assert_eq!(at_edge.side, Side::Undefined(NoSide::NonManifold));
+    let on_edge = ask(&wall, Vec3::new(10.0, 10.0, 5.0));
+    assert_eq!(on_edge.side, Side::Undefined(NoSide::NonManifold));
     assert_eq!(ask(&wall, Vec3::new(2.0, 5.0, 5.0)).side, Side::Inside);
     assert_eq!(ask(&wall, Vec3::new(5.0, 5.0, 13.0)).side, Side::Outside);
     assert_eq!(ask(&wall, Vec3::new(12.0, 5.0, 5.0)).side, Side::Outside);

@@ -248,3 +248,29 @@ fn a_pair_whose_side_was_not_asked_for_is_not_passed_over() {
     // Inside, it is searched at every tick.
     assert_eq!(ask(&Options::new()).pair, 1);
 }
+
+/// Without adjacency there is no side that could change unseen, so a far pair is passed over. A single pair states its
+/// motion.
+#[test]
+fn a_far_pair_at_a_surface_without_sides_rests() {
+    let mesh = ball(3);
+    let built = Builder::new().with_adjacency(false).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let surface = Odometer::new(&tree).start(rows.as_slice());
+    let tools = [43.0, 90.0].map(|x| Sphere::new(Vec3::X * x, 1.0).expect("finite"));
+    let [mut near, mut far, mut alone] =
+        [(); 3].map(|()| Tracked::new(&tree).expect("deep enough"));
+    for (searched, moved) in [(2, None), (1, Some(0.0))] {
+        let mut pairs = [(&mut near, &surface, &tools[0]), (&mut far, &surface, &tools[1])];
+        let found = Tracker::closest_of(&mut pairs, &Options::new());
+        let found = found.expect("an answer").expect("two pairs");
+        assert_eq!((found.pair, found.searched, found.moved), (0, searched, None));
+        assert_eq!(found.closest.side, Side::Undefined(NoSide::NoAdjacency));
+        let mut pair = [(&mut alone, &surface, &tools[0])];
+        let single = Tracker::closest_of(&mut pair, &Options::new());
+        let single = single.expect("an answer").expect("one pair");
+        assert_eq!((single.pair, single.searched, single.moved), (0, 1, moved));
+        assert_eq!(single.closest.separation, found.closest.separation);
+    }
+}

@@ -102,8 +102,8 @@ fn missing<'c>(
 }
 
 /// Compares a tracker's contacts with a complete query's. Adds the numbers of compared, missing and invalid contacts.
-fn compare<S: MovingSurface, T: Tool, const NEAR: usize>(
-    tracker: &mut Tracked<'_>,
+fn compare<S: MovingSurface, T: Tool, const NEAR: usize, const RANGE: usize>(
+    tracker: &mut Tracker<'_, u16, MAX_STACK, 256, RANGE>,
     surface: &S,
     tool: &T,
     options: &Options,
@@ -177,25 +177,34 @@ fn contacts_survive_leaps_rests_budgets_and_other_trackers() {
     assert!(cfg!(debug_assertions) || compared > 500, "{compared}");
 }
 
-#[test]
-fn no_budget_hides_contacts_for_which_the_front_has_no_place() {
+/// Compares the contacts of ticks within many budgets, with this many places for opened nodes.
+fn compare_budgets<const RANGE: usize>(found: &mut [usize; 2]) {
     let mesh = generate::heart(2_000).expect("a valid size").mesh;
     let built = Builder::new().build(&mesh).expect("a valid mesh");
     let tree = built.tree::<u16>().expect("16-bit indices");
     let rows = built.to_rows(&mesh.positions);
-    let mut tracker = Tracked::with_range(&tree).expect("deep enough");
+    let tracker = Tracker::<u16, MAX_STACK, 256, RANGE>::with_range(&tree);
+    let mut tracker = tracker.expect("deep enough");
     let mut odometer = Odometer::new(&tree);
     let surface = odometer.start(rows.as_slice());
     let mut list = Contacts::<64, 4>::new();
-    let mut found = [0; 2];
     for row in (0..tree.vertex_count()).step_by(97) {
         let at = rows[row as usize] * 1.05;
         let tool = Sphere::new(at, 2.0).expect("a valid sphere");
         for node_tests in (0..600).step_by(3) {
             let options = Options::new().budget(Budget::new(node_tests));
-            compare(&mut tracker, &surface, &tool, &options, &mut list, &mut found);
+            compare(&mut tracker, &surface, &tool, &options, &mut list, found);
         }
     }
+}
+
+/// Nodes for which the front has no place are searched from the stack; without any place, all are.
+#[test]
+fn no_budget_hides_contacts_for_which_the_front_has_no_place() {
+    let mut found = [0; 2];
+    compare_budgets::<256>(&mut found);
+    compare_budgets::<8>(&mut found);
+    compare_budgets::<0>(&mut found);
     let [compared, wrong] = found;
     println!("{compared} contacts below the lists' bounds");
     assert_eq!(wrong, 0, "contacts missing or of nothing, of {compared}");

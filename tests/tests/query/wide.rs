@@ -6,6 +6,7 @@ use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Options, Query, Sphere, measure_stretch};
 use dibs_tests::deform::unit;
+use dibs_tests::surfaces::cuboid;
 use fastrand::Rng;
 use glam::Vec3;
 
@@ -66,6 +67,34 @@ fn any_stack_that_holds_the_tree_is_enough() {
     assert!(least != more && more != most, "spare entries of the stack are used");
     assert_eq!(tests_with::<{ NEEDED + 129 }>(&mesh, &built, &rows), most, "128 are used");
     assert_eq!(tests_with::<MAX_STACK>(&mesh, &built, &rows), most, "128 are used");
+}
+
+/// From the middle of a block all leaves are equally near, so that a batch fills the stack to its last entry.
+#[test]
+fn a_batch_may_fill_the_stack() {
+    let (positions, triangles) = cuboid(Vec3::splat(-10.0), Vec3::splat(10.0));
+    let mesh = Mesh { positions: positions.into(), triangles: triangles.into(), ..Mesh::default() };
+    let tool = Sphere::new(Vec3::ZERO, 1.0).expect("valid");
+    let mut asked = 0;
+    for leaf in 1..=6 {
+        let built = Builder::new().leaf_triangles(leaf).build(&mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("valid");
+        let rows = built.to_rows(&mesh.positions);
+        macro_rules! ask_with {
+            ($($stack:literal)*) => {$(
+                if tree.stack() == $stack {
+                    let mut query = Query::<u16, $stack>::new(&tree).expect("deep enough");
+                    let options = Options::cold().unsigned();
+                    let found = query.closest_wide(rows.as_slice(), &tool, &options);
+                    let found = found.expect("an answer");
+                    assert!((found.separation - 9.0).abs() <= found.accuracy, "{leaf}: {found:?}");
+                    asked += 1;
+                }
+            )*};
+        }
+        ask_with!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16);
+    }
+    assert_eq!(asked, 6);
 }
 
 /// Node tests of a stream on a stack of `D` entries. Its separations must agree with [`Query::closest`].
