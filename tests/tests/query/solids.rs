@@ -8,7 +8,9 @@ use std::sync::LazyLock;
 
 use dibs_build::{Builder, BuiltTree, Mesh};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Capsule, Odometer, Options, Proximity, Query, Side, Sphere, Tracker, Tree};
+use dibs_nostd::{
+    Budget, Capsule, NoSide, Odometer, Options, Proximity, Query, Side, Sphere, Tracker, Tree,
+};
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::sides;
@@ -326,4 +328,34 @@ fn the_closest_of_several_tools_is_that_of_each() {
             }
         }
     }
+}
+
+/// A tool outside of the nearer solid may be inside another one, whose search the budget ends.
+#[test]
+fn a_solid_that_a_budget_leaves_open_leaves_the_side_open() {
+    let parts = [round(Vec3::Z * 30.0, 20.0), block([-60.0, -60.0, -2.0], [60.0, 60.0, -1.0])];
+    let mesh = joined(&parts);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let tool = Sphere::new(Vec3::Z * 7.0, 0.5).expect("finite");
+    let whole = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
+    assert!((whole.separation - 2.5).abs() <= whole.accuracy, "{whole:?}");
+    assert_eq!(whole.side, Side::Outside);
+    let (mut stated, mut open) = (0, 0);
+    for tests in 0..whole.work() + 40 {
+        let options = Options::cold().budget(Budget::new(tests));
+        let found = query.closest(rows.as_slice(), &tool, &options).expect("an answer");
+        let is_nearest = found.triangle == whole.triangle;
+        if found.side == Side::Outside {
+            assert!(is_nearest && found.lower == whole.lower, "{tests}: {found:?}");
+            stated += 1;
+        } else {
+            assert_eq!(found.side, Side::Undefined(NoSide::CutShort), "{tests}");
+            open += u32::from(is_nearest);
+        }
+    }
+    println!("{stated} sides stated, {open} open although the nearest pair is known");
+    assert!(stated > 0 && open > 0, "{stated} {open}");
 }

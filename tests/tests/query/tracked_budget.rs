@@ -5,8 +5,8 @@
 use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Capsule, Contacts, Interval, NoSide, Odometer, Options, Proximity, Query, Side, Tool,
-    Tracker,
+    Budget, Capsule, Contacts, Interval, NoSide, Odometer, Options, Proximity, Query, Side, Sphere,
+    Tool, Tracker,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::surfaces::cuboid;
@@ -163,4 +163,28 @@ fn every_bound_has_its_turn_under_a_budget_that_is_always_too_small() {
     println!("{mean} tests a tick; {short} of {TICKS} cut, {widest} mm wide at most");
     assert!(short > TICKS as usize / 10, "the budget of {mean} is enough");
     assert!(widest < 20.0 * STEP, "{widest}");
+}
+
+/// A much thicker tool at the same place has an accuracy that is larger than the interval of the tick before.
+#[test]
+fn an_interval_that_is_narrower_than_the_accuracy_stays_in_order() {
+    let mesh = generate::heart(1_280).expect("a valid size").mesh;
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let surface = Odometer::new(&tree).start(rows.as_slice());
+    let mut tracker = Tracker::<u16, MAX_STACK, 256>::new(&tree).expect("deep enough");
+    let tool = |radius: f32| Sphere::new(Vec3::new(80.0, 0.0, 20.0), radius).expect("finite");
+    let mut tick = |radius: f32, budget: Budget| {
+        let options = Options::new().budget(budget);
+        tracker.closest(&surface, &tool(radius), &options).expect("an answer")
+    };
+    let thin = tick(1.0, Budget::UNLIMITED);
+    let thick = tick(500.0, Budget::new(0));
+    assert!(thick.is_kept && thick.closest.side == Side::Outside, "{thick:?}");
+    assert!(thick.closest.accuracy > 2.0 * thin.closest.accuracy, "{thin:?} {thick:?}");
+    assert!(thick.closest.lower <= thick.closest.separation, "{thick:?}");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let whole = query.closest(&surface, &tool(500.0), &Options::cold()).expect("an answer");
+    assert!(meet(thick.closest.interval(), whole.interval()), "{thick:?} {whole:?}");
 }

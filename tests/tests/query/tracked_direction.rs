@@ -167,3 +167,36 @@ fn no_direction_turns_to_and_fro_at_a_tie() {
     assert!(whole > 20 * most && tracked * 100 < whole, "{whole} {tracked}");
     assert!(kept > most && beyond > most, "{kept} {beyond}");
 }
+
+/// Where the axis meets an edge whose two triangles face away from each other, there is no normal.
+#[test]
+fn an_axis_at_an_edge_without_a_normal_keeps_the_last_direction() {
+    // Two pyramids on one base, onto which they collapse.
+    let rim = [[-8.0, -8.0], [8.0, -8.0], [8.0, 8.0], [-8.0, 8.0]];
+    let mut positions = rim.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
+    positions.extend([Vec3::Z, Vec3::NEG_Z]);
+    let edges = [[0, 1], [1, 2], [2, 3], [3, 0]].into_iter();
+    let triangles = edges.flat_map(|[a, b]| [[a, b, 4], [b, a, 5]]).collect();
+    let mesh = Mesh { positions, triangles, ..Mesh::default() };
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let thick = built.to_rows(&mesh.positions);
+    let flat: Vec<Vec3> = thick.iter().map(|at| at.with_z(0.0)).collect();
+    let tool = |x: f32| {
+        let [start, end] = [-5.0, 5.0].map(|z| Vec3::new(x, 1.0, z));
+        Capsule::new(start, end, 0.5).expect("finite")
+    };
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let whole = query.closest(flat.as_slice(), &tool(8.0), &Options::cold()).expect("an answer");
+    assert_eq!((whole.side, whole.direction), (Side::Crossing, Vec3::ZERO));
+    let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("deep enough");
+    let mut odometer = Odometer::new(&tree);
+    let surface = odometer.start(thick.as_slice());
+    let beside = tracker.closest(&surface, &tool(9.0), &Options::new()).expect("an answer");
+    assert_eq!(beside.closest.side, Side::Outside);
+    let surface = odometer.step(thick.as_slice(), flat.as_slice()).after();
+    let met = tracker.closest(&surface, &tool(8.0), &Options::new()).expect("an answer").closest;
+    assert_eq!(met.side, Side::Crossing);
+    assert!(met.direction.dot(Vec3::X) > 0.999, "{met:?}");
+    assert!(met.point_on_tool.distance(Vec3::new(7.5, 1.0, 0.0)) < 1e-3, "{met:?}");
+}

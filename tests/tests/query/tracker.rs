@@ -386,3 +386,32 @@ fn a_tick_states_twice_the_accuracy_of_a_query() {
         assert!((1.999..2.001).contains(&stated), "{stated}: {found:?} {whole:?}");
     }
 }
+
+/// A place of the front that was freed counts as due once tool and surface have moved far enough in all. It stays free.
+#[test]
+fn a_place_that_is_free_outlasts_any_motion() {
+    const STEP: f32 = 0.45;
+    let mesh = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut tracker = Tracker::<u16, MAX_STACK, 128>::new(&tree).expect("deep enough");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let surface = Odometer::new(&tree).start(rows.as_slice());
+    let top = rows.iter().copied().max_by(|a, b| a.z.total_cmp(&b.z)).expect("rows");
+    for tick in 0..24_000_i32 {
+        // Down to the surface, where nodes are opened, and up again, where they are closed; then to and fro.
+        let steps = if tick < 200 { (100 - tick).abs() } else { 100 + tick % 2 };
+        let centre = top + Vec3::Z * STEP * steps as f32;
+        let tool = Sphere::new(centre, 1.0).expect("a valid sphere");
+        let options = Options::new().unsigned();
+        let found = tracker.closest(&surface, &tool, &options).expect("an answer");
+        assert_eq!(found.fallback.is_some(), tick == 0, "{tick}: {found:?}");
+        if tick % 50 == 0 {
+            let whole = query.closest(&surface, &tool, &options).expect("an answer");
+            let accuracy = found.closest.accuracy + whole.accuracy;
+            let off = (found.closest.separation - whole.separation).abs();
+            assert!(off <= accuracy, "{tick}: {found:?} {whole:?}");
+        }
+    }
+}

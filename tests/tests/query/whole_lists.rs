@@ -73,32 +73,81 @@ fn contacts_of_a_tool_that_arrives_at_the_surface_stay_known() {
     assert_eq!(sides, [outside, kept]);
 }
 
-/// A pleated cone whose tip joins more triangles than a side looks at: every other one is in a plane with the point.
+/// A pleated cone with this many triangles at its tip: every other one is in a plane with its axis.
+fn pleated(around: u32) -> Mesh {
+    let angle = |at: u32| (at / 2) as f32 / (around / 2) as f32 * std::f32::consts::TAU;
+    let low = |at: u32| Vec3::Z * (at % 2) as f32 * -5.0;
+    let rim =
+        (0..around).map(|at| Vec3::new(angle(at).cos(), angle(at).sin(), 0.0) * 20.0 + low(at));
+    let mut mesh = Mesh { positions: rim.collect(), ..Mesh::default() };
+    mesh.positions.extend([Vec3::Z * 20.0, Vec3::Z * -20.0]);
+    for at in 0..around {
+        let next = (at + 1) % around;
+        mesh.triangles.extend([[at, next, around], [next, at, around + 1]]);
+    }
+    mesh
+}
+
+/// A cone whose tip joins more triangles than a side looks at, alone and around a small cavity far below the tip.
 #[test]
 fn a_vertex_of_too_many_triangles_has_no_side() {
-    let cone = |around: u32| {
-        let angle = |at: u32| (at / 2) as f32 / (around / 2) as f32 * std::f32::consts::TAU;
-        let low = |at: u32| Vec3::Z * (at % 2) as f32 * -5.0;
-        let rim =
-            (0..around).map(|at| Vec3::new(angle(at).cos(), angle(at).sin(), 0.0) * 20.0 + low(at));
-        let mut mesh = Mesh { positions: rim.collect(), ..Mesh::default() };
-        mesh.positions.extend([Vec3::Z * 20.0, Vec3::Z * -20.0]);
-        for at in 0..around {
-            let next = (at + 1) % around;
-            mesh.triangles.extend([[at, next, around], [next, at, around + 1]]);
+    let mut cavity = ball(1);
+    cavity.positions.iter_mut().for_each(|at| *at = *at * 0.05 - Vec3::Z * 5.0);
+    cavity.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    let below = Side::Undefined(NoSide::BelowAccuracy);
+    let none = Side::Undefined(NoSide::Degenerate);
+    for (around, expected) in [(200, [Side::Outside, below]), (300, [none, none])] {
+        let cone = pleated(around);
+        for mesh in [joined(&[cone.clone(), cavity.clone()]), cone] {
+            let built = Builder::new().build(&mesh).expect("a valid mesh");
+            let tree = built.tree::<u16>().expect("valid");
+            let rows = built.to_rows(&mesh.positions);
+            let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+            // Above the tip, and at it.
+            for (height, side) in [5.0, 0.0].into_iter().zip(expected) {
+                let tool = Sphere::new(Vec3::Z * (20.0 + height), 1.0).expect("valid");
+                let found = query.closest(rows.as_slice(), &tool, &Options::cold());
+                let found = found.expect("an answer");
+                assert!((found.separation - (height - 1.0)).abs() <= 1e-4, "{found:?}");
+                assert_eq!(found.side, side, "{around} triangles, {height}");
+            }
         }
-        mesh
+    }
+}
+
+/// A tool that comes to a vertex without a side is still outside, and so it is next to the vertex, where its distance
+/// gives no direction.
+#[test]
+fn contacts_at_a_vertex_without_a_side_have_that_of_the_tick_before() {
+    let mesh = pleated(300);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut tracker = Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough");
+    let mut contacts = Contacts::<4>::new();
+    let surface = Odometer::new(&tree).start(rows.as_slice());
+    let mut tick = |at: Vec3| {
+        let tool = Sphere::new(at, 1.0).expect("valid");
+        let found = tracker.contacts(&surface, &tool, 10.0, &Options::new(), &mut contacts);
+        let first = contacts.within(10.0).expect("it has a side").next().copied();
+        (found.expect("an answer"), first)
     };
-    for (around, expected) in [(200, Side::Outside), (300, Side::Undefined(NoSide::Degenerate))] {
-        let mesh = cone(around);
-        let built = Builder::new().build(&mesh).expect("a valid mesh");
-        let tree = built.tree::<u16>().expect("valid");
-        let rows = built.to_rows(&mesh.positions);
-        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-        let tool = Sphere::new(Vec3::Z * 25.0, 1.0).expect("valid");
-        let found = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
-        assert!((found.separation - 4.0).abs() <= 1e-4, "{found:?}");
-        assert_eq!(found.side, expected, "{around} triangles");
+    let (beside, none) = tick(Vec3::new(16.0, 0.0, 24.0));
+    assert_eq!((beside.closest.side, beside.is_kept, none), (Side::Outside, false, None));
+    let above = Vec3::Z * 28.0;
+    let tool = Sphere::new(above, 1.0).expect("valid");
+    let plain = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
+    assert_eq!(plain.side, Side::Undefined(NoSide::Degenerate));
+    let (over, first) = tick(above);
+    // The distance of four accuracies is more than the side needs, but less than a direction does.
+    let height = 4.0 * over.closest.accuracy;
+    let (next, second) = tick(Vec3::Z * (20.0 + height));
+    for (found, first, separation) in [(over, first, 7.0), (next, second, height - 1.0)] {
+        assert!(found.is_kept && found.closest.side == Side::Outside, "{found:?}");
+        assert!(found.closest.direction.dot(Vec3::Z) > 0.999, "{found:?}");
+        let first = first.expect("the tip");
+        assert!((first.separation - separation).abs() < 2e-3, "{separation}: {first:?}");
     }
 }
 
