@@ -250,7 +250,20 @@ mod tests {
         let large = [Vec3::ZERO, Vec3::X * 8e9, Vec3::Y * 8e9];
         let (unit, area) = normal(&large).expect("it has an area");
         assert!(unit == Vec3::Z && (area / 6.4e19 - 1.0).abs() < 1e-6, "{unit} {area}");
+        // No f32 holds their areas.
+        for size in [1e-23, 1e20] {
+            assert!(normal(&[Vec3::ZERO, Vec3::X * size, Vec3::Y * size]).is_err(), "{size:e}");
+        }
         assert!(normal(&[Vec3::ZERO, Vec3::X, Vec3::X * 3.0]).is_err());
         assert!(normal(&[Vec3::ZERO, Vec3::X, Vec3::NAN]).is_err());
+    }
+
+    /// The line through its ends passes the point, but the square of its length has lost its digits.
+    #[test]
+    fn an_edge_that_is_hardly_longer_than_zero_is_no_feature() {
+        let third = Vec3::new(10.0, 10.0, 0.0);
+        let feature = |end: Vec3| Feature::of(&[Vec3::ZERO, end, third], Vec3::X * 5.0, 1e-3);
+        assert_eq!(feature(Vec3::X * 1e-16), Feature::Face);
+        assert_eq!(feature(Vec3::X * 10.0), Feature::Edge(0));
     }
 }

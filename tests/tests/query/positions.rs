@@ -74,10 +74,10 @@ fn a_position_whose_square_is_not_finite_is_refused_or_passed_over() {
     let tree = built.tree::<u16>().expect("valid");
     let rest = built.to_rows(&mesh.positions);
     let mut refused = 0;
-    for vertex in 0..rest.len() {
+    for (vertex, &at) in rest.iter().enumerate() {
         let mut rows = rest.clone();
         rows[vertex][vertex % 3] = 1e20;
-        let tool = Sphere::new(rest[vertex] * 1.1, 1.0).expect("valid");
+        let tool = Sphere::new(at * 1.1, 1.0).expect("valid");
         match first_tick(&tree, &rows, &tool) {
             Ok(pair) => assert!(pair.point_on_surface.is_finite(), "{vertex}: {pair:?}"),
             Err(QueryError::Position { .. }) => refused += 1,

@@ -167,3 +167,52 @@ fn take_lowest(paths: &mut [Path; PATHS], count: &mut usize) -> Option<Path> {
     *count = last;
     Some(lowest)
 }
+
+#[cfg(test)]
+mod tests {
+    use dibs_build::{Builder, Mesh};
+    use glam::Vec3;
+
+    use crate::format::MAX_STACK;
+    use crate::{Capsule, Contacts, Options, Query, Tree};
+
+    /// Adds a strip of squares of half a millimetre, 40 mm long and 4 mm wide.
+    fn add_strip(mesh: &mut Mesh, place: impl Fn(f32, f32) -> Vec3) {
+        const LONG: u32 = 80;
+        const WIDE: u32 = 8;
+        let first = mesh.positions.len() as u32;
+        for y in 0..=WIDE {
+            for x in 0..=LONG {
+                mesh.positions.push(place(0.5 * x as f32 - 20.0, 0.5 * y as f32 - 2.0));
+                if x < LONG && y < WIDE {
+                    let a = first + y * (LONG + 1) + x;
+                    let (b, c, d) = (a + 1, a + LONG + 1, a + LONG + 2);
+                    mesh.triangles.extend([[a, b, d], [a, d, c]]);
+                }
+            }
+        }
+    }
+
+    /// Below the axis a whole row of squares is equally near, and a path leads out of each triangle.
+    #[test]
+    fn a_wall_with_more_paths_than_are_remembered_acts_fully() {
+        let mut mesh = Mesh::default();
+        add_strip(&mut mesh, |x, y| Vec3::new(x, y, 0.0));
+        // A nearer wall beside the axis.
+        add_strip(&mut mesh, |x, y| Vec3::new(x, 4.15, y + 4.0));
+        let built = Builder::new().build(&mesh).expect("builds");
+        let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+        let rows = built.to_rows(&mesh.positions);
+        let mut query = Query::<_, MAX_STACK>::new(&tree).expect("deep enough");
+        let [start, end] = [-18.0, 18.0].map(|x| Vec3::new(x, 0.25, 4.0));
+        let tool = Capsule::new(start, end, 1.0).expect("finite");
+        let mut contacts = Contacts::<8, 4096>::new();
+        let options = Options::cold();
+        query.contacts(rows.as_slice(), &tool, 6.0, &options, &mut contacts).expect("an answer");
+        assert_eq!(contacts.len(), 2, "{contacts:?}");
+        for (contact, separation) in contacts.iter().zip([2.9, 3.0]) {
+            assert!((contact.separation - separation).abs() < 1e-3, "{contact:?}");
+            assert_eq!(contact.activation, 1.0, "{contact:?}");
+        }
+    }
+}

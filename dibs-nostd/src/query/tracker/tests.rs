@@ -12,13 +12,14 @@ use fastrand::Rng;
 use glam::Vec3;
 
 use super::Tracker;
+use crate::format::MAX_STACK;
 use crate::query::distances::{distance, least};
 use crate::query::memory::clock::Deadline;
 use crate::query::memory::front::{NOWHERE, UNUSED};
 use crate::tree::format::Link;
 use crate::{
-    Budget, Capsule, Coverage, MotionReading, MovingSurface, Odometer, Options, Sphere, Tree,
-    VertexTable, measure_stretch,
+    Budget, Capsule, Contacts, Coverage, MotionReading, MovingSurface, Odometer, Options, Query,
+    Side, Sphere, Tree, VertexTable, measure_stretch,
 };
 
 struct Bound {
@@ -110,8 +111,8 @@ fn no_bound_exceeds_the_distance() {
     assert!(above_zero > 150 * frames());
 }
 
-/// Positions that are each off by up to a millimetre.
-struct Rough<'a>(&'a [Vec3]);
+/// Positions that are each off by up to this (mm).
+struct Rough<'a>(&'a [Vec3], f32);
 
 impl VertexTable for Rough<'_> {
     fn len(&self) -> usize {
@@ -123,19 +124,22 @@ impl VertexTable for Rough<'_> {
     }
 
     fn position_error(&self) -> f32 {
-        1.0
+        self.1
     }
 }
 
-/// The error of the positions counts twice: when the pair was searched, and now.
+/// The error of the positions counts twice: when the pair was searched, and now. With an error that is no number, no
+/// pair rests.
 #[test]
 fn a_pair_rests_only_if_it_is_farther_than_the_errors_of_both_searches() {
     let built = Builder::new().stretch(1.5).build(&band(160)).expect("builds");
     let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
     let rest: Vec<Vec3> =
         (0..tree.vertex_count()).map(|row| tree.rest_position(row).expect("a row")).collect();
-    for (height, searched) in [(1.5, 2), (1.9, 2), (2.1, 1)] {
-        let rough = Rough(rest.as_slice());
+    for (height, error, searched) in
+        [(1.5, 1.0, 2), (1.9, 1.0, 2), (2.1, 1.0, 1), (9.0, 1.0, 1), (9.0, f32::NAN, 2)]
+    {
+        let rough = Rough(rest.as_slice(), error);
         let surface = Odometer::new(&tree).start(&rough);
         let tool = |x: f32, height: f32| {
             Sphere::new(Vec3::new(x, 0.05, 5.0 + height), 0.5).expect("valid")
@@ -149,7 +153,7 @@ fn a_pair_rests_only_if_it_is_farther_than_the_errors_of_both_searches() {
             Tracker::closest_of(&mut pairs, &options).expect("an answer").expect("two pairs")
         };
         assert_eq!(ask().searched, 2);
-        assert_eq!(ask().searched, searched, "{height}");
+        assert_eq!(ask().searched, searched, "{height} {error}");
     }
 }
 
@@ -179,7 +183,7 @@ fn an_answer_says_whether_the_stretch_was_checked() {
         let again = tracker.closest(&surface, &tool, &options).expect("an answer");
         assert_eq!(again.moved, Some(0.0));
         let tools = [tool; 2];
-        let mut query = crate::Query::<_, 128>::new(&tree).expect("enough");
+        let mut query = Query::<_, 128>::new(&tree).expect("enough");
         let of = query.closest_of(rows.as_slice(), &tools, &options).expect("an answer");
         assert_eq!(of.map(|found| found.proximity.coverage), Some(coverage));
     }
@@ -296,4 +300,80 @@ fn an_error_that_grows_widens_what_is_kept() {
         }
         assert!(now.lower <= expected[0] + 1e-3 && now.upper >= expected[1] - 1e-3, "{now:?}");
     }
+}
+
+/// Where the last tick and this one exclude each other, the motion was larger than stated: only this one counts.
+#[test]
+fn a_motion_larger_than_stated_makes_nothing_certain() {
+    let mesh = generate::heart(320).unwrap().mesh;
+    let built = Builder::new().build(&mesh).unwrap();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let rows = built.to_rows(&mesh.positions);
+    let motion = Odometer::new(&tree).start(rows.as_slice()).motion();
+    let mut query = Query::<_, MAX_STACK>::new(&tree).unwrap();
+    let sphere = |at: Vec3| Sphere::new(at, 1.0).unwrap();
+    let (outside, inside) =
+        (Vec3::new(80.0, 0.0, 20.0), rows.iter().sum::<Vec3>() / rows.len() as f32);
+    let pair = query.closest(rows.as_slice(), &sphere(outside), &Options::cold()).unwrap();
+    // The root's pin comes next to the tool, and the budget covers no other test.
+    let pin = rows[tree.node(0).expect("a root").0 as usize];
+    let (all, none) = (Budget::UNLIMITED, Budget::new(0));
+    let half = pair.direction * pair.axis_distance * 0.5;
+    for (at, side, by, budget) in [
+        (outside, Side::Outside, half, all),
+        (outside, Side::Outside, outside - pair.point_on_surface, all),
+        (outside, Side::Outside, outside - pin - Vec3::X, none),
+        (inside, Side::Inside, inside - pin - Vec3::X, none),
+    ] {
+        // Its front is always full, so that each tick is a whole query.
+        let mut tracker = Tracker::<_, MAX_STACK, 1>::new(&tree).unwrap();
+        let mut tick = |rows: &[Vec3], options: &Options| {
+            let surface = Off { rows, motion, error: 0.0 };
+            tracker.closest(&surface, &sphere(at), options).unwrap()
+        };
+        assert_eq!(tick(&rows, &Options::cold()).closest.side, side);
+        let moved: Vec<Vec3> = rows.iter().map(|&row| row + by).collect();
+        let options = Options::cold().budget(budget);
+        let found = tick(&moved, &options);
+        let alone = query.closest(moved.as_slice(), &sphere(at), &options).unwrap();
+        assert_eq!((found.closest.side, found.is_kept), (alone.side, false), "{by}");
+        let off = (found.closest.separation - alone.separation).abs();
+        assert!(off <= 2.0 * found.closest.accuracy, "{by}: {found:?} {alone:?}");
+    }
+}
+
+/// Where the surface's motion is not known, each list is a whole query's, within the tick's budget.
+#[test]
+fn contacts_of_a_surface_whose_motion_is_not_known_are_those_of_a_query() {
+    const MARGIN: f32 = 8.0;
+    let mesh = generate::heart(1_280).unwrap().mesh;
+    let built = Builder::new().build(&mesh).unwrap();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let rows = built.to_rows(&mesh.positions);
+    let surface = Off { rows: &rows, motion: None, error: 0.0 };
+    let mut tracker = Tracker::<_, MAX_STACK, 64, 64>::with_range(&tree).unwrap();
+    let mut query = Query::<_, MAX_STACK>::new(&tree).unwrap();
+    let (mut own, mut whole) = (Contacts::<32>::new(), Contacts::<32>::new());
+    let (mut short, mut complete) = (0, 0);
+    for row in (0..rows.len()).step_by(61) {
+        let tool = Sphere::new(rows[row] * 1.05, 1.0).unwrap();
+        query.contacts(&surface, &tool, MARGIN, &Options::cold(), &mut whole).unwrap();
+        for tests in (0..900).step_by(7).chain([1_000_000]) {
+            let options = Options::new().budget(Budget::new(tests));
+            let found = tracker.contacts(&surface, &tool, MARGIN, &options, &mut own).unwrap();
+            assert!(found.closest.work() <= tests + 1 + Budget::TRIANGLE, "{tests} {found:?}");
+            let bound = own.bound() - 2.0 * own.accuracy();
+            for one in whole.iter().filter(|one| one.separation < bound) {
+                let is_listed =
+                    own.iter().any(|other| (other.separation - one.separation).abs() < 1e-3);
+                assert!(is_listed, "{row} {tests}: {one:?} {own:?}");
+            }
+            let is_complete = own.within(MARGIN).is_ok_and(|list| list.is_complete());
+            *if is_complete { &mut complete } else { &mut short } += 1;
+            assert!(is_complete || tests < 1_000_000, "{row}: {own:?}");
+        }
+        assert_eq!(own.len(), whole.len(), "{row}: {own:?} {whole:?}");
+    }
+    std::println!("{complete} lists complete, {short} cut short");
+    assert!(complete > 10 && short > 100, "{complete} {short}");
 }
