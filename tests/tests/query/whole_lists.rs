@@ -124,31 +124,42 @@ fn contacts_at_a_vertex_without_a_side_have_that_of_the_tick_before() {
     let tree = built.tree::<u16>().expect("valid");
     let rows = built.to_rows(&mesh.positions);
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
-    let mut tracker = Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough");
-    let mut contacts = Contacts::<4>::new();
     let surface = Odometer::new(&tree).start(rows.as_slice());
-    let mut tick = |at: Vec3| {
+    let tick = |tracker: &mut Tracker<'_, u16, MAX_STACK, 256>, at: Vec3, margin: f32| {
         let tool = Sphere::new(at, 1.0).expect("valid");
-        let found = tracker.contacts(&surface, &tool, 10.0, &Options::new(), &mut contacts);
-        let first = contacts.within(10.0).expect("it has a side").next().copied();
-        (found.expect("an answer"), first)
+        let mut contacts = Contacts::<4>::new();
+        let found = tracker.contacts(&surface, &tool, margin, &Options::new(), &mut contacts);
+        let all = contacts.within(margin).expect("it has a side").copied().collect::<Vec<_>>();
+        (found.expect("an answer"), all)
     };
-    let (beside, none) = tick(Vec3::new(16.0, 0.0, 24.0));
-    assert_eq!((beside.closest.side, beside.is_kept, none), (Side::Outside, false, None));
+    let mut tracker = Tracker::new(&tree).expect("deep enough");
+    let (beside, none) = tick(&mut tracker, Vec3::new(16.0, 0.0, 24.0), 10.0);
+    assert_eq!((beside.closest.side, beside.is_kept, none.len()), (Side::Outside, false, 0));
     let above = Vec3::Z * 28.0;
     let tool = Sphere::new(above, 1.0).expect("valid");
     let plain = query.closest(rows.as_slice(), &tool, &Options::cold()).expect("an answer");
     assert_eq!(plain.side, Side::Undefined(NoSide::Degenerate));
-    let (over, first) = tick(above);
+    let (over, all) = tick(&mut tracker, above, 10.0);
+    let (again, none) = tick(&mut tracker, above, 5.0);
+    assert!(again.is_kept && none.is_empty(), "{again:?} {none:?}");
     // The distance of four accuracies is more than the side needs, but less than a direction does.
     let height = 4.0 * over.closest.accuracy;
-    let (next, second) = tick(Vec3::Z * (20.0 + height));
-    for (found, first, separation) in [(over, first, 7.0), (next, second, height - 1.0)] {
+    let (next, nearer) = tick(&mut tracker, Vec3::Z * (20.0 + height), 10.0);
+    for (found, all, separation) in [(over, all, 7.0), (next, nearer, height - 1.0)] {
         assert!(found.is_kept && found.closest.side == Side::Outside, "{found:?}");
         assert!(found.closest.direction.dot(Vec3::Z) > 0.999, "{found:?}");
-        let first = first.expect("the tip");
+        let first = all.first().expect("the tip");
         assert!((first.separation - separation).abs() < 2e-3, "{separation}: {first:?}");
     }
+    // After a step that may have led inside, the only contact is as deep as the distance.
+    let mut tracker = Tracker::new(&tree).expect("deep enough");
+    let (beside, _) = tick(&mut tracker, Vec3::new(40.0, 0.0, 24.0), 10.0);
+    assert_eq!(beside.closest.side, Side::Outside);
+    let (over, all) = tick(&mut tracker, Vec3::Z * 23.0, 10.0);
+    assert!(over.is_kept && over.closest.side == Side::Either, "{over:?}");
+    assert_eq!(all.len(), 1, "{all:?}");
+    assert_eq!(all[0].separation, over.closest.lower, "{all:?}");
+    assert!((all[0].separation + 4.0).abs() < 2e-3, "{all:?}");
 }
 
 /// Tests that cost nothing need no budget.
