@@ -117,6 +117,30 @@ fn recorded_begins_count_once() {
     assert_eq!(assembler.counters().of(Event::Base), 50 * begins.len() as u32);
 }
 
+/// A sender that starts anew numbers its frames from the start: a frame that is refused counts once, although the last
+/// one refused had a higher number.
+#[test]
+fn a_refused_frame_of_a_new_session_counts() {
+    let (mut assembler, _reader) = line(mac());
+    for packet in sent(1, mac()) {
+        give(&mut assembler, &packet).unwrap();
+    }
+    // Of partial frames whose base is not published.
+    let rows = surface(9);
+    let begin = |session, epoch: u32| {
+        let id = FrameId { mesh_id: MESH, session, epoch };
+        let encoding = Encoding::Float;
+        let frame = FrameEncoder::<_, 64>::partial(id, encoding, &rows[..], epoch - 1, &rows[..]);
+        collect(frame.unwrap().with_mac(mac()).unwrap()).swap_remove(0)
+    };
+    for (count, (session, epoch)) in (1..).zip([(1, 9), (2, 3), (2, 4)]) {
+        for _ in 0..3 {
+            give(&mut assembler, &begin(session, epoch)).unwrap_err();
+            assert_eq!(assembler.health().rejections, count, "frame {epoch} of session {session}");
+        }
+    }
+}
+
 /// Even without a key a stray packet of a frame far ahead does not hide a later frame that fails.
 #[test]
 fn without_a_key_nothing_mutes() {
