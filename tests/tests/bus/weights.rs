@@ -9,9 +9,10 @@ use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
     Admission, Advance, Assembler, FrameExtent, Frames, Gate, IncomingSurface, Millis, Options,
-    Query, ReceiveError, Sphere, StretchError, Tree, TreeBytes, VertexTable, measure_stretch,
+    Progress, Query, ReceiveError, Sphere, StretchError, Tree, TreeBytes, VertexTable,
+    measure_stretch,
 };
-use dibs_tests::bus::reseal;
+use dibs_tests::bus::{collect, reseal};
 use dibs_tests::modal::{anywhere, positions, small};
 use dibs_tests::motions::trembling;
 use fastrand::Rng;
@@ -141,6 +142,29 @@ fn hostile_frames_of_weights_are_rejected_and_counted() {
     assert_eq!(positions(&bus.reader.read().expect("stays")), published);
     assert_eq!(bus.reader.read().expect("stays").label().epoch, 1);
     assert!(bus.send(100, &bus.recorded[8].clone()).is_ok());
+}
+
+/// In a frame of weights a packet of vertices is refused, and weights that come twice are ignored: the frame continues.
+#[test]
+fn a_frame_of_weights_takes_only_weights_and_each_once() {
+    let mut bus = bus();
+    let weights = bus.recorded[5].clone();
+    let packets = bus.packets(1, &weights);
+    let [begin, values, commit] = &packets[..] else { panic!("{} packets", packets.len()) };
+    let id = FrameId { mesh_id: bus.tree.mesh_id(), session: 1, epoch: 1 };
+    let vertices = FrameEncoder::<_, 64>::new(id, Encoding::Float, &[Vec3::ZERO; 4][..]);
+    let vertices = collect(vertices.expect("can be sent")).swap_remove(1);
+    let mut take = |packet: &[u8]| bus.assembler.accept(packet, Millis(0));
+    assert_eq!(take(begin), Ok(Progress::Begun { epoch: 1 }));
+    assert_eq!(take(&vertices), Err(ReceiveError::Encoding));
+    assert_eq!(take(values), Ok(Progress::Stored));
+    assert_eq!(take(values), Ok(Progress::Duplicate));
+    assert_eq!(take(commit), Ok(Progress::Complete { epoch: 1 }));
+    assert_eq!(bus.assembler.advance(u32::MAX), Ok(Advance::Published { epoch: 1 }));
+    let counted = |event| bus.assembler.counters().of(event);
+    assert_eq!([Event::Encoding, Event::Duplicate].map(counted), [1, 1]);
+    let surface = bus.modes.surface::<4>(&weights).expect("recorded");
+    assert_eq!(positions(&bus.reader.read().expect("published")), positions(&surface));
 }
 
 /// A receiver of vertices accepts no weights.
