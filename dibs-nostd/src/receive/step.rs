@@ -97,3 +97,41 @@ impl StepMeter {
         after.unwrap_or_else(|| MotionReading::start(unit.tree))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use dibs_build::{Builder, generate};
+
+    use super::*;
+    use crate::tree::Tree;
+
+    /// Of the last step, the new one and the distance from the extrapolation, each may be too long to count: then nothing
+    /// is stated.
+    #[test]
+    fn a_length_that_is_too_long_to_count_is_unknown() {
+        let mesh = generate::heart(320).expect("a valid size").mesh;
+        let built = Builder::new().build(&mesh).expect("a valid mesh");
+        let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+        let unit = MotionUnit::of(&tree);
+        let (_, radius, _) = tree.node(0).expect("a root");
+        let units = |length: f32| unit.units_of_step(length * length).expect("finite");
+        let far = 100.0 * radius;
+        assert!((MOST..u64::from(u32::MAX)).contains(&units(far)), "{}", units(far));
+        let ahead = |units, step: f32, off: f32| {
+            let (largest, off) = (step * step, off * off);
+            let meter = StepMeter { largest, off, units, t: 1.0, ..StepMeter::new() };
+            let PredictionCheck { passed, off, .. } = meter.ahead(Some(&unit));
+            (passed, off)
+        };
+        let near = units(1.0);
+        for last in [near, MOST - 1] {
+            let (passed, off) = ahead(last, 1.0, 0.5);
+            assert!(u64::from(passed).abs_diff(last) <= 1 + last / 1_000_000, "{passed} {last}");
+            let rounding = u64::from(off) - units(0.5);
+            assert!(rounding <= (2 * last + near) / 100_000 + 2, "{rounding} {last}");
+        }
+        for (last, step, off) in [(MOST, 1.0, 0.5), (near, far, 0.5), (near, 1.0, far)] {
+            assert_eq!(ahead(last, step, off), (0, u32::MAX), "{last} {step} {off}");
+        }
+    }
+}
