@@ -197,6 +197,32 @@ mod tests {
 
     use super::*;
 
+    /// A triangle that is within the limit by less than the rounding up counts as stretched to the limit, not beyond.
+    #[test]
+    fn a_triangle_just_within_the_limit_is_not_beyond_it() {
+        just_within::<SingularValue>([1.0, 0.0, 1.0]);
+        just_within::<LongestEdge>([1.0, 2.0, 1.0]);
+    }
+
+    /// Stretches a triangle of two edges of length 1 at a right angle by nearly 1.5.
+    fn just_within<M: Measure>(rest: Squares) {
+        let limit = 2.25;
+        let squared = |length: f32| {
+            let now = Edges { first: Vec3::X * length, second: Vec3::Y * length };
+            squared_stretch::<M>(&rest, now, limit)
+        };
+        let bits = 1.5_f32.to_bits();
+        for steps in 1..60 {
+            let length = f32::from_bits(bits - steps);
+            assert_eq!(squared(length), limit, "{length}");
+            let length = f32::from_bits(bits + steps);
+            assert!(squared(length) > limit, "{length}");
+        }
+        // The rounding up itself.
+        let length = 1.4_f32;
+        assert!(squared(length) > length * length && squared(length) < 1.97, "{length}");
+    }
+
     proptest! {
         /// The limit's square is never above the exact one, and at most slightly below.
         #[test]
