@@ -2,12 +2,14 @@
 
 // Requirement: F-02
 
+use dibs_build::{Builder, Paths, generate};
 use dibs_nostd::{
-    Admission, FrameExtent, Gate, IncomingSurface, MeasuredStretch, REGIONS, StretchError,
-    StretchMonitor, SurfaceLimits, Tree, VertexTable, measure_stretch,
+    Admission, FrameExtent, Gate, IncomingSurface, MeasuredStretch, Millis, PathKind, REGIONS,
+    StretchError, StretchMonitor, SurfaceLimits, Tree, VertexTable, measure_stretch,
 };
-use dibs_tests::deform::{deformed, unit};
+use dibs_tests::deform::{Deformation, deformed, unit};
 use fastrand::Rng;
+use glam::Vec3;
 
 /// Passes a frame to a gate as a bus does: packets of rows in some order, and slices of work between them.
 fn feed<V: VertexTable + ?Sized>(
@@ -154,6 +156,86 @@ fn partial_is_whole_and_measures_only_what_moved() {
         work += 1;
     }
     assert!(work > 0 && work < tree.triangle_count() / 4, "{work} triangles for one vertex");
+
+    // If none changes, there is nothing to measure.
+    monitor.published();
+    monitor.begin(FrameExtent::Partial);
+    monitor.moved(7..7);
+    let admission = monitor.advance(IncomingSurface::new(surface.as_slice(), vertices), 0);
+    assert!(matches!(admission, Ok(Admission::Admitted(Some(_)))), "{admission:?}");
+}
+
+/// A frame of a tree with paths along edges starts each region with the worst triangle of the last frame, and has the
+/// result of a measurement of its own.
+#[test]
+fn paths_along_edges_are_measured_alike_in_slices() {
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).paths(Paths::Edges).build(&mesh);
+    let built = built.expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    assert_eq!(tree.paths(), PathKind::EdgePath);
+    let mut monitor = StretchMonitor::new(&tree)
+        .expect("a metric")
+        .limits(SurfaceLimits::reach_mm(1e3).shrinkage(0.0));
+    let mut rng = Rng::with_seed(27);
+    let packets = in_packets(tree.vertex_count(), 7);
+    let kinds = [Deformation::Waves, Deformation::Bump, Deformation::Noise, Deformation::Rigid];
+    for round in 0..40 {
+        let moved = kinds[round % kinds.len()].apply(&mesh, tree.paths(), 1.4, &mut rng);
+        let rows = built.to_rows(&moved);
+        let whole = measure_stretch(&tree, rows.as_slice());
+        assert!(whole.is_ok(), "{whole:?}");
+        let sliced = feed(&mut monitor, rows.as_slice(), FrameExtent::Whole, &packets, &mut rng);
+        assert_same(sliced, whole);
+    }
+}
+
+/// A gate that is given the published frame compares the rows itself, in slices of any size and as far as they have
+/// arrived: it names the vertex that moved too far, and admits a frame without one.
+#[test]
+fn rows_are_compared_in_slices_of_any_size() {
+    let (mesh, built, _) = deformed(0, 0);
+    let tree = built.tree::<u16>().expect("valid");
+    let rest = built.to_rows(&mesh.positions);
+    let vertices = tree.vertex_count();
+    // 1 mm in 9 ms and the one that counts because of rounding.
+    let limits = SurfaceLimits::reach_mm(1e3).shrinkage(0.0).speed(0.1);
+    for work in [1, 7, 40, 100_000] {
+        for each in [11, vertices] {
+            for fast in [None, Some(0), Some(500), Some(vertices - 1)] {
+                let mut moved: Vec<Vec3> = rest.iter().map(|at| *at + Vec3::X * 0.5).collect();
+                if let Some(vertex) = fast {
+                    moved[vertex as usize].x += 1.0;
+                }
+                let mut monitor = StretchMonitor::new(&tree).expect("a metric").limits(limits);
+                monitor.begin(FrameExtent::Whole);
+                let (mut ready, mut calls) = (0, 0);
+                let outcome = loop {
+                    ready = vertices.min(ready + each);
+                    calls += 1;
+                    assert!(calls < 10_000, "the gate does not come to an end");
+                    let before = Some((rest.as_slice(), Millis(9)));
+                    let incoming = IncomingSurface::new(moved.as_slice(), ready);
+                    match monitor.advance(IncomingSurface { before, ..incoming }, work) {
+                        Ok(Admission::Pending) => (),
+                        outcome => break outcome,
+                    }
+                };
+                match (fast, outcome) {
+                    (None, Ok(Admission::Admitted(Some(_)))) => {
+                        // One row or triangle a call.
+                        let all = vertices + tree.triangle_count();
+                        assert!(work > 1 || each < vertices || calls == all, "{calls} {all}");
+                    }
+                    (Some(fast), Err(StretchError::TooFast { vertex, step, limit })) => {
+                        assert_eq!((vertex, limit), (fast, 1.0));
+                        assert!((step - 1.5).abs() < 1e-4, "{step}");
+                    }
+                    other => panic!("{other:?} with work {work}, {each} rows a call"),
+                }
+            }
+        }
+    }
 }
 
 /// No call exceeds its work. With work for one triangle a call, a frame takes as many calls as it has triangles; from
