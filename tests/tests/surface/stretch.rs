@@ -7,12 +7,14 @@ use dibs_nostd::format::{Join, MAX_STACK};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Assembler, Frames, MeasuredStretch, Options, Query, QueryError, REGIONS, ReceiveError, Sphere,
-    StretchError, Tree, TriangleRow, measure_stretch,
+    Assembler, FrameExtent, Frames, Gate, IncomingSurface, MeasuredStretch, Options, Query,
+    QueryError, REGIONS, ReceiveError, Sphere, StretchError, StretchMonitor, Tree, TriangleRow,
+    measure_stretch,
 };
 use dibs_tests::bus::give;
 use dibs_tests::deform::{Deformation, deformed, unit};
 use dibs_tests::oracle::{Instrument, exhaustive};
+use dibs_tests::tree_bytes::section;
 use dibs_tests::{sample, stretch};
 use fastrand::Rng;
 
@@ -262,6 +264,44 @@ fn what_cannot_be_measured_is_named() {
     let tree = without.tree::<u16>().expect("valid");
     let refused = measure_stretch(&tree, rows.as_slice());
     assert!(matches!(refused, Err(StretchError::NoMetric)));
+}
+
+/// A triangle whose corner changed in flash, after the tree was validated, to a row outside the table: every
+/// measurement names that row, and no frame is admitted.
+#[test]
+fn a_corner_outside_the_table_is_corrupt() {
+    let (mesh, built, _) = deformed(0, 0);
+    let tree = built.tree::<u16>().expect("valid");
+    let (rows, vertices) = (built.to_rows(&mesh.positions), tree.vertex_count());
+    let (at, _) = section(built.blob(), 2);
+    let with_corner = |triangle: u32, row: u32| {
+        let mut bytes = built.blob().to_vec();
+        let third = at + 6 * triangle as usize + 4;
+        bytes[third..third + 2].copy_from_slice(&(row as u16).to_le_bytes());
+        bytes
+    };
+    let corrupt = |row| Err(StretchError::Corrupt { row });
+    // A region begins with its first triangle until another one is the worst of a frame.
+    let region = tree.triangle_count().div_ceil(REGIONS as u32);
+    for triangle in [0, 1, 3 * region, 3 * region + 5, tree.triangle_count() - 1] {
+        for row in [vertices, 0xFFFF] {
+            let bytes = with_corner(triangle, row);
+            let damaged = tree.moved_to(&bytes).expect("the same layout");
+            assert_eq!(measure_stretch(&damaged, rows.as_slice()).map(|_| ()), corrupt(row));
+        }
+        let bytes = with_corner(triangle, vertices);
+        let damaged = tree.moved_to(&bytes).expect("the same layout");
+        let mut monitor = StretchMonitor::new(&damaged).expect("a block has the row");
+        for _ in 0..2 {
+            monitor.begin(FrameExtent::Whole);
+            let incoming = IncomingSurface::new(rows.as_slice(), vertices);
+            assert_eq!(monitor.advance(incoming, u32::MAX).map(|_| ()), corrupt(vertices));
+        }
+        let bytes = with_corner(triangle, 0xFFFF);
+        let damaged = tree.moved_to(&bytes).expect("the same layout");
+        let refused = StretchMonitor::new(&damaged).map(|_| ());
+        assert_eq!(refused, corrupt(triangle), "no block has the row");
+    }
 }
 
 /// With a tree as the gate, a frame beyond the stretch limit is refused, and the earlier one stays.
