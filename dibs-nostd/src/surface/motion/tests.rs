@@ -10,7 +10,8 @@ use dibs_build::{Builder, generate};
 use fastrand::Rng;
 use glam::Vec3;
 
-use super::{MotionReading, Odometer};
+use super::{MotionReading, Odometer, Unit};
+use crate::tree::format::{CRC, field};
 use crate::{MovingSurface, Tree};
 
 /// A change of a frame.
@@ -89,4 +90,27 @@ fn readings_of_other_trees_and_runs_have_no_difference() {
     for other in [MotionReading::start(2), MotionReading::start(1)] {
         assert_eq!((one.since(&other), one.after(&other)), (None, None));
     }
+}
+
+/// The unit is a number for any radii, also those that no mesh has: it and its inverse are neither zero nor infinite.
+#[test]
+fn radii_of_any_size_have_a_unit() {
+    let mesh = generate::heart(320).unwrap().mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).unwrap();
+    // With this length of a radius code, and the checksum corrected.
+    let unit = |code: f32| {
+        let mut bytes = built.blob().to_vec();
+        bytes[field::RADIUS_UNIT..][..4].copy_from_slice(&code.to_le_bytes());
+        let mut digest = CRC.digest();
+        digest.update(&bytes[..field::CHECKSUM]);
+        digest.update(&bytes[field::CHECKSUM + 4..]);
+        bytes[field::CHECKSUM..][..4].copy_from_slice(&digest.finalize().to_le_bytes());
+        let Unit { length, inverse } = Unit::of(&Tree::<u16>::from_bytes(&bytes).unwrap());
+        assert!(length.is_normal() && inverse.is_normal(), "{code}: {length} {inverse}");
+        assert_eq!(length * inverse, 1.0, "{code}");
+        length
+    };
+    assert!(unit(1e-3) < unit(1.0) && unit(1.0) < unit(1e3));
+    assert!(unit(0.0) == unit(1e-30) && unit(0.0) < 1e-27);
+    assert!(unit(1e17) == unit(1e18) && unit(1e18) > 1e12);
 }
