@@ -9,7 +9,7 @@ use std::prelude::rust_2024::*;
 use dibs_build::{Builder, generate};
 use glam::Vec3;
 
-use crate::{Odometer, QuantisedVertices, Tree, VertexTable};
+use crate::{Odometer, QuantisedVertices, StretchError, Tree, VertexTable, measure_stretch};
 
 /// Positions with an error.
 struct Inexact(Vec<Vec3>, f32);
@@ -76,5 +76,26 @@ fn a_quantised_table_states_its_error() {
             worst = worst.max(off);
         }
         assert!(stated < worst * 1.05, "{worst} {stated}");
+    }
+}
+
+/// Between tables of two lengths there are no rows, so that nothing is measured there.
+#[test]
+fn tables_of_two_lengths_have_no_rows_between_them() {
+    let mesh = generate::heart(320).unwrap().mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).unwrap();
+    let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
+    let rows = built.to_rows(&mesh.positions);
+    let (whole, short) = (&rows[..], &rows[1..]);
+    let mut odometer = Odometer::new(&tree);
+    for (before, after) in [(whole, short), (short, whole), (whole, whole)] {
+        let step = odometer.step(before, after);
+        let found = if before.len() == after.len() { rows.len() } else { 0 };
+        for blend in [step.at(0.5), step.beyond(0.5)] {
+            assert_eq!(blend.len(), found);
+            let measured = measure_stretch(&tree, &blend).map(|_| ());
+            let refused = StretchError::VertexCount { expected: tree.vertex_count(), found: 0 };
+            assert_eq!(measured, if found == 0 { Err(refused) } else { Ok(()) });
+        }
     }
 }
