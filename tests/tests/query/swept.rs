@@ -10,8 +10,8 @@ use dibs_build::{Builder, Mesh};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{
-    Budget, Capsule, Odometer, Options, QueryError, Sphere, Step, Sweep, SweepAnswer, Tracker,
-    VertexTable, measure_stretch,
+    Budget, Capsule, Odometer, Options, QueryError, Sphere, Step, Sweep, SweepAnswer, Tool,
+    Tracker, VertexTable, measure_stretch,
 };
 use dibs_tests::climb::climb;
 use dibs_tests::deform::unit;
@@ -409,6 +409,47 @@ fn hostile_ways_are_refused_or_never_cleared() {
         Err(error) => matches!(error, QueryError::Position { .. }),
     };
     assert!(is_unclear, "{found:?}");
+}
+
+/// A sweep over a surface at rest.
+fn sweep_at_rest<T: Tool>(
+    tracker: &mut Follower<'_>,
+    step: &Step<'_, [Vec3], [Vec3]>,
+    tools: [T; 2],
+) -> SweepAnswer {
+    let sweep = Sweep { step, t: [0.0, 1.0], tools };
+    tracker.sweep(&sweep, 0.0, SAMPLES, &Options::cold()).expect("an answer")
+}
+
+/// Of the radii at start and end the larger counts all the way.
+#[test]
+fn a_tool_has_the_larger_of_its_radii_throughout() {
+    let mesh = sheet(60.0, 8);
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("builds");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rest = built.to_rows(&mesh.positions);
+    let mut tracker = Follower::new(&tree).expect("enough");
+    let mut odometer = Odometer::new(&tree);
+    let still = odometer.step(rest.as_slice(), rest.as_slice());
+    let sphere = |(z, radius): (f32, f32)| Sphere::new(Vec3::Z * z, radius).expect("valid");
+    let capsule = |(z, radius): (f32, f32)| {
+        let ends = [-5.0, 5.0].map(|x| Vec3::new(x, 0.0, z));
+        Capsule::new(ends[0], ends[1], radius).expect("valid")
+    };
+    for (height, touches) in [(2.5, true), (3.5, false)] {
+        for [from, to] in [[0.5, 3.0], [3.0, 0.5]] {
+            let ways = [(height, from), (9.0, to)];
+            let by_sphere = sweep_at_rest(&mut tracker, &still, ways.map(sphere));
+            let by_capsule = sweep_at_rest(&mut tracker, &still, ways.map(capsule));
+            for found in [by_sphere, by_capsule] {
+                if touches {
+                    assert_eq!((found.clear_until, found.contact), (0.0, Some(0.0)), "{found:?}");
+                } else {
+                    assert!(found.clear_until > 1.0 && found.contact.is_none(), "{found:?}");
+                }
+            }
+        }
+    }
 }
 
 /// Nothing moves, so any positive distance rules out contact; a budget that shows none is no error.
