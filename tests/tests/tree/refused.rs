@@ -186,6 +186,47 @@ fn a_neighbour_that_has_another_is_refused() {
     assert_eq!(refused, FormatError::Neighbour { triangle: 0, edge: 0 });
 }
 
+/// Two cubes that touch along an edge: of its four triangles each has one neighbour, and no other triangle at the edge
+/// may take its place.
+#[test]
+fn a_neighbour_is_not_another_triangle_at_the_edge() {
+    let mut mesh = Mesh::default();
+    for low in [Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)] {
+        let (positions, triangles) = cuboid(low, low + Vec3::ONE);
+        let numbers = positions.map(|at| {
+            let known = mesh.positions.iter().position(|&position| position == at);
+            known.unwrap_or_else(|| {
+                mesh.positions.push(at);
+                mesh.positions.len() - 1
+            }) as u32
+        });
+        mesh.triangles.extend(triangles.map(|corners| corners.map(|v| numbers[v as usize])));
+    }
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (14, 24));
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let mut owners = std::collections::BTreeMap::<_, Vec<_>>::new();
+    for row in 0..tree.triangle_count() {
+        let [a, b, c] = tree.corners(TriangleRow(row)).expect("a row");
+        for (edge, ends) in (0..).zip([(a, b), (b, c), (c, a)]) {
+            owners.entry(ends).or_default().push((row, edge));
+        }
+    }
+    let at_edge = owners.into_values().find(|rows| rows.len() == 2).expect("an edge of four");
+    let [(one, edge), (other, same)] = at_edge[..] else { unreachable!("two rows") };
+    let [own, theirs] = [(one, edge), (other, same)].map(|(row, edge)| {
+        let TriangleRow(across) = tree.neighbour(TriangleRow(row), edge).expect("a closed surface");
+        across
+    });
+    assert_ne!(own, theirs, "each has its own");
+    let mut bytes = built.blob().to_vec();
+    let place = section(&bytes, 8).0 + 6 * one as usize + 2 * edge as usize;
+    bytes[place..place + 2].copy_from_slice(&(theirs as u16).to_le_bytes());
+    let refused = Tree::<u16>::from_bytes(&with_words(&bytes, &[])).expect_err("not a pair");
+    let FormatError::Neighbour { triangle, .. } = refused else { panic!("{refused}") };
+    assert_eq!(triangle, one.min(own), "the first of the two");
+}
+
 /// Above 65,535 triangles a row of 16 bits names one of several.
 #[test]
 fn a_large_narrow_tree_knows_its_neighbours_and_its_border() {
@@ -216,7 +257,9 @@ fn a_large_narrow_tree_knows_its_neighbours_and_its_border() {
 #[test]
 fn rows_outside_the_tables_have_no_value() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
-    for built in [Builder::new(), Builder::new().limits(vec![1.5; 320])] {
+    // Equal limits are not stored.
+    let limits = (0..320).map(|triangle| if triangle % 2 == 0 { 1.5 } else { 1.25 }).collect();
+    for built in [Builder::new(), Builder::new().limits(limits)] {
         let built = built.build(&mesh).expect("a valid mesh");
         let tree = built.tree::<u16>().expect("valid");
         let (last, outside) = (TriangleRow(319), TriangleRow(320));
