@@ -131,3 +131,31 @@ pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<bool, FormatEr
     }
     Ok(is_closed)
 }
+
+#[cfg(test)]
+mod tests {
+    use dibs_build::{Builder, IndexWidth, generate};
+
+    use super::*;
+
+    /// Why a tree whose header states this many triangles is refused; it has the rows of 320.
+    fn refusal<I: Index>(width: IndexWidth, triangles: u32) -> FormatError {
+        let mesh = generate::heart(320).expect("a valid size").mesh;
+        let built = Builder::new().index(width).build(&mesh).expect("a valid mesh");
+        let mut tree = Tree::<I>::from_bytes(built.blob()).expect("valid");
+        assert_eq!(check(&tree), Ok(true));
+        tree.header.triangles = triangles;
+        check(&tree).expect_err("rows are missing")
+    }
+
+    /// More than four rows with the same low 16 bits are too many, and a row without neighbours is refused.
+    #[test]
+    fn a_narrow_tree_has_at_most_four_rows_alike() {
+        let missing = FormatError::Neighbour { triangle: 320, edge: 0 };
+        let (most, more) = (MAX_NARROW_TRIANGLES, MAX_NARROW_TRIANGLES + 1);
+        let too_many = FormatError::Section { kind: format::section::ADJACENCY };
+        assert_eq!(refusal::<u16>(IndexWidth::Bits16, most), missing);
+        assert_eq!(refusal::<u16>(IndexWidth::Bits16, more), too_many);
+        assert_eq!(refusal::<u32>(IndexWidth::Bits32, more), missing);
+    }
+}
