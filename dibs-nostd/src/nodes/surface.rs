@@ -113,7 +113,7 @@ mod tests {
 
     use std::vec::Vec;
 
-    use dibs_build::{Builder, Volume, generate};
+    use dibs_build::{Builder, Unit, Volume, generate};
 
     use super::*;
     use crate::surface::MotionUnit;
@@ -148,5 +148,29 @@ mod tests {
             longest = longest.max(way);
         }
         assert!(longest > 1.5 && (longest - nodes.amplification()).abs() < 1e-3, "{longest}");
+    }
+
+    /// An odometer of the same nodes in another tree is replaced: its readings are no earlier ones of this tree.
+    #[test]
+    fn an_odometer_of_another_tree_is_replaced() {
+        let mesh = generate::heart(600).expect("a valid size").mesh;
+        let lattice = Volume::lattice(&mesh, [3, 3, 3]).expect("a lattice");
+        let builder = Builder::new().nodes(&lattice);
+        let built = builder.build(&mesh).expect("held");
+        let other = builder.unit(Unit::Metre).build(&mesh).expect("held");
+        let [tree, other] =
+            [&built, &other].map(|built| Tree::<u16>::from_bytes(built.blob()).expect("valid"));
+        let [nodes, others] = [&tree, &other].map(|tree| Nodes::of(tree).expect("valid"));
+        assert!(nodes.count() == others.count() && tree.checksum() != other.checksum());
+        let rest: Vec<Vec3> = (0..nodes.count()).filter_map(|at| nodes.rest_position(at)).collect();
+        let next: Vec<Vec3> = rest.iter().map(|at| *at + Vec3::X).collect();
+        let (from, to) = (nodes.surface(&rest[..]), nodes.surface(&next[..]));
+        for (mut odometer, is_kept) in [(nodes.odometer(), true), (others.odometer(), false)] {
+            let before = odometer.start(rest.as_slice()).motion().expect("measured");
+            let step = from.step(&to, &mut odometer);
+            let after = step.after().motion().expect("measured");
+            assert!(step.length() >= 0.999, "{}", step.length());
+            assert_eq!(after.since(&before).is_some(), is_kept);
+        }
     }
 }
