@@ -122,3 +122,16 @@ fn standard<F: Frame>(frame: &F) -> Option<u16> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_is_that_of_its_length() {
+        for (code, bytes) in (0..).zip(LENGTHS.map(usize::from)) {
+            assert_eq!((dlc_of(bytes), length_of(code)), (Some(code), bytes));
+            assert_eq!(length_of(code | 0xF0), bytes, "the upper four bits are ignored");
+        }
+    }
+}

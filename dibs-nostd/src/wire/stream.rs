@@ -247,6 +247,22 @@ mod tests {
             })
     }
 
+    /// A block without bytes between two zeros is a packet without bytes; zeros alone are none.
+    #[test]
+    fn a_packet_may_be_empty() {
+        let stream = [0, 0, 1, 0, 0, 2, 7, 0, 0];
+        let mut deframer = Deframer::<MTU>::new();
+        let mut outcomes = Vec::new();
+        for byte in stream {
+            outcomes.extend(deframer.push(byte).map(|outcome| outcome.map(<[u8]>::to_vec)));
+        }
+        let expected: [Outcome; 2] = [Ok(Vec::new()), Ok(Vec::from([7]))];
+        assert_eq!(outcomes, expected);
+        assert_eq!(outcomes, reference(&stream));
+        let mut framed = [9; framed_bytes(0)];
+        assert_eq!(enframe(&[], &mut framed), Some(&[1, 0][..]));
+    }
+
     proptest! {
         #[test]
         fn any_stream_is_decoded_as_the_crate_does(
