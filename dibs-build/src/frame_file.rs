@@ -6,7 +6,7 @@ use dibs_nostd::format::Unit;
 use glam::{DVec3, Vec3};
 
 use crate::frames::{FrameCheck, FrameError};
-use crate::read::{self, ReadError, ReadErrorKind};
+use crate::read::{self, ReadError, ReadErrorKind, Wanted};
 
 impl FrameCheck {
     /// Reads a mesh file that is a frame: positions in the order of the tree's rows.
@@ -22,7 +22,8 @@ impl FrameCheck {
     ) -> Result<Vec<Vec3>, ReadError> {
         let path = path.as_ref();
         let frame = || {
-            let (positions, faces) = read::frame(path, 0, unit, origin)?;
+            let wanted = if self.is_of_nodes() { Wanted::Volume } else { Wanted::Surface };
+            let (positions, faces) = read::frame(path, wanted, 0, unit, origin)?;
             let rows = self.to_rows(&positions);
             // The faces tell a frame of another mesh from one in another unit.
             if !matches!(rows, Err(FrameError::Vertices { .. } | FrameError::Nodes { .. })) {

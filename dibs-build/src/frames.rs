@@ -178,6 +178,10 @@ impl FrameCheck {
         if self.is_of_nodes { &[] } else { &self.triangles }
     }
 
+    pub(crate) const fn is_of_nodes(&self) -> bool {
+        self.is_of_nodes
+    }
+
     /// Positions of a frame: the vertices of the mesh's file, or the nodes.
     #[must_use]
     pub const fn positions(&self) -> usize {

@@ -1,6 +1,6 @@
 //! A numbered series of mesh files, each a frame: `heart_%03d.vtp`.
 
-use crate::read::{self, ReadError, ReadErrorKind};
+use crate::read::{self, ReadError, ReadErrorKind, Wanted};
 use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ fn frame(
     unit: Option<Unit>,
     origin: DVec3,
 ) -> Result<Vec<Vec3>, ReadErrorKind> {
-    let (positions, faces) = read::frame(path, number as usize, unit, origin)?;
+    let (positions, faces) = read::frame(path, Wanted::Surface, number as usize, unit, origin)?;
     if *of_first.get_or_insert_with(|| faces.clone()) != faces {
         return Err(ReadErrorKind::OtherTriangles);
     }

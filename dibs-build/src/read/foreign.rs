@@ -1,6 +1,6 @@
 //! Files of kinds that are not read: each with its name, and the command that converts it.
 
-use super::ReadErrorKind;
+use super::{ReadErrorKind, Wanted};
 use std::path::Path;
 
 /// How to convert a file to a mesh that can be read.
@@ -65,7 +65,7 @@ const ELEMENTS: &[(&[u8], &str, Remedy)] = &[
 const BEGINNING: usize = 1024;
 
 /// The error for a file of a kind that is known but not read.
-pub(super) fn named(bytes: &[u8], path: &Path) -> Option<ReadErrorKind> {
+pub(super) fn named(bytes: &[u8], path: &Path, wanted: Wanted) -> Option<ReadErrorKind> {
     let starts = |at: usize, mark: &[u8]| {
         let found = bytes.get(at..).and_then(|bytes| bytes.get(..mark.len()));
         found.is_some_and(|found| found.eq_ignore_ascii_case(mark))
@@ -79,19 +79,22 @@ pub(super) fn named(bytes: &[u8], path: &Path) -> Option<ReadErrorKind> {
         found.map(|(_, what, remedy)| (what, remedy))
     };
     let (what, remedy) = mark.or_else(element)?;
-    Some(ReadErrorKind::Foreign { what: (*what).to_owned(), remedy: remedy.text(path) })
+    Some(ReadErrorKind::Foreign { what: (*what).to_owned(), remedy: remedy.text(path, wanted) })
 }
 
 impl Remedy {
-    fn text(&self, path: &Path) -> String {
+    fn text(&self, path: &Path, wanted: Wanted) -> String {
+        let is_volume = wanted == Wanted::Volume;
         let old = path.display();
-        let new = path.with_extension("ply");
+        let new = path.with_extension(if is_volume { "vtu" } else { "ply" });
         let new = new.display();
         match self {
             Self::Meshio => format!("convert it: `meshio convert {old} {new}` (pip install meshio)"),
             Self::Assimp => format!("convert it: `assimp export {old} {new}`"),
             Self::Gmsh => {
-                format!("mesh its surface: `gmsh {old} -2 -o {}`", path.with_extension("msh").display())
+                let (what, dimension) = if is_volume { ("volume", 3) } else { ("surface", 2) };
+                let new = path.with_extension("msh");
+                format!("mesh its {what}: `gmsh {old} -{dimension} -o {}`", new.display())
             }
             Self::FreeSurfer => {
                 format!("convert it: `mris_convert {old} {}`", path.with_extension("stl").display())
@@ -103,7 +106,10 @@ impl Remedy {
                     .to_owned()
             }
             Self::Fetch => "fetch the mesh itself (`git lfs pull`, or another link)".to_owned(),
-            Self::Motion => "give the mesh here, and this file where a motion is asked for".to_owned(),
+            Self::Motion => {
+                let what = if is_volume { "volume" } else { "mesh" };
+                format!("give the {what} here, and this file where a motion is asked for")
+            }
         }
     }
 }

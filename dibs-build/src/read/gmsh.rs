@@ -8,7 +8,7 @@ use super::groups::FaceGroups;
 use super::raw::{Raw, excerpt};
 use super::scalar::{Endian, Scalar};
 use super::volume::{Shape, Volumes};
-use super::{Format, ReadErrorKind};
+use super::{Format, ReadErrorKind, Wanted};
 use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
@@ -22,10 +22,11 @@ enum Version {
     Four,
 }
 
-pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
+pub(super) fn read(bytes: &[u8], wanted: Wanted) -> Result<Raw> {
+    let groups = wanted == Wanted::Groups;
     let mut file = Cursor::new(bytes, Format::Gmsh);
     let version = header(&mut file)?;
-    let mut mesh = Mesh::default();
+    let mut mesh = Mesh { wanted, ..Mesh::default() };
     mesh.raw.groups = groups.then(FaceGroups::default);
     let (mut has_nodes, mut has_elements) = (false, false);
     while let Some(section) = file.word() {
@@ -63,7 +64,7 @@ pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
     if let (Some(groups), true) = (&mut raw.groups, raw.ends.is_empty()) {
         groups.names = volume_names;
     }
-    volumes.finish(&mut raw, groups, FLATTEN)?;
+    volumes.finish(&mut raw, groups, &flatten(wanted))?;
     // Without physical groups all numbers are 0.
     raw.groups = raw.groups.filter(|groups| groups.of_face.iter().any(|&n| n != 0.0));
     Ok(raw)
@@ -104,10 +105,15 @@ fn header(file: &mut Cursor<'_>) -> Result<Version> {
     Ok(if version.starts_with('2') { Version::Two } else { Version::Four })
 }
 
-const FLATTEN: &str = "mesh it again with flat elements: `gmsh MODEL.geo -2 -order 1 -o NEW.msh`";
+/// The remedy for curved elements.
+fn flatten(wanted: Wanted) -> String {
+    let dimension = if wanted == Wanted::Volume { 3 } else { 2 };
+    format!("mesh it again with flat elements: `gmsh MODEL.geo -{dimension} -order 1 -o NEW.msh`")
+}
 
 #[derive(Default)]
 struct Mesh {
+    wanted: Wanted,
     raw: Raw,
     /// The row of each node by its number.
     row: HashMap<u64, u32>,
@@ -228,7 +234,7 @@ impl Mesh {
             let group = self.physical.get(&(dimension as u64, entity as i64));
             let group = group.copied().unwrap_or(0.0);
             let kind = file.index(Scalar::I32)?;
-            let nodes = nodes_of(kind)?;
+            let nodes = nodes_of(kind, self.wanted)?;
             for _ in 0..file.index(Scalar::U64)? {
                 let tag = file.index(Scalar::U64)?;
                 let nodes = file.numbers(nodes, Scalar::U64, "nodes")?;
@@ -253,7 +259,7 @@ impl Mesh {
                 kind = file.index(Scalar::I32)?;
                 (block, tags) = (1, file.index(Scalar::I32)?);
             }
-            let nodes = nodes_of(kind)?;
+            let nodes = nodes_of(kind, self.wanted)?;
             for _ in 0..block {
                 let tag = tag.map_or_else(|| file.index(Scalar::I32), Ok)?;
                 // The first tag is the physical group, 0 for none.
@@ -273,7 +279,7 @@ impl Mesh {
             // The physical group, and the entity.
             let (group, _) = (file.text_number()?, file.text_number()?);
             let count = file.text_index()?;
-            if nodes_of(kind)? != count {
+            if nodes_of(kind, self.wanted)? != count {
                 let what = format!("element {tag} of the type {kind} has {count} nodes");
                 return Err(file.malformed(what));
             }
@@ -307,7 +313,9 @@ impl Mesh {
         let row = |&node: &f64| {
             let row = self.row.get(&file.whole(node)?).copied();
             row.ok_or_else(|| {
-                file.malformed(format!("element {tag} has node {node}, which is not there"))
+                file.malformed(format!(
+                    "element {tag} has node {node} (Gmsh's numbers), which is not there"
+                ))
             })
         };
         let rows = nodes.iter().map(row).collect::<Result<Vec<u32>>>()?;
@@ -332,7 +340,7 @@ fn skip_line(file: &mut Cursor<'_>) {
 }
 
 /// The number of nodes of an element of this type.
-fn nodes_of(kind: u64) -> Result<u64> {
+fn nodes_of(kind: u64, wanted: Wanted) -> Result<u64> {
     let curved = match kind {
         15 => return Ok(1),
         1 => return Ok(2),
@@ -355,12 +363,12 @@ fn nodes_of(kind: u64) -> Result<u64> {
         _ => {
             return Err(ReadErrorKind::Foreign {
                 what: format!("a Gmsh mesh with elements of the type {kind}, which is not read"),
-                remedy: FLATTEN.to_owned(),
+                remedy: flatten(wanted),
             });
         }
     };
     Err(ReadErrorKind::Foreign {
         what: format!("a Gmsh mesh of {curved}"),
-        remedy: FLATTEN.to_owned(),
+        remedy: flatten(wanted),
     })
 }

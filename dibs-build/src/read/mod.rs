@@ -137,7 +137,8 @@ impl ReadOptions {
 
     fn read_bytes(&self, bytes: Vec<u8>, path: &Path) -> Result<Import, ReadErrorKind> {
         self.check_options()?;
-        let (format, raw) = elements(bytes, path, self.groups)?;
+        let wanted = if self.groups { Wanted::Groups } else { Wanted::Surface };
+        let (format, raw) = elements(bytes, path, wanted)?;
         let mut import = self.import(format, raw)?;
         let extension = path.extension().and_then(|extension| extension.to_str());
         import.report.extension_disagrees = extension.is_some_and(|e| !format.has_extension(e));
@@ -199,6 +200,17 @@ impl ReadOptions {
     }
 }
 
+/// What is read from a file: the remedies in errors depend on it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    #[default]
+    Surface,
+    /// A surface, and the groups of its faces.
+    Groups,
+    /// The nodes of a volume of tetrahedra.
+    Volume,
+}
+
 /// The unit of a file's lengths: the one that it states, or else the given one, or millimetres.
 ///
 /// # Errors
@@ -222,11 +234,12 @@ pub(crate) fn unit_of(
 /// [`ReadErrorKind::UnnumberedFrame`] for STL, whose vertices may be numbered otherwise than the tree's.
 pub(crate) fn frame(
     path: &Path,
+    wanted: Wanted,
     number: usize,
     unit: Option<Unit>,
     origin: DVec3,
 ) -> Result<(Vec<Vec3>, Vec<Vec<u32>>), ReadErrorKind> {
-    let (format, raw) = elements(file::whole(path)?, path, false)?;
+    let (format, raw) = elements(file::whole(path)?, path, wanted)?;
     if matches!(format, Format::StlAscii | Format::StlBinary) {
         return Err(ReadErrorKind::UnnumberedFrame);
     }
@@ -240,7 +253,7 @@ pub(crate) fn volume(
     path: &Path,
     unit: Option<Unit>,
 ) -> Result<(Vec<DVec3>, Vec<[u32; 4]>), ReadErrorKind> {
-    let (format, raw) = elements(file::whole(path)?, path, false)?;
+    let (format, raw) = elements(file::whole(path)?, path, Wanted::Volume)?;
     if raw.other_cells > 0 || raw.tetrahedra.is_empty() {
         let (tetrahedra, others) = (raw.tetrahedra.len(), raw.other_cells);
         return Err(ReadErrorKind::NoVolume { format, tetrahedra, others });
@@ -254,23 +267,23 @@ pub(crate) fn volume(
 pub(crate) fn elements(
     bytes: Vec<u8>,
     path: &Path,
-    groups: bool,
+    wanted: Wanted,
 ) -> Result<(Format, Raw), ReadErrorKind> {
     // A binary STL may begin with any bytes.
     let bytes = if stl::size_fits_count(&bytes) { bytes } else { text::normal(bytes) };
-    let format = sniff::format(&bytes, path)?;
+    let format = sniff::format(&bytes, path, wanted)?;
     let raw = match format {
-        Format::Obj => obj::read(&bytes, groups),
+        Format::Obj => obj::read(&bytes, wanted == Wanted::Groups),
         Format::StlAscii => stl::read_ascii(&bytes),
         Format::StlBinary => stl::read_binary(&bytes),
         Format::Ply => ply::read(bytes),
         Format::Off => off::read(&bytes),
-        Format::Vtk => vtk::read(&bytes, groups),
-        Format::Gmsh => gmsh::read(&bytes, groups),
+        Format::Vtk => vtk::read(&bytes, wanted),
+        Format::Gmsh => gmsh::read(&bytes, wanted),
         // No file is recognised as this format.
         Format::Memory => Err(ReadErrorKind::UnknownFormat),
         #[cfg(feature = "formats")]
-        Format::Vtp => vtp::read(&bytes, groups),
+        Format::Vtp => vtp::read(&bytes, wanted),
         #[cfg(feature = "formats")]
         Format::Gltf => gltf::read(&bytes, path.parent().unwrap_or(Path::new(""))),
         #[cfg(feature = "formats")]

@@ -2,10 +2,10 @@
 
 use super::raw::{coordinate, lines};
 use super::text::trimmed;
-use super::{Format, ReadErrorKind, foreign, off, stl};
+use super::{Format, ReadErrorKind, Wanted, foreign, off, stl};
 use std::path::Path;
 
-pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind> {
+pub(super) fn format(bytes: &[u8], path: &Path, wanted: Wanted) -> Result<Format, ReadErrorKind> {
     if bytes.is_empty() {
         return Err(ReadErrorKind::Empty);
     }
@@ -39,7 +39,7 @@ pub(super) fn format(bytes: &[u8], path: &Path) -> Result<Format, ReadErrorKind>
     if named == Some(Format::ThreeMf) {
         return Ok(Format::ThreeMf);
     }
-    if let Some(foreign) = foreign::named(bytes, path) {
+    if let Some(foreign) = foreign::named(bytes, path, wanted) {
         return Err(foreign);
     }
     match named {

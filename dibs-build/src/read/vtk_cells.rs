@@ -1,10 +1,20 @@
 //! Cells of VTK's formats: faces, strips, and volumes, whose boundary is extracted.
 
-use super::ReadErrorKind;
 use super::raw::{Raw, excerpt};
 use super::volume::{Shape, Volumes};
+use super::{ReadErrorKind, Wanted};
 
-const FLATTEN: &str = "save it with flat cells: in ParaView, the filter Extract Surface, then Triangulate and Save Data";
+/// The remedy for curved cells.
+const fn flatten(wanted: Wanted) -> &'static str {
+    match wanted {
+        Wanted::Volume => {
+            "save it with linear tetrahedra: in ParaView, the filter Tetrahedralize and then Save Data"
+        }
+        _ => {
+            "save it with flat cells: in ParaView, the filter Extract Surface, then Triangulate and Save Data"
+        }
+    }
+}
 
 /// Cuts a list of points at each cell's end. The first offset may be the start of the first cell.
 pub(super) fn split(offsets: &[u64], points: &[u64]) -> Result<Vec<Vec<u32>>, String> {
@@ -33,6 +43,7 @@ pub(super) fn clamped(point: u64) -> u32 {
 #[derive(Default)]
 pub(super) struct Labelled {
     pub raw: Raw,
+    pub wanted: Wanted,
     /// A label for each cell of the piece.
     labels: Option<Vec<f64>>,
     /// Cells of the piece so far.
@@ -43,6 +54,10 @@ pub(super) struct Labelled {
 }
 
 impl Labelled {
+    pub fn of(wanted: Wanted) -> Self {
+        Self { wanted, ..Self::default() }
+    }
+
     /// Begins a piece of the file.
     pub fn begin(&mut self, labels: Option<Vec<f64>>) {
         (self.labels, self.cell) = (labels, 0);
@@ -146,7 +161,7 @@ impl Labelled {
                 };
                 return Err(ReadErrorKind::Foreign {
                     what: format!("a VTK grid with {what} of the type {kind}, which is not read"),
-                    remedy: FLATTEN.to_owned(),
+                    remedy: flatten(self.wanted).to_owned(),
                 });
             }
         };
@@ -174,7 +189,7 @@ impl Labelled {
     /// The faces; if there are none, the boundary of the volumes.
     pub fn end(mut self) -> Result<Raw, ReadErrorKind> {
         let has_labels = self.labels.is_some();
-        self.volumes.finish(&mut self.raw, has_labels, FLATTEN)?;
+        self.volumes.finish(&mut self.raw, has_labels, flatten(self.wanted))?;
         self.raw.remark(
             self.others,
             "cell was left out: points and lines are no surface",
@@ -184,7 +199,7 @@ impl Labelled {
     }
 }
 
-pub(super) fn not_a_surface(kind: &str) -> ReadErrorKind {
+pub(super) fn not_a_surface(kind: &str, wanted: Wanted) -> ReadErrorKind {
     let names_others = kind.starts_with('P') && kind != "PolyData" && kind.len() > 1
         || ["MultiBlock", "Collection", "Partitioned", "Composite", "AMR"]
             .iter()
@@ -197,9 +212,15 @@ pub(super) fn not_a_surface(kind: &str) -> ReadErrorKind {
                 .to_owned(),
         };
     }
+    let (what, remedy) = match wanted {
+        Wanted::Volume => ("tetrahedra", flatten(wanted)),
+        _ => (
+            "surface",
+            "save it as PolyData: in ParaView, the filter Extract Surface and then Save Data",
+        ),
+    };
     ReadErrorKind::Foreign {
-        what: format!("VTK data of the kind {kind}, which is no surface"),
-        remedy: "save it as PolyData: in ParaView, the filter Extract Surface and then Save Data"
-            .to_owned(),
+        what: format!("VTK data of the kind {kind}, which is no {what}"),
+        remedy: remedy.to_owned(),
     }
 }

@@ -6,7 +6,7 @@ use super::groups::is_name;
 use super::raw::{Raw, coordinate, excerpt};
 use super::scalar::{Endian, Scalar, index};
 use super::vtk_cells::{Labelled, not_a_surface, split};
-use super::{Format, ReadErrorKind, base64, inflate};
+use super::{Format, ReadErrorKind, Wanted, base64, inflate};
 use flate2::read::ZlibDecoder;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -17,11 +17,11 @@ type Result<T> = std::result::Result<T, ReadErrorKind>;
 /// The element whose content may not be XML.
 const APPENDED: &[u8] = b"<AppendedData";
 
-pub(super) fn read(bytes: &[u8], groups: bool) -> Result<Raw> {
+pub(super) fn read(bytes: &[u8], wanted: Wanted) -> Result<Raw> {
     let end = bytes.windows(APPENDED.len()).position(|window| window == APPENDED);
     let (head, appended) = bytes.split_at(end.unwrap_or(bytes.len()));
     let head = String::from_utf8_lossy(head);
-    let mut file = File { appended, has_groups: groups, ..File::default() };
+    let mut file = File { appended, surface: Labelled::of(wanted), ..File::default() };
     let mut xml = Reader::from_str(&head);
     // Only the end of the document is cut off.
     xml.config_mut().check_end_names = false;
@@ -77,8 +77,6 @@ struct File<'a> {
     is_compressed: bool,
     /// From the element `AppendedData` on.
     appended: &'a [u8],
-    /// Whether cell labels are requested.
-    has_groups: bool,
     /// `PolyData` or `UnstructuredGrid`.
     kind: String,
     /// Points, Polys, Strips, Cells, `CellData`, or others.
@@ -115,7 +113,7 @@ impl File<'_> {
             "VTKFile" => {
                 let kind = attribute("type")?.unwrap_or_default();
                 if !matches!(kind.as_str(), "PolyData" | "UnstructuredGrid") {
-                    return Err(not_a_surface(&kind));
+                    return Err(not_a_surface(&kind, self.surface.wanted));
                 }
                 self.kind = kind;
                 let is_big = attribute("byte_order")?.is_some_and(|order| order == "BigEndian");
@@ -177,7 +175,7 @@ impl File<'_> {
             "Polys" | "Strips" | "Cells" => {
                 matches!(name, "connectivity" | "offsets" | "types")
             }
-            "CellData" => self.has_groups && is_name(name),
+            "CellData" => self.surface.wanted == Wanted::Groups && is_name(name),
             _ => false,
         }
     }
@@ -202,8 +200,13 @@ impl File<'_> {
         if self.surface.has_volumes() {
             return Err(ReadErrorKind::Foreign {
                 what: "a VTK grid of volume cells in several pieces".to_owned(),
-                remedy: "save its skin: in ParaView, the filters Merge Blocks and Extract Surface"
-                    .to_owned(),
+                remedy: match self.surface.wanted {
+                    Wanted::Volume => {
+                        "join them: in ParaView, the filter Merge Blocks and then Save Data"
+                    }
+                    _ => "save its skin: in ParaView, the filters Merge Blocks and Extract Surface",
+                }
+                .to_owned(),
             });
         }
         self.surface.begin(labels);
