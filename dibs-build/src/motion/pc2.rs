@@ -193,7 +193,7 @@ pub(super) fn parse(bytes: &[u8], place: &FileCoordinates) -> Result<Motion, Rea
     let after = (data.len() as u64).checked_sub(length);
     if rate.is_none() && after.is_none_or(|after| after >= frame_bytes) {
         return Err(ReadErrorKind::Count {
-            element: format!("frames of {points} vertices"),
+            element: format!("frames of {points} points"),
             claimed: samples,
             found: data.len() as u64 / frame_bytes,
             at_most: false,

@@ -65,7 +65,9 @@ pub enum ReadErrorKind {
     )]
     NumPyArchive,
     /// A NumPy array that is not a motion.
-    #[error("no motion: {what}; save it by `numpy.save(name, frames)`, of frames x vertices x 3")]
+    #[error(
+        "no motion: {what}; save it by `numpy.save(name, frames)`, of frames x vertices (or nodes) x 3"
+    )]
     NumPy {
         /// What is wrong with it.
         what: String,
@@ -101,9 +103,9 @@ pub enum ReadErrorKind {
         "STL has no vertex numbers, so its vertices are not those of other frames; export the series as PLY"
     )]
     UnnumberedFrame,
-    /// A frame of a series has other triangles than the first.
+    /// A frame of a series has other triangles than the first, or is of other tetrahedra.
     #[error(
-        "its triangles are not those of the series' first file; export every frame of one mesh, with vertices in the same order"
+        "its triangles or tetrahedra are not those of the series' first file; export every frame of one mesh or volume, with vertices in the same order"
     )]
     OtherTriangles,
     /// It violates its format.
@@ -176,7 +178,9 @@ pub enum ReadErrorKind {
         most: usize,
     },
     /// A coordinate is NaN or infinite.
-    #[error("{vertex} has the coordinate {value}, which is not a finite number; repair the mesh")]
+    #[error(
+        "{vertex} has the coordinate {value}, which is not a finite number; repair it, or export the file again"
+    )]
     NonFinite {
         /// The vertex, in the file's own terms.
         vertex: String,

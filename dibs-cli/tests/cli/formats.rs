@@ -206,7 +206,7 @@ fn a_series_has_no_gap_and_one_mesh() {
     let mut other = mesh.clone();
     other.triangles.swap(0, 1);
     other.write_ply(folder.join("a10.ply")).unwrap();
-    assert!(fails("a%d.ply").contains("a10.ply: its triangles are not those"));
+    assert!(fails("a%d.ply").contains("a10.ply: its triangles or tetrahedra are not those"));
     std::fs::remove_file(folder.join("a10.ply")).unwrap();
     assert!(
         fails("a%d.ply").contains("a10.ply: missing in its series, which goes on with number 11")
