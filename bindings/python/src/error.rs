@@ -23,7 +23,7 @@ const ADVICE: [(&str, &str); 14] = [
     ("--unit m", "unit='m'"),
     ("(--unit states", "(unit states"),
     ("(--unit)", "(unit)"),
-    ("`dibs stretch MESH MOTION --limits FILE` writes one", "`MotionStretch.limits` makes one"),
+    ("`dibs stretch MESH --motion MOTION --limits FILE` writes one", "`MotionStretch.limits` makes one"),
 ];
 
 /// A sentence of the library with Python's names of the options.

@@ -31,8 +31,18 @@ pub enum LimitsErrorKind {
     #[error("cannot be read ({0})")]
     Io(#[from] std::io::Error),
     /// It does not start as a file of limits.
-    #[error("is no file of stretch limits: `dibs stretch MESH MOTION --limits FILE` writes one")]
+    #[error(
+        "is no file of stretch limits: `dibs stretch MESH --motion MOTION --limits FILE` writes one"
+    )]
     NotLimits,
+    /// It has limits of triangles where those of tetrahedra are needed, or the reverse.
+    #[error("has limits of {found}, and those of {expected} are needed: {}", remedy(found))]
+    OtherKind {
+        /// `triangles`, or `tetrahedra` if a volume moves the surface.
+        expected: &'static str,
+        /// The other.
+        found: &'static str,
+    },
     /// The limits are of another mesh.
     #[error(
         "is of mesh {found:08x}, this one is {expected:08x}: write it anew for this mesh or volume, with \
@@ -61,6 +71,17 @@ pub enum LimitsErrorKind {
         text: String,
     },
 }
+
+fn remedy(found: &str) -> &'static str {
+    if found == TETRAHEDRA {
+        "give the volume as well (--nodes VOLUME), or the file of `dibs stretch MESH --motion MOTION --limits FILE`"
+    } else {
+        "leave --nodes out, or give the file of `dibs stretch MESH --nodes VOLUME --motion MOTION --limits FILE`"
+    }
+}
+
+const TRIANGLES: &str = "triangles";
+const TETRAHEDRA: &str = "tetrahedra";
 
 /// Writes limits for the triangles of a mesh, after a comment.
 ///
@@ -127,7 +148,7 @@ impl Limited {
             .flat_map(Vec3::to_array)
             .for_each(|x| digest.update(&x.to_le_bytes()));
         mesh.triangles.iter().flatten().for_each(|corner| digest.update(&corner.to_le_bytes()));
-        Self { elements: "triangles", count: mesh.triangles.len(), checksum: digest.finalize() }
+        Self { elements: TRIANGLES, count: mesh.triangles.len(), checksum: digest.finalize() }
     }
 
     fn tetrahedra(volume: &Volume) -> Self {
@@ -142,11 +163,7 @@ impl Limited {
             .iter()
             .flatten()
             .for_each(|corner| digest.update(&corner.to_le_bytes()));
-        Self {
-            elements: "tetrahedra",
-            count: volume.tetrahedra().len(),
-            checksum: digest.finalize(),
-        }
+        Self { elements: TETRAHEDRA, count: volume.tetrahedra().len(), checksum: digest.finalize() }
     }
 
     fn write(&self, path: &Path, limits: &[f32], comment: &str) -> Result<(), WriteError> {
@@ -180,10 +197,16 @@ fn parse(text: &str, of: &Limited) -> Result<Vec<f32>, LimitsErrorKind> {
         return Err(LimitsErrorKind::NotLimits);
     }
     let found = field("mesh").and_then(|digits| u32::from_str_radix(digits, 16).ok());
-    let count = field(of.elements).and_then(|digits| digits.parse::<usize>().ok());
-    let (Some(found), Some(count)) = (found, count) else {
+    let counted = lines.next().and_then(|(_, line)| line.split_once(' '));
+    let count = counted.and_then(|(_, digits)| digits.parse::<usize>().ok());
+    let (Some(found), Some((elements, _)), Some(count)) = (found, counted, count) else {
         return Err(LimitsErrorKind::NotLimits);
     };
+    match [TRIANGLES, TETRAHEDRA].into_iter().find(|&kind| kind == elements) {
+        Some(kind) if kind == of.elements => {}
+        Some(found) => return Err(LimitsErrorKind::OtherKind { expected: of.elements, found }),
+        None => return Err(LimitsErrorKind::NotLimits),
+    }
     if found != of.checksum {
         return Err(LimitsErrorKind::OtherMesh { expected: of.checksum, found });
     }

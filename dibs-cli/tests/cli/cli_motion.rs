@@ -202,7 +202,10 @@ fn limits_that_cannot_be_used_are_named() {
         ("build other.ply -o t.dibs --limits heart.limits", "is of mesh"),
         ("build heart.ply -o t.dibs --limits short.limits", "has 496 limits, 1000 are needed"),
         ("build heart.ply -o t.dibs --limits low.limits", "'0.5' is not a limit"),
-        ("build heart.ply -o t.dibs --limits none.limits", "no file of stretch limits"),
+        (
+            "build heart.ply -o t.dibs --limits none.limits",
+            "no file of stretch limits: `dibs stretch MESH --motion MOTION",
+        ),
         ("build heart.ply -o t.dibs --limits missing.limits", "cannot be read"),
         ("stretch heart.ply --motion other.pc2", "vertices and the mesh has"),
         ("stretch heart.ply --motion heart.pc2 --margin=-1", "a margin of -1 makes no sense"),
