@@ -60,7 +60,8 @@ pub enum FrameError {
     },
     /// A tetrahedron of a volume is turned inside out, or flat.
     #[error(
-        "turns the tetrahedron {tetrahedron} (nodes {}) inside out, or flat: no stretch limit admits that, mend the frame",
+        "turns the tetrahedron {tetrahedron} (nodes {}; all counted from 0) inside out, or flat: no stretch limit admits that, \
+         mend the frame",
         numbers(nodes)
     )]
     Inverted {

@@ -62,7 +62,7 @@ fn check_frames<I: Index>(tree: &Tree<'_, I>, path: &Path, frames: &[Vec<Vec3>])
         let at = || format!("{}, frame {number}", path.display());
         let rows = check.to_rows(frame).map_err(|error| anyhow!("{}: {error}", at()))?;
         if let Err(error) = Nodes::of(tree)?.measure(rows.as_slice()) {
-            let remedy = "build with a larger --stretch";
+            let remedy = "build with a larger --stretch, or with --limits that allow it";
             bail!("{}: {}", at(), SurfaceRows::refusal(tree, error, remedy));
         }
     }

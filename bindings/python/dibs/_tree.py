@@ -139,7 +139,10 @@ class Surface:
 
     @property
     def stretch(self) -> Optional[float]:
-        """The largest stretch of any triangle relative to the rest shape; `None` if the tree cannot measure it."""
+        """The largest stretch of any triangle, or tetrahedron of a volume, relative to the rest shape.
+
+        `None` if the tree cannot measure it.
+        """
         return self._native.stretch()
 
     def query(
@@ -239,7 +242,7 @@ class Tree:
         return self.rest if positions is None and velocities is None else Surface(self, positions, velocities)
 
     def stretch(self, positions: npt.ArrayLike) -> Optional[float]:
-        """The largest stretch of any triangle of a surface relative to the rest shape."""
+        """The largest stretch of any triangle of a surface, or tetrahedron of its volume, relative to the rest shape."""
         return Surface(self, positions).stretch
 
     def query(

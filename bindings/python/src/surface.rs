@@ -39,7 +39,7 @@ impl Surface {
     fn stretch(&self) -> Option<f64> {
         let measured = self.stretch?;
         let largest =
-            of_any_width!(self.tree.view(), tree => largest_stretch(tree, self.rows.positions()));
+            of_any_width!(self.tree.view(), tree => largest_stretch(tree, self.rows.frame()));
         Some(largest.unwrap_or(measured.sigma().into()))
     }
 }

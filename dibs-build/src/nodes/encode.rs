@@ -62,18 +62,21 @@ pub(crate) fn least_limit(corners: [DVec3; 4]) -> Option<f64> {
 
 /// The least limit of any tetrahedron of a built volume; the tree's, if all have that.
 pub(crate) fn least_stretch_limit(nodes: &Nodes<'_>) -> f32 {
-    let limit = |element| {
-        let corners = nodes.element(element)?.map(|node| nodes.rest_position(node));
-        let [a, b, c, d] = corners.map(|corner| corner.map(Vec3::as_dvec3));
-        // The stored limit is lower by the margin for rounding; this restores the limit that the builder was given.
-        let scale = 1.0 + MARGIN / openness(edges([a?, b?, c?, d?]));
-        Some(f64::from(nodes.element_limit(element)?) * scale.sqrt())
-    };
-    let tree = nodes.stretch_limit();
-    let least = (0..nodes.element_count()).filter_map(limit).fold(f64::INFINITY, f64::min);
+    let limits = (0..nodes.element_count()).filter_map(|element| own_limit(nodes, element));
+    limits.fold(nodes.stretch_limit(), f32::min)
+}
+
+/// The limit of a tetrahedron of a built volume that the builder was given; `None` outside the table.
+pub(crate) fn own_limit(nodes: &Nodes<'_>, element: u32) -> Option<f32> {
+    let corners = nodes.element(element)?.map(|node| nodes.rest_position(node));
+    let [a, b, c, d] = corners.map(|corner| corner.map(Vec3::as_dvec3));
+    // The stored limit is lower by the margin for rounding.
+    let scale = 1.0 + MARGIN / openness(edges([a?, b?, c?, d?]));
+    let own = f64::from(nodes.element_limit(element)?) * scale.sqrt();
     // Rounded to the digits that are certain: the two computations differ in the last digits.
-    let least = ((least * 1e5).round() / 1e5) as f32;
-    if least < tree * (1.0 - 1e-5) { least } else { tree }
+    let own = ((own * 1e5).round() / 1e5) as f32;
+    let tree = nodes.stretch_limit();
+    Some(if own < tree * (1.0 - 1e-5) { own } else { tree })
 }
 
 /// A tetrahedron at rest.

@@ -8,7 +8,7 @@ mod paths;
 mod volume;
 
 pub(crate) use binding::Embedding;
-pub(crate) use encode::{encode, least_limit, least_stretch_limit};
+pub(crate) use encode::{encode, least_limit, least_stretch_limit, own_limit};
 pub(crate) use paths::VolumePaths;
 pub use volume::{Volume, VolumeError};
 pub(crate) use volume::{edges, largest_stretch};

@@ -3,6 +3,7 @@
 mod file;
 
 use dibs_nostd::format::PathKind;
+use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree, TriangleRow};
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use rayon::prelude::*;
@@ -205,15 +206,27 @@ impl MotionStretch {
     }
 }
 
-/// The largest stretch of any triangle of a surface whose vertices are in the order of the tree's rows, in f64; `None`
-/// if the tree has no rest shape, a position is missing, or the limits are those of tetrahedra.
-/// [`MeasuredStretch`](dibs_nostd::MeasuredStretch) is the factor for the tree's radii instead: if triangles have their
-/// own limits, it multiplies a triangle's stretch by the tree's limit over the triangle's.
+/// The largest stretch of any triangle of a surface whose vertices are in the order of the tree's rows, or of any element
+/// for the nodes of a tree with [nodes](dibs_nostd::nodes), in f64; `None` if the tree has no rest shape, or positions are
+/// missing. [`MeasuredStretch`](dibs_nostd::MeasuredStretch) is the factor for the tree's radii instead: if triangles or
+/// elements have their own limits, it multiplies one's stretch by the tree's limit over its own.
 #[must_use]
 pub fn largest_stretch<I: Index>(tree: &Tree<'_, I>, rows: &[Vec3]) -> Option<f64> {
     let kind = tree.paths();
     if kind == PathKind::Volume {
-        return None;
+        let nodes = Nodes::of(tree).ok().filter(|nodes| rows.len() == nodes.count() as usize)?;
+        let stretch = |element| {
+            let corners = nodes.element(element)?;
+            let [a, b, c, d] = corners.map(|node| nodes.rest_position(node).map(Vec3::as_dvec3));
+            let rest = edges([a?, b?, c?, d?]);
+            Some(largest_stretch_of(
+                rest,
+                edges(corners.map(|node| rows[node as usize].as_dvec3())),
+            ))
+        };
+        return (0..nodes.element_count())
+            .map(stretch)
+            .try_fold(0.0, |most, now| Some(f64::max(most, now?)));
     }
     let paths = if kind == PathKind::EdgePath { Paths::Edges } else { Paths::default() };
     let mut largest = 0.0;

@@ -53,8 +53,8 @@ impl<'a> Surface<'a> {
             AnyTree::Wide(tree) => measured(tree, path, vertices, frame, lengths, &shown)?,
         };
         let largest = match &tree {
-            AnyTree::Narrow(tree) => largest_stretch(tree, rows.positions()),
-            AnyTree::Wide(tree) => largest_stretch(tree, rows.positions()),
+            AnyTree::Narrow(tree) => largest_stretch(tree, rows.frame()),
+            AnyTree::Wide(tree) => largest_stretch(tree, rows.frame()),
         };
         // Without a rest shape only the factor for radii is known, which is at least as large.
         let stretch = measured.map(|measured| largest.unwrap_or(measured.sigma().into()));
@@ -273,7 +273,7 @@ fn framed<I: Index>(
     frame: &[Vec3],
 ) -> Result<(SurfaceRows, Option<f64>, Option<MeasuredStretch>)> {
     let rows = SurfaceRows::of(tree, FrameCheck::of(tree).to_rows(frame)?)?;
-    let largest = largest_stretch(tree, rows.positions());
+    let largest = largest_stretch(tree, rows.frame());
     let measured = within_limit(tree, &rows)?;
     Ok((rows, largest, measured))
 }

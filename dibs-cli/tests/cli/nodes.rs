@@ -194,7 +194,7 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
         ("heart.ply", "with 0 tetrahedra and 0 other volume cells"),
         ("absent.msh", "absent.msh: cannot be read"),
         ("lattice:0,1,1", "a lattice of 0 x 1 x 1 cells cannot be stored"),
-        ("lattice:2,2,3 --stretch 1.01 --motion nodes.pc2", "nodes.pc2, frame 1: element"),
+        ("lattice:2,2,3 --stretch 1.01 --motion nodes.pc2", "nodes.pc2, frame 1: the element of the nodes"),
         ("lattice:3,2,3 --motion nodes.pc2", "frame 0: has 36 points and the tree has 48 nodes"),
     ] {
         let error = fails(folder, &format!("build heart.ply -o heart.dibs --nodes {nodes}"));
