@@ -237,7 +237,7 @@ fn warn(label: &str, warnings: impl Iterator<Item = String>) {
 }
 
 /// The command line's options in the library's sentences, and what a script calls instead.
-const CALLS: [(&str, &str); 12] = [
+const CALLS: [(&str, &str); 13] = [
     ("`dibs build --orient`", "`.orient()`"),
     ("--orient", "`.orient()`"),
     ("without --strict", "without `strict` in `.reading(..)`"),
@@ -250,6 +250,7 @@ const CALLS: [(&str, &str); 12] = [
     ("--unit um", "`.unit(Unit::Micrometre)`"),
     ("--unit m", "`.unit(Unit::Metre)`"),
     ("--unit", "`.unit(..)`"),
+    ("(--bind-within)", "(`Volume::bind_within`)"),
 ];
 
 /// A sentence of the library, with a script's calls.
@@ -333,6 +334,8 @@ mod tests {
             compiled!(.unit(Unit::Inch)),
             compiled!(.unit(Unit::Micrometre)),
         ];
+        let _: fn(crate::Volume, f64) -> crate::Volume = crate::Volume::bind_within;
+        compiled.push("`Volume::bind_within`".to_owned());
         // A sentence may name a call or a field without its argument or value.
         for end in ["(", ": "] {
             let short = |text: &String| text.split_once(end).map(|(name, _)| name.to_owned());

@@ -7,8 +7,8 @@ use crate::{modes, overwrite, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
-    Beyond, Builder, BuiltTree, Group, Import, IndexWidth, Mesh, Needed, Volume, orient,
-    read_labels, read_limits,
+    Beyond, BuildError, Builder, BuiltTree, Group, Import, IndexWidth, Mesh, Needed, Volume,
+    orient, read_labels, read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, value_name = "VOLUME", value_parser = nodes::parse, conflicts_with = "modes")]
     nodes: Option<VolumeSpec>,
     /// Bind vertices outside of the volume to the nearest tetrahedron, within this distance (mm)
-    #[arg(long, value_name = "MM", requires = "nodes", default_value_t = 0.0)]
+    #[arg(long, value_name = "MM", value_parser = nodes::parse_distance, requires = "nodes", default_value_t = 0.0)]
     bind_within: f64,
     /// A label for each face of the file or triangle of the mesh, say of its tissue: text, one number from 0 to 255 a
     /// line, in the file's order
@@ -136,8 +136,15 @@ pub fn run(args: &Args) -> Result<()> {
         (Some(path), Some(_)) => Some(modes::fit(mesh, path, &args.reading.lengths)?),
         _ => None,
     };
-    let mut tree = build(args, &import, limits, labels, volume.as_ref())
-        .map_err(|error| anyhow!("{name}: no tree can be built: {error}"))?;
+    let mut tree =
+        build(args, &import, limits, labels, volume.as_ref()).map_err(|error| {
+            match (&error, nodes) {
+                (BuildError::Volume(_), Some(volume)) => {
+                    anyhow!("{volume}: no tree can be built: {error}")
+                }
+                _ => anyhow!("{name}: no tree can be built: {error}"),
+            }
+        })?;
     if let (Some(path), Some(_)) = (&args.motion, nodes) {
         nodes::check_covered(&tree, path, &args.reading.lengths)?;
     }
@@ -207,7 +214,7 @@ fn build(
     limits: Option<Vec<f32>>,
     labels: Option<Vec<u8>>,
     volume: Option<&Volume>,
-) -> Result<BuiltTree, dibs_build::BuildError> {
+) -> Result<BuiltTree, BuildError> {
     let bar = mesh_file::progress_bar("building", import.mesh.triangles.len());
     let progress = |done: usize| bar.set_position(done as u64);
     let builder = match limits {

@@ -1,11 +1,12 @@
 //! Volumes whose nodes move a surface, on the command line.
 
 use crate::mesh_file::Lengths;
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::glam::Vec3;
 use dibs_build::{BuiltTree, FrameCheck, Mesh, SurfaceRows, Volume};
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// The argument `VOLUME`: a file, or `lattice:NX,NY,NZ`.
@@ -17,6 +18,9 @@ pub enum VolumeSpec {
 
 /// Parses the argument of `--nodes`.
 pub fn parse(text: &str) -> Result<VolumeSpec> {
+    if text.is_empty() {
+        bail!("expected a file of tetrahedra, or lattice:NX,NY,NZ");
+    }
     let Some(cells) = text.strip_prefix("lattice:") else {
         return Ok(VolumeSpec::File(text.into()));
     };
@@ -24,6 +28,25 @@ pub fn parse(text: &str) -> Result<VolumeSpec> {
     match numbers.collect::<Result<Vec<_>, _>>().as_deref() {
         Ok(&[x, y, z]) => Ok(VolumeSpec::Lattice([x, y, z])),
         _ => Err(anyhow!("expected lattice:NX,NY,NZ, the cells along each axis")),
+    }
+}
+
+/// Parses the argument of `--bind-within`.
+pub fn parse_distance(text: &str) -> Result<f64> {
+    // Written so that NaN is refused.
+    text.parse()
+        .ok()
+        .filter(|distance| *distance >= 0.0)
+        .context("expected a distance of at least 0")
+}
+
+/// What it is called in an error.
+impl fmt::Display for VolumeSpec {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => write!(f, "{}", path.display()),
+            Self::Lattice([x, y, z]) => write!(f, "--nodes lattice:{x},{y},{z}"),
+        }
     }
 }
 
@@ -41,7 +64,7 @@ impl VolumeSpec {
         match self {
             Self::File(path) => Ok(Volume::read(path, lengths.unit())?),
             Self::Lattice(cells) => {
-                Volume::lattice(mesh, *cells).map_err(|error| anyhow!("--nodes: {error}"))
+                Volume::lattice(mesh, *cells).map_err(|error| anyhow!("{self}: {error}"))
             }
         }
     }

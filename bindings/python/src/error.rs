@@ -9,7 +9,7 @@ use std::fmt::Display;
 use std::io::ErrorKind;
 
 /// Advice for the command line in the library's errors, and the same for Python.
-const ADVICE: [(&str, &str); 14] = [
+const ADVICE: [(&str, &str); 15] = [
     ("`dibs build --orient` turns them", "orient=True turns them"),
     ("with --orient", "with orient=True"),
     ("--orient, unless", "orient=True, unless"),
@@ -23,6 +23,7 @@ const ADVICE: [(&str, &str); 14] = [
     ("--unit m", "unit='m'"),
     ("(--unit states", "(unit states"),
     ("(--unit)", "(unit)"),
+    ("(--bind-within)", "(bind_within)"),
     ("`dibs stretch MESH --motion MOTION --limits FILE` writes one", "`MotionStretch.limits` makes one"),
 ];
 

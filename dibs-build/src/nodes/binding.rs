@@ -124,7 +124,7 @@ impl Embedding {
         for (tetrahedron, &number) in self.order.iter().enumerate() {
             let corners = self.tetrahedra[tetrahedron].map(|node| self.nodes[node as usize]);
             let least = least_limit(corners.map(Vec3::as_dvec3));
-            let least = least.ok_or(VolumeError::Shape { tetrahedron: number })?;
+            let least = least.ok_or_else(|| self.unmeasurable(tetrahedron))?;
             own.push(limits.map_or(stretch, |limits| limits[number]).max(round_up(least)));
         }
         let most = own.iter().copied().fold(1.0, f32::max);
@@ -145,9 +145,12 @@ impl Embedding {
         self.ratios.get(tetrahedron as usize).copied().unwrap_or(1.0)
     }
 
-    /// The volume's index of a tetrahedron.
-    pub fn number(&self, tetrahedron: usize) -> usize {
-        self.order[tetrahedron]
+    /// The error for a tetrahedron whose stretch the controller cannot measure.
+    pub fn unmeasurable(&self, tetrahedron: usize) -> VolumeError {
+        if self.is_box {
+            return VolumeError::CellShape;
+        }
+        VolumeError::Shape { tetrahedron: self.order[tetrahedron] }
     }
 
     /// A weight as a tree stores it.

@@ -112,8 +112,7 @@ fn shapes(embedding: &Embedding, stretch: f32) -> Result<Vec<Shape>, VolumeError
         let is_possible = openness >= FLAT
             && edges.determinant() > volume
             && shape.squares().iter().all(|square| possible.contains(square));
-        let number = embedding.number(tetrahedron);
-        if is_possible { Ok(shape) } else { Err(VolumeError::Shape { tetrahedron: number }) }
+        if is_possible { Ok(shape) } else { Err(embedding.unmeasurable(tetrahedron)) }
     };
     embedding.tetrahedra.iter().enumerate().map(shape).collect()
 }

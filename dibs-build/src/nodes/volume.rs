@@ -40,7 +40,10 @@ pub enum VolumeError {
         tetrahedra: usize,
     },
     /// A tetrahedron names a node that does not exist.
-    #[error("tetrahedron {tetrahedron} uses node {node}, the volume has {nodes} nodes")]
+    #[error(
+        "tetrahedron {tetrahedron} (counted from 0) refers to node {node}, but the volume has {nodes} nodes numbered from \
+         0: export it again"
+    )]
     Corner {
         /// The tetrahedron.
         tetrahedron: usize,
@@ -50,14 +53,17 @@ pub enum VolumeError {
         nodes: usize,
     },
     /// A node has a coordinate that is not finite.
-    #[error("node {node} has a coordinate that is not a finite number")]
+    #[error(
+        "node {node} (counted from 0) has a coordinate that is not a finite number: repair the volume, or export it again"
+    )]
     Coordinate {
         /// The node.
         node: usize,
     },
     /// Tetrahedra whose nodes are numbered inside out, or which are mirrored.
     #[error(
-        "{count} tetrahedra are inverted at rest (the first is {first}): exchange two nodes of each, or mend the mesh"
+        "tetrahedron {first} (counted from 0) is inverted at rest{}: exchange two nodes of {}, or mend the mesh",
+        others(*count), if *count > 1 { "each" } else { "it" }
     )]
     Inverted {
         /// Their number.
@@ -67,13 +73,19 @@ pub enum VolumeError {
     },
     /// A tetrahedron so flat, small or large that its stretch cannot be measured in f32.
     #[error(
-        "tetrahedron {tetrahedron} is too flat, small or large for the controller's stretch check: mesh the volume again, \
-         with edges of 0.01 mm to 10 m"
+        "tetrahedron {tetrahedron} (counted from 0) is too flat, small or large for the controller's stretch check: mesh \
+         the volume again, with edges of 0.01 mm to 10 m"
     )]
     Shape {
         /// The tetrahedron.
         tetrahedron: usize,
     },
+    /// Cells of a lattice so thin, small or large that their stretch cannot be measured in f32.
+    #[error(
+        "the lattice's cells are too thin, small or large for the controller's stretch check: give fewer of them, or the \
+         unit of the surface's file (--unit)"
+    )]
+    CellShape,
     /// Parts that no shared node connects.
     #[error("the volume has {parts} parts that share no node: join them, or build a tree for each")]
     Apart {
@@ -82,8 +94,9 @@ pub enum VolumeError {
     },
     /// Vertices of the surface that are in no tetrahedron.
     #[error(
-        "{count} vertices of the surface are outside the volume (the first is {first}), the farthest by {distance:.3} mm: \
-         give a volume that holds the surface, in its unit and coordinates, or bind vertices within that distance"
+        "vertex {first} (counted from 0) of the surface is outside the volume{}, by up to {distance:.3} mm: give a volume \
+         that holds the surface, in its unit and coordinates, or bind vertices within that distance (--bind-within)",
+        others(*count)
     )]
     Outside {
         /// Their number.
@@ -95,8 +108,8 @@ pub enum VolumeError {
     },
     /// A thin tetrahedron would extrapolate to this vertex so far that errors of its nodes grow threefold.
     #[error(
-        "vertex {vertex} of the surface is {distance:.3} mm outside of a tetrahedron that is about as thin: mesh the volume \
-         coarser there, or let it hold the vertex"
+        "vertex {vertex} (counted from 0) of the surface is {distance:.3} mm outside of a tetrahedron that is about as thin, \
+         too far to bind it (--bind-within): mesh the volume coarser there, or let it hold the vertex"
     )]
     Lever {
         /// The first such vertex.
@@ -115,6 +128,15 @@ pub enum VolumeError {
     },
 }
 
+/// The elements besides the named one of which the same is true.
+fn others(count: usize) -> String {
+    match count {
+        ..=1 => String::new(),
+        2 => ", and so is 1 other".to_owned(),
+        count => format!(", and so are {} others", count - 1),
+    }
+}
+
 impl Volume {
     /// A volume of these nodes, in millimetres and the coordinates of the surface's file, and tetrahedra of them. Seen
     /// from the fourth node of each, the first three run counterclockwise: as VTK and Gmsh number them.
@@ -129,7 +151,7 @@ impl Volume {
     /// A lattice of cells around a mesh, each cut into six tetrahedra, with a margin of a thousandth of its size.
     ///
     /// # Errors
-    /// [`VolumeError::Cells`] for no cells, or too many; [`VolumeError::Shape`] for cells too small.
+    /// [`VolumeError::Cells`] for no cells, or too many; the builder refuses cells too small or large.
     pub fn lattice(mesh: &Mesh, cells: [u32; 3]) -> Result<Self, VolumeError> {
         let bounds = [DVec3::INFINITY, DVec3::NEG_INFINITY];
         // Vertices of no triangle may be anywhere.

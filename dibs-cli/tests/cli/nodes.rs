@@ -12,7 +12,7 @@ use dibs_build::{Motion, Volume};
 use dibs_nostd::nodes::{NodeMonitor, Nodes};
 use dibs_nostd::{Advance, Assembler, Frames, Millis, SurfaceLimits, Tree, VertexTable};
 
-use crate::program::{fails, json, succeeds};
+use crate::program::{dibs, fails, json, succeeds};
 
 /// Nodes of the lattice below.
 const NODES: usize = 36;
@@ -155,7 +155,9 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
     let smaller: Vec<DVec3> = volume.nodes().iter().map(|at| *at * 0.97).collect();
     std::fs::write(folder.join("smaller.vtk"), vtk(&smaller, volume.tetrahedra())).unwrap();
     let bound = "build heart.ply -o bound.dibs --nodes smaller.vtk --bind-within";
-    assert!(fails(folder, &format!("{bound} 0.01")).contains("bind vertices within that distance"));
+    assert!(
+        fails(folder, &format!("{bound} 0.01")).contains("within that distance (--bind-within)")
+    );
     let bound = json(folder, &format!("{bound} 3 --json"));
     assert!(bound["tree"]["volume"]["amplification"].as_f64().unwrap() > 1.01);
     assert!(succeeds(folder, "inspect bound.dibs").contains("outside  vertices move up to 1."));
@@ -186,15 +188,19 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
     let mut inverted = volume.tetrahedra().to_vec();
     inverted[5].swap(0, 1);
     std::fs::write(folder.join("inverted.msh"), msh(volume.nodes(), &inverted)).unwrap();
-    std::fs::write(folder.join("wrong.vtk"), vtk(volume.nodes(), &[[0, 1, 2, 99]])).unwrap();
     for (nodes, part) in [
-        ("shifted.vtk", "vertices of the surface are outside the volume (the first is"),
-        ("inverted.msh", "inverted.msh: 1 tetrahedra are inverted at rest (the first is 5)"),
-        ("wrong.vtk", "wrong.vtk"),
+        ("shifted.vtk", "(counted from 0) of the surface is outside the volume, and so are "),
+        (
+            "inverted.msh",
+            "inverted.msh: tetrahedron 5 (counted from 0) is inverted at rest: exchange two nodes of it",
+        ),
         ("heart.ply", "with 0 tetrahedra and 0 other volume cells"),
         ("absent.msh", "absent.msh: cannot be read"),
         ("lattice:0,1,1", "a lattice of 0 x 1 x 1 cells cannot be stored"),
-        ("lattice:2,2,3 --stretch 1.01 --motion nodes.pc2", "nodes.pc2, frame 1: the element of the nodes"),
+        (
+            "lattice:2,2,3 --stretch 1.01 --motion nodes.pc2",
+            "nodes.pc2, frame 1: the element of the nodes",
+        ),
         ("lattice:3,2,3 --motion nodes.pc2", "frame 0: has 36 points and the tree has 48 nodes"),
     ] {
         let error = fails(folder, &format!("build heart.ply -o heart.dibs --nodes {nodes}"));
@@ -216,6 +222,127 @@ fn trees_with_nodes_are_built_asked_and_tracked() {
     let error = fails(folder, "view bound.dibs --motion heart.ply -o heart.html --page page.html");
     assert!(error.contains("heart.ply"), "{error}");
     assert_eq!(std::fs::read(folder.join("heart.dibs")).unwrap(), before);
+}
+
+/// Each error about a volume names its file, the element and a remedy for tetrahedra.
+#[test]
+fn what_is_wrong_with_a_volume_is_said_of_the_volume() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let volume = heart(folder);
+    let put = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    let (nodes, all) = (volume.nodes(), volume.tetrahedra());
+    let ten = "0 1 2 3 4 5 6 7 8 9";
+    for (name, element) in [("ten.msh", "1 11 2 0 1"), ("six.msh", "1 9 2 0 1")] {
+        let elements = format!("$Elements\n1\n{element} 1 2 3 4 5 6 7 8 9 10\n$EndElements\n");
+        put(name, &(msh(nodes, &[]).split("$Elements").next().unwrap().to_owned() + &elements));
+    }
+    let one = vtk(nodes, &[[0, 1, 2, 3]]);
+    let curved = one.replace("CELLS 1 5\n4 0 1 2 3", &format!("CELLS 1 11\n10 {ten}"));
+    put("ten.vtk", &curved.replace("\n10\n", "\n24\n"));
+    let one = vtu(nodes, &[[0, 1, 2, 3]]);
+    let curved = one.replace(">0 1 2 3<", &format!(">{ten}<")).replace(">4<", ">10<");
+    put(
+        "ten.vtu",
+        &curved.replace("\"ascii\">10</DataArray></Cells>", "\"ascii\">24</DataArray></Cells>"),
+    );
+    put("pieces.vtu", &vtu(nodes, all).replace("</Piece>", "</Piece><Piece/>"));
+    put("image.vtk", "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\n");
+    put("model.step", "ISO-10303-21;\nHEADER;");
+    let with = |more: [u32; 4]| [all, &[more]].concat();
+    put("flat.vtk", &vtk(nodes, &with([0, 1, 4, 4])));
+    put("range.vtk", &vtk(nodes, &with([0, 1, 2, 99])));
+    put("range.msh", &msh(nodes, &with([0, 1, 2, 99])));
+    let two: Vec<[u32; 4]> = all
+        .iter()
+        .enumerate()
+        .map(|(at, &[a, b, c, d])| if at % 9 == 5 { [b, a, c, d] } else { [a, b, c, d] })
+        .collect();
+    put("inverted.vtk", &vtk(nodes, &two));
+    let moved = |by: f64| nodes.iter().map(|at| *at + DVec3::X * by).collect::<Vec<_>>();
+    put("far.vtk", &vtk(&moved(1_000.0), all));
+    let mut unknown = nodes.to_vec();
+    unknown[8].y = f64::NAN;
+    put("unknown.vtk", &vtk(&unknown, all));
+    put("unknown.msh", &msh(&unknown, all));
+    succeeds(folder, "generate heart --triangles 1000 -o h.ply --motion heart.pc2");
+    succeeds(folder, "stretch heart.ply --motion heart.pc2 --limits triangles.limits");
+    let line = "stretch heart.ply --nodes volume.vtk --motion nodes.pc2 --limits nodes.limits";
+    succeeds(folder, line);
+    for (given, start, part) in [
+        ("--nodes ten.msh", "ten.msh: ", "`gmsh MODEL.geo -3 -order 1 -o NEW.msh`"),
+        ("--nodes six.msh", "six.msh: ", "`gmsh MODEL.geo -3 -order 1 -o NEW.msh`"),
+        (
+            "--nodes ten.vtk",
+            "ten.vtk: ",
+            "linear tetrahedra: in ParaView, the filter Tetrahedralize",
+        ),
+        (
+            "--nodes ten.vtu",
+            "ten.vtu: ",
+            "linear tetrahedra: in ParaView, the filter Tetrahedralize",
+        ),
+        ("--nodes image.vtk", "image.vtk: ", "which is no tetrahedra; save it with linear"),
+        ("--nodes pieces.vtu", "pieces.vtu: ", "the filter Merge Blocks and then Save Data"),
+        (
+            "--nodes model.step",
+            "model.step: ",
+            "mesh its volume: `gmsh model.step -3 -o model.msh`",
+        ),
+        ("--nodes nodes.pc2", "nodes.pc2: ", "give the volume here"),
+        ("--nodes flat.vtk", "flat.vtk: no tree can be built: tetrahedron 72 (counted from 0)", ""),
+        (
+            "--nodes far.vtk",
+            "far.vtk: no tree can be built: vertex 0 (counted from 0) of",
+            "(--bind-within)",
+        ),
+        (
+            "--nodes far.vtk --bind-within 1e30",
+            "far.vtk: no tree",
+            "too far to bind it (--bind-within)",
+        ),
+        (
+            "--nodes lattice:10000,1,1",
+            "--nodes lattice:10000,1,1: no tree",
+            "give fewer of them, or the unit",
+        ),
+        (
+            "--nodes range.vtk",
+            "range.vtk: tetrahedron 72 (counted from 0) refers to node 99",
+            "export it again",
+        ),
+        ("--nodes range.msh", "range.msh: ", "element 73 has node 100 (Gmsh's numbers)"),
+        (
+            "--nodes inverted.vtk",
+            "inverted.vtk: tetrahedron 5 (counted from 0)",
+            ", and so are 7 others: exchange two nodes of each",
+        ),
+        ("--nodes unknown.vtk", "unknown.vtk: node 8 (counted from 0) has", "repair the volume"),
+        ("--nodes unknown.msh", "unknown.msh: node 8 (counted from 0) has", "repair the volume"),
+        (
+            "--nodes volume.vtk --limits triangles.limits",
+            "triangles.limits: has limits of triangles",
+            "leave --nodes out, or give the file of `dibs stretch MESH --nodes VOLUME --motion",
+        ),
+        (
+            "--limits nodes.limits",
+            "nodes.limits: has limits of tetrahedra",
+            "give the volume as well (--nodes VOLUME)",
+        ),
+    ] {
+        let error = fails(folder, &format!("build heart.ply -o heart.dibs {given}"));
+        assert!(error.starts_with(start) && error.contains(part), "{given}: {error}");
+    }
+    for (given, part) in [
+        ("--nodes volume.vtk --bind-within -1", "a distance of at least 0"),
+        ("--nodes volume.vtk --bind-within nan", "a distance of at least 0"),
+        ("--nodes=", "a file of tetrahedra, or lattice:NX,NY,NZ"),
+    ] {
+        let output = dibs(folder, &format!("build heart.ply -o heart.dibs {given}"));
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && error.contains(part), "{given}: {error}");
+    }
+    assert!(!folder.join("heart.dibs").exists());
 }
 
 /// From the program, over UDP, to the surface that a controller searches.
