@@ -184,6 +184,23 @@ fn frames_of_the_other_kind_are_refused_and_counted() {
     }
 }
 
+/// A node beyond the reach is refused by its row, even if no element has it.
+#[test]
+fn a_node_beyond_the_reach_is_refused_and_counted() {
+    let heart = generate::heart(320).expect("a valid size").mesh;
+    let lattice = Volume::lattice(&heart, [4, 4, 4]).expect("a lattice");
+    let more = [lattice.nodes(), &[lattice.nodes()[0]]].concat();
+    let volume = Volume::new(more, lattice.tetrahedra().to_vec()).expect("valid");
+    let embedded = Builder::new().stretch(3.0).nodes(&volume).build(&heart).expect("held");
+    let nodes: Vec<Vec3> = volume.nodes().iter().map(|node| node.as_vec3()).collect();
+    for row in [57, 125] {
+        let mut far = nodes.clone();
+        far[row].y = 1e6;
+        let refused = refusal::<126, Nodes<'static>>(embedded.blob(), &far, &nodes);
+        assert_eq!(refused, ReceiveError::TooFar { row: row as u32 });
+    }
+}
+
 /// The refusal of a frame, which is counted, and after which a good one is published.
 fn refusal<const N: usize, R: Rows>(blob: &[u8], frame: &[Vec3], good: &[Vec3]) -> ReceiveError {
     let surface: &Surface<N, R> = Box::leak(Box::new(Surface::new()));
