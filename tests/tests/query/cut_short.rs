@@ -131,8 +131,8 @@ fn waves(splits: u32, rng: &mut Rng) -> Mesh {
 fn a_tick_that_ended_knows_not_where_the_axis_meets_the_surface() {
     let (mut cut, mut rng) = (0, Rng::with_seed(5));
     for number in 0..if cfg!(debug_assertions) { 16 } else { sample(60) } {
-        let mesh = waves(2 + number % 2, &mut rng);
-        let leaf = 1 + number as usize / 2 % 8;
+        let mesh = waves(2 + number as u32 % 2, &mut rng);
+        let leaf = 1 + number / 2 % 8;
         let built = Builder::new().stretch(1.1).leaf_triangles(leaf).build(&mesh);
         let built = built.expect("a valid mesh");
         let tree = built.tree::<u16>().expect("16-bit indices");

@@ -305,7 +305,7 @@ fn an_error_that_grows_widens_what_is_kept() {
 /// Where the last tick and this one exclude each other, the motion was larger than stated: only this one counts.
 #[test]
 fn a_motion_larger_than_stated_makes_nothing_certain() {
-    let mesh = generate::heart(320).unwrap().mesh;
+    let mesh = generate::brain(500).unwrap();
     let built = Builder::new().build(&mesh).unwrap();
     let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
     let rows = built.to_rows(&mesh.positions);
@@ -313,7 +313,7 @@ fn a_motion_larger_than_stated_makes_nothing_certain() {
     let mut query = Query::<_, MAX_STACK>::new(&tree).unwrap();
     let sphere = |at: Vec3| Sphere::new(at, 1.0).unwrap();
     let (outside, inside) =
-        (Vec3::new(80.0, 0.0, 20.0), rows.iter().sum::<Vec3>() / rows.len() as f32);
+        (Vec3::new(150.0, 0.0, 20.0), rows.iter().sum::<Vec3>() / rows.len() as f32);
     let pair = query.closest(rows.as_slice(), &sphere(outside), &Options::cold()).unwrap();
     // The root's pin comes next to the tool, and the budget covers no other test.
     let pin = rows[tree.node(0).expect("a root").0 as usize];
