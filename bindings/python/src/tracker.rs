@@ -365,8 +365,7 @@ pub fn named(error: FilterError) -> PyErr {
             invalid(format!("{name}: it cannot be {value}"))
         }
         FilterError::Command => invalid("command: it is too large"),
-        FilterError::Row { row } => invalid(format!("rows: row {row} is not finite")),
-        FilterError::Rows { .. } => invalid(format!("rows: {error}")),
+        FilterError::Row { .. } | FilterError::Rows { .. } => invalid(format!("rows: {error}")),
         FilterError::Unlabelled { label } => {
             invalid(format!("stand_off_of: no triangle has the label {label}"))
         }

@@ -143,6 +143,15 @@ fn bad_input_is_named() {
         assert_eq!(bench.ask(&tool, &step), Err(FilterError::Row { row: 1 }));
         bench.own.clear();
     }
+    // Factors whose squares f32 does not hold, and a limit that it does not hold once they are scaled.
+    for (factor, least) in [(1e20, 1e19), (1e-18, 1e-19), (1e-30, -1e-31), (1e-10, 1e30)] {
+        bench.own = vec![MotionRow::along(Vec3::X * factor, least)];
+        assert_eq!(bench.ask(&tool, &step), Err(FilterError::Row { row: 0 }), "{factor} {least}");
+    }
+    bench.own = vec![MotionRow::along(Vec3::ZERO, -1.0), MotionRow::along(Vec3::X * 1e10, 2e9)];
+    let pushed = bench.ask(&tool, &step).expect("an answer");
+    assert!((pushed.motion.translation.x - 0.2).abs() < 1e-3, "{pushed:?}");
+    bench.own.clear();
     let named = |error| match error {
         FilterError::Parameter { parameter, .. } => parameter,
         other => panic!("{other:?}"),

@@ -80,7 +80,7 @@ pub enum FilterError {
     },
     /// The commanded motion is not finite.
     Command,
-    /// A number of a caller's row is not finite.
+    /// A number of a caller's row is not finite, or the length of its factors is [out of range](super::MotionRow).
     Row {
         /// The row's index.
         row: usize,
@@ -121,7 +121,7 @@ impl fmt::Display for FilterError {
         match self {
             Self::Parameter { parameter, value } => write!(f, "{parameter} cannot be {value}"),
             Self::Command => write!(f, "the commanded motion is not finite"),
-            Self::Row { row } => write!(f, "row {row} is not finite"),
+            Self::Row { row } => write!(f, "row {row} is not finite, or out of range"),
             Self::Rows { found, most } => {
                 write!(f, "{found} rows, but at most {most} have a place")
             }

@@ -41,7 +41,10 @@ pub(super) fn least(start: f32, end: f32, moved: f32, grow: f32) -> f32 {
     if !(s > 0.0 && s < 1.0) {
         return ends - slack;
     }
-    let squared = (1.0 - s) * start * start + s * end * end - s * (1.0 - s) * moved * moved;
+    // Near zero the root magnifies the rounding of the square.
+    let rounding = ROUNDING * (start * start + end * end + moved * moved);
+    let squared =
+        (1.0 - s) * start * start + s * end * end - s * (1.0 - s) * moved * moved - rounding;
     let inside = if squared > 0.0 { sqrt(squared) - grow * s } else { by_motion };
     (if inside < ends { inside } else { ends }) - slack
 }
@@ -66,7 +69,7 @@ mod tests {
     }
 
     /// Where two balls barely overlap, the square of the distance in between is so small that rounding may leave nothing
-    /// of it, or some more: the root is known to a thousandth of a millimetre.
+    /// of it, or some more: the root is known to a thousandth of a millimetre, and the bound is below it.
     #[test]
     fn balls_that_barely_overlap_leave_a_narrow_neck() {
         let sizes = || (1..40_u8).map(|sevenths| f32::from(sevenths) / 7.0);
@@ -78,7 +81,7 @@ mod tests {
                 let beyond = (b - (length - a)) * (b + (length - a)) / (2.0 * length);
                 let neck = (beyond * (2.0 * a - beyond)).sqrt();
                 let bound = f64::from(least(start, end, moved, 0.0));
-                assert!(bound > -1e-3 && bound < neck + 1e-3, "{start} {end} {moved}: {bound}");
+                assert!(bound > -1e-3 && bound <= neck, "{start} {end} {moved}: {bound}");
             }
         }
     }

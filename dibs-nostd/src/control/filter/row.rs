@@ -14,13 +14,17 @@ const MOST: usize = 16;
 
 pub(super) const MOST_OWN: usize = 8;
 
+/// Range of the length of a row's factors, whose squares f32 holds.
+const LENGTHS: [f32; 2] = [1e-15, 1e15];
+
 /// Shortfall (mm) of a caller's row that is ignored.
 const SHORTFALL: f32 = 1e-4;
 
 /// One inequality on the motion of a period: `linear . translation + angular . rotation >= least`.
 ///
 /// For limits that only the caller knows: joints, a remote centre (two rows for each direction across the shaft), a
-/// guide. They take precedence over the walls.
+/// guide. They take precedence over the walls. The length of the factors, with the angular ones divided by the filter's
+/// [lever](super::Filter::lever), is from 1e-15 to 1e15, or zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MotionRow {
@@ -45,9 +49,13 @@ impl MotionRow {
         Self { linear: row.linear, angular: row.angular, least: row.least * period }
     }
 
-    pub(super) fn is_finite(&self) -> bool {
-        let factors = self.linear.iter().chain(&self.angular);
-        factors.chain([&self.least]).all(|x| x.is_finite())
+    /// The half-space; `None` if a number is not finite, or a length is out of range. Factors of zero have none.
+    fn checked(&self, lever: f32) -> Option<HalfSpace> {
+        let (row, length) = self.scaled(lever);
+        let is_zero = [self.linear, self.angular] == [[0.0; 3]; 2];
+        let [shortest, longest] = LENGTHS;
+        let has_length = length >= shortest && length <= longest;
+        ((is_zero || has_length) && row.least.is_finite()).then_some(row)
     }
 
     /// The half-space, with rotations as lengths at the end of a lever, and the length of the factors before
@@ -84,10 +92,8 @@ impl Rows {
     pub fn new(own: &[MotionRow], lever: f32) -> Result<Self, FilterError> {
         let mut rows = Self { own: Vec::new(), walls: Vec::new(), lever };
         for (number, row) in own.iter().enumerate() {
-            if !row.is_finite() {
-                return Err(FilterError::Row { row: number });
-            }
-            if rows.own.push(row.scaled(lever).0).is_err() {
+            let row = row.checked(lever).ok_or(FilterError::Row { row: number })?;
+            if rows.own.push(row).is_err() {
                 return Err(FilterError::Rows { found: own.len(), most: MOST_OWN });
             }
         }
