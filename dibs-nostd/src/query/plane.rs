@@ -74,7 +74,7 @@ impl Plane {
     }
 }
 
-/// The least of three; NaN if any is NaN.
+/// The least of three numbers; NaN if the first is NaN. The others may be NaN: then they are not the least.
 #[inline(always)]
 pub(super) fn least([a, b, c]: [f32; 3]) -> f32 {
     let lower = if a > b { b } else { a };

@@ -221,12 +221,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
         let Some(contact) = add::contact(closest) else { return };
         self.found.has_no_side = false;
-        if closest.side != Side::Outside {
-            self.found.list.clear();
-        }
-        if closest.accuracy > self.found.accuracy {
-            self.found.accuracy = closest.accuracy;
-        }
+        // The search may have listed the same point without its side.
+        let is_other = |at: Vec3| {
+            let apart = at.distance_squared(contact.point_on_surface);
+            apart > closest.accuracy * closest.accuracy
+        };
+        let is_outside = closest.side == Side::Outside;
+        self.found.list.retain(|own| is_outside && is_other(own.point_on_surface));
         if contact.separation <= self.found.margin {
             self.found.insert(contact);
         }
