@@ -19,7 +19,7 @@ pub(crate) const fn farthest(speed: f32, recovery: f32, elapsed: Millis) -> f32 
 }
 
 /// The largest squared distance of these rows from their previous positions, or `largest` if larger. NaN if a position
-/// is NaN.
+/// is NaN or missing.
 #[inline(never)]
 pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
     now: &V,
@@ -28,7 +28,9 @@ pub(crate) fn largest_step<V: VertexTable + ?Sized, W: VertexTable + ?Sized>(
     mut largest: f32,
 ) -> f32 {
     for row in rows {
-        let (Some(now), Some(before)) = (now.position(row), before.position(row)) else { break };
+        let (Some(now), Some(before)) = (now.position(row), before.position(row)) else {
+            return f32::NAN;
+        };
         let squared = (now - before).length_squared();
         // Written so that NaN is kept.
         if !(squared <= largest) {
