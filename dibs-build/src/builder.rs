@@ -14,10 +14,13 @@ use crate::nodes::{Embedding, Volume};
 use crate::rest::{LimitRatios, Paths, SHARED, has_area, least_limits};
 use crate::rounding::round_up;
 
+/// Most triangles whose neighbours a tree of 16-bit indices stores.
+const NARROW_TRIANGLES: usize = 1 << 18;
+
 /// Width of the vertex indices in the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum IndexWidth {
-    /// 16 bits up to 65,536 vertices, 32 above.
+    /// 16 bits up to 65,536 vertices and, with neighbours, 262,144 triangles; 32 above.
     #[default]
     Fitting,
     /// 16 bits; a larger mesh is an error.
@@ -226,7 +229,9 @@ impl<'p> Builder<'p> {
     /// [`BuildError`] names the defect of the mesh or the options.
     pub fn build(&self, surface: &(impl RestSurface + ?Sized)) -> Result<BuiltTree, BuildError> {
         self.check(surface.mesh())?;
-        let is_small = surface.mesh().positions.len() <= u16::MAX_VERTICES as usize;
+        let mesh = surface.mesh();
+        let is_small = mesh.positions.len() <= u16::MAX_VERTICES as usize
+            && (!self.with_adjacency || mesh.triangles.len() <= NARROW_TRIANGLES);
         match self.index {
             IndexWidth::Bits16 => self.build_with::<u16>(surface),
             IndexWidth::Fitting if is_small => self.build_with::<u16>(surface),
@@ -243,6 +248,10 @@ impl<'p> Builder<'p> {
         if vertices > I::MAX_VERTICES as usize {
             let (most, bits) = (I::MAX_VERTICES, 8 * I::BYTES);
             return Err(BuildError::TooManyVertices { vertices, most, bits });
+        }
+        let triangles = mesh.triangles.len();
+        if I::BYTES == 2 && self.with_adjacency && triangles > NARROW_TRIANGLES {
+            return Err(BuildError::TooManyTriangles { triangles, most: NARROW_TRIANGLES });
         }
         if let Some(volume) = &self.nodes {
             return self.build_embedded::<I>(surface, volume);

@@ -55,6 +55,17 @@ pub enum BuildError {
         /// Bits of an index.
         bits: usize,
     },
+    /// The mesh has more triangles than a tree of 16-bit indices stores the neighbours of.
+    #[error(
+        "the mesh has {triangles} triangles, with 16-bit indices the neighbours of at most {most} are stored: \
+         use 32-bit indices or a coarser mesh"
+    )]
+    TooManyTriangles {
+        /// Triangles of the mesh.
+        triangles: usize,
+        /// Most triangles.
+        most: usize,
+    },
     /// A stretch limit that is not a number of at least 1.
     #[error(
         "a stretch limit of {stretch} makes no sense: it is a factor of at least 1 (at most 1e6)"
