@@ -24,7 +24,10 @@ const ADVICE: [(&str, &str); 15] = [
     ("(--unit states", "(unit states"),
     ("(--unit)", "(unit)"),
     ("(--bind-within)", "(bind_within)"),
-    ("`dibs stretch MESH --motion MOTION --limits FILE` writes one", "`MotionStretch.limits` makes one"),
+    (
+        "`dibs stretch MESH --motion MOTION --limits FILE` writes one",
+        "`MotionStretch.limits` makes one",
+    ),
 ];
 
 /// A sentence of the library with Python's names of the options.
