@@ -5,7 +5,7 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     Budget, Capsule, Contacts, Fallback, MeasuredStretch, MovingSurface, Options, Proximity, Query,
-    Side, Step, Tracker, Tree, TriangleRow,
+    QueryError, Side, Step, Tracker, TrackerAnswer, Tree, TriangleRow,
 };
 
 use crate::rows::Rows;
@@ -258,7 +258,7 @@ impl Session<'_, '_> {
             let [Some(tracker), ..] = &mut *self.trackers else { return Err(Fault) };
             let before = machine.clock();
             let tracked = if kind & tick::CONTACTS == 0 {
-                tracker.closest(surface, &first, &options)
+                closest(tracker, surface, &first, &options)
             } else {
                 tracker.contacts(surface, &first, MARGIN, &options, list)
             };
@@ -321,10 +321,22 @@ impl Session<'_, '_> {
     }
 }
 
+/// A tick's closest pair. A function of its own, so that a bound on its instructions has a root.
+#[inline(never)]
+fn closest(
+    tracker: &mut Follower,
+    surface: &impl MovingSurface,
+    tool: &Capsule,
+    options: &Options,
+) -> Result<TrackerAnswer, QueryError> {
+    tracker.closest(surface, tool, options)
+}
+
 /// Whether two answers' sides, which differ, cannot both be right.
 fn is_other_side(tracked: &Proximity, whole: &Proximity) -> bool {
-    let is_defined = |side| !matches!(side, Side::Undefined(_));
-    is_defined(tracked.side) && is_defined(whole.side) && whole.axis_distance > 2.0 * whole.accuracy
+    // Where neither is certain, the last tick's interval still may be: next to the surface a tracker says so.
+    let is_certain = |side| !matches!(side, Side::Undefined(_) | Side::Either);
+    is_certain(tracked.side) && is_certain(whole.side) && whole.axis_distance > 2.0 * whole.accuracy
 }
 
 /// An answer whose interval lies so far above and below a whole query's.
