@@ -75,8 +75,8 @@ impl Facts {
     }
 }
 
-const NO_SIDE: Never = ("query::separation::signed", "", "the query asks for no side");
-const NO_TIES: Never = (
+pub(super) const NO_SIDE: Never = ("query::separation::signed", "", "the query asks for no side");
+pub(super) const NO_TIES: Never = (
     "",
     "Ties::drop_farther",
     "without a side `tie_squared` is not a number, and no triangle is collected",
@@ -105,10 +105,10 @@ pub(super) const WITHOUT_EDGE: Never = ("", "edge::edge_to_segment", "wrong");
 /// Functions that a program must only call from these callers, because the facts about them are about those calls.
 pub const ONLY_FROM: &[(&str, &str)] = &[("mem::memcpy", "__aeabi_memcpy4")];
 
-const NODE: &str = "dibs-nostd/src/query/search/node.rs";
+pub(super) const NODE: &str = "dibs-nostd/src/query/search/node.rs";
 const LEAF: &str = "dibs-nostd/src/query/search/leaf.rs";
 const ROOTS: &str = "dibs-nostd/src/query/search/roots.rs";
-const PLANE: &str = "dibs-nostd/src/query/plane.rs";
+pub(super) const PLANE: &str = "dibs-nostd/src/query/plane.rs";
 const SURFACE: &str = "dibs-nostd/src/modes/surface.rs";
 pub(super) const SEARCH: &str = "dibs-nostd/src/query/search.rs";
 
@@ -124,7 +124,7 @@ pub(super) const TEST: Count =
     Count::Calls(&[Function("leaf"), Function("test_triangle")], "closest_to_");
 pub(super) const WARM: Count =
     Count::Calls(&[Function("start"), Function("test_triangle")], "closest_to_");
-const POP: Count =
+pub(super) const POP: Count =
     Count::Heads(&[Line(SEARCH, "while let Some(Waiting { lower, link }) = self.pop() {")]);
 pub(super) const PUSH: Count = Count::Passes(&[
     Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
@@ -134,7 +134,9 @@ const SHIFT: Count = Count::Passes(&[
     Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
     Line(NODE, "*self.stack.get_mut(at)? = below;"),
 ]);
-const OTHERS: Count = Count::Calls(&[], "Roots::with_others");
+pub(super) const OTHERS: Count = Count::Calls(&[], "Roots::with_others");
+pub(super) const ROOT_TURN: Count = Count::Heads(&[Line(ROOTS, "for row in others.filter(")]);
+pub(super) const ROOT_MOVE: Count = Count::Passes(&[Line(ROOTS, "*stack.get_mut(at)? = nearer;")]);
 const FOR_EACH_ROOT: Most = Most { base: 0, roots: 1, nodes: 0, triangles: 0 };
 const BLEND: &[Within] = &[Line(SURFACE, "for (&gain, mode) in self.gains")];
 const SCAN: &[Within] = &[Line(PLANE, "for (before, [_, _, corner]) in (1..).zip(triangles)")];
@@ -202,13 +204,13 @@ const ROWS: &[Fact] = &[
     },
     Fact {
         name: "turns of the roots",
-        terms: &[(1, Count::Heads(&[Line(ROOTS, "for row in others.filter(")])), (-1, OTHERS)],
+        terms: &[(1, ROOT_TURN), (-1, OTHERS)],
         most: FOR_EACH_ROOT,
         because: "one for each further root, and one where they end",
     },
     Fact {
         name: "moves of roots",
-        terms: &[(1, Count::Passes(&[Line(ROOTS, "*stack.get_mut(at)? = nearer;")]))],
+        terms: &[(1, ROOT_MOVE)],
         most: Most { base: 0, roots: 31, nodes: 0, triangles: 0 },
         because: "the k-th moves at most the k - 1 before it, and a tree has at most 63 of them",
     },
@@ -259,7 +261,7 @@ const BLENDED: &[Fact] = &[Fact {
 }];
 
 /// If a position takes more than a load, the compiler keeps this loop, which it otherwise unrolls.
-const KEPT: &[Fact] = &[Fact {
+pub(super) const KEPT: &[Fact] = &[Fact {
     name: "triangles of a plane",
     terms: &[(1, Count::Heads(SCAN)), (-8, Count::Entries(SCAN))],
     most: Most::base(0),

@@ -22,5 +22,7 @@ pub mod report;
 pub mod second;
 pub mod sided;
 pub mod system;
+pub mod ticks;
 pub mod trace;
+pub mod tracked;
 pub mod walk;

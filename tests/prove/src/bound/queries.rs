@@ -26,7 +26,7 @@ pub struct Kind {
     /// Its name in the names of figures.
     pub id: &'static str,
     /// A part of the name of its function in the probe.
-    root: &'static str,
+    pub root: &'static str,
     pub is_capsule: bool,
     pub table: Table,
     /// Whether it asks for the side.
@@ -285,7 +285,7 @@ fn moved(queries: usize, seed: u64) -> Result<Vec<Script>> {
 }
 
 /// Several copies of a surface beside each other, with the same motion.
-fn beside((mesh, motion): &(Mesh, Motion), count: u32) -> (Mesh, Motion) {
+pub(super) fn beside((mesh, motion): &(Mesh, Motion), count: u32) -> (Mesh, Motion) {
     let (mut all, mut moved) = (Mesh::default(), motion.clone());
     moved.frames.iter_mut().for_each(Vec::clear);
     for number in 0..count {
@@ -311,6 +311,22 @@ pub struct Counted {
     pub mean_share: f64,
 }
 
+impl Counted {
+    /// Adds a query that took so much, and whose bound is this.
+    pub fn add(&mut self, took: i128, bound: i128) {
+        let share = took as f64 / bound as f64;
+        self.queries += 1;
+        self.above += usize::from(took > bound);
+        self.share = self.share.max(share);
+        self.mean_share += share;
+    }
+
+    /// After the last.
+    pub fn end(self) -> Self {
+        Self { mean_share: self.mean_share / self.queries.max(1) as f64, ..self }
+    }
+}
+
 /// Counts the instructions of many queries, and compares each with its bound.
 pub fn count(proven: &[Proven], probe: &Path, queries: usize) -> Result<Vec<Counted>> {
     let mut found: Vec<Counted> = proven.iter().map(|_| Counted::default()).collect();
@@ -319,17 +335,9 @@ pub fn count(proven: &[Proven], probe: &Path, queries: usize) -> Result<Vec<Coun
             let all = proven.iter().zip(&mut found);
             for (proven, found) in all.filter(|(one, _)| one.kind.is_of(answer.record)) {
                 let took = i128::from(answer.instructions) * UNIT;
-                let bound = proven.at(counts(&answer));
-                let share = took as f64 / bound as f64;
-                found.queries += 1;
-                found.above += usize::from(took > bound);
-                found.share = found.share.max(share);
-                found.mean_share += share;
+                found.add(took, proven.at(counts(&answer)));
             }
         }
     }
-    for found in &mut found {
-        found.mean_share /= found.queries.max(1) as f64;
-    }
-    Ok(found)
+    Ok(found.into_iter().map(Counted::end).collect())
 }

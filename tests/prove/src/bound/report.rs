@@ -10,9 +10,11 @@ use xtask::toolchain::Cross;
 use xtask::{qemu, workspace};
 
 use super::facts::{Facts, MODAL, ONLY_FROM};
-use super::follow::{Traced, faults, planted, trace};
+use super::follow::{Traced, faults, planted_in_queries, trace};
 use super::queries::{Counted, KINDS, Proven, count, to_trace};
 use super::sided::{RING, SIDED_CAPSULE};
+use super::ticks::{self, TICK};
+use super::tracked::{SLOTS, TRACKED};
 use super::walk::UNIT;
 use crate::harness::run::Run;
 use crate::probe::build_for_board;
@@ -48,10 +50,11 @@ pub struct Findings {
 }
 
 /// Proves, counts and traces.
-pub fn findings(probe: &Path, queries: usize, traces: usize) -> Result<Findings> {
+pub fn findings([probe, tracker]: [&Path; 2], queries: usize, traces: usize) -> Result<Findings> {
     let start = Instant::now();
     let proven: Vec<Proven> =
         KINDS.iter().map(|kind| Proven::new(kind, probe, kind.facts)).collect::<Result<_>>()?;
+    let tick = Proven::new(&TICK, tracker, TICK.facts)?;
     let seconds = start.elapsed().as_secs_f64();
     let counted = count(&proven, probe, queries)?;
     let traced = trace(&proven, probe, &to_trace(traces)?)?;
@@ -60,8 +63,12 @@ pub fn findings(probe: &Path, queries: usize, traces: usize) -> Result<Findings>
         let decoded = proven.decoded(probe)?;
         rows.push(Row { proven, counted, traced, decoded });
     }
-    let found: Vec<_> =
-        faults().map(|(kind, fault)| planted(kind, probe, &fault)).collect::<Result<_>>()?;
+    let counted = ticks::count(&tick, tracker, queries as u32)?;
+    let traced = ticks::trace(&tick, tracker, traces as u32)?;
+    let decoded = tick.decoded(tracker)?;
+    rows.push(Row { proven: tick, counted, traced, decoded });
+    let found = faults().map(|(kind, fault)| planted_in_queries(kind, probe, &fault));
+    let found: Vec<_> = found.chain([ticks::faults(tracker)]).collect::<Result<_>>()?;
     let found = found.as_flattened();
     let unnoticed = found.iter().filter(|is_found| !**is_found).count();
     Ok(Findings { rows, planted: found.len(), unnoticed, seconds })
@@ -71,8 +78,9 @@ pub fn findings(probe: &Path, queries: usize, traces: usize) -> Result<Findings>
 pub fn run(options: &Options) -> Result<()> {
     qemu::find()?;
     let run = Run::now(String::new());
-    let probe = build_for_board(&Cross::find()?, "probe")?;
-    write(&findings(&probe, options.queries, options.traces)?, &run)
+    let cross = Cross::find()?;
+    let [probe, tracker] = ["probe", "track"].map(|name| build_for_board(&cross, name));
+    write(&findings([&probe?, &tracker?], options.queries, options.traces)?, &run)
 }
 
 /// Writes the page of a run, unless it found an error.
@@ -147,6 +155,9 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
          [sided.rs](../../tests/prove/src/bound/sided.rs). Its base holds up to 32 tied triangles, each at another \
          vertex; its node test holds the work in f64, by software on this processor, which is counted as node tests of typical \
          time.\n\n\
+         A *tracker's tick* is `Tracker::closest` within a budget, unsigned, of a tracker of {SLOTS} opened nodes that was never asked for a side, \
+         on a surface between two frames: the whole tick, with what it remembers and a whole query where its front is full. `n` is all \
+         that its budget counts ([prices.rs](../../dibs-nostd/src/query/prices.rs)). Its facts are of [tracked.rs](../../tests/prove/src/bound/tracked.rs).\n\n\
          | query | base | root | node test | triangle test | times the typical base, node and triangle test | functions | instructions in the graph |\n\
          |---|---:|---:|---:|---:|---|---:|---:|\n",
         run.commit, run.compiler, run.emulator
@@ -208,11 +219,15 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
         findings.planted,
         findings.unnoticed
     )?;
+    let (of_ticks, of_queries): (Vec<_>, Vec<_>) =
+        findings.rows.iter().partition(|row| row.proven.kind.id == TICK.id);
     let (with_side, without): (Vec<_>, Vec<_>) =
-        findings.rows.iter().partition(|row| row.proven.kind.is_signed);
+        of_queries.into_iter().partition(|row| row.proven.kind.is_signed);
     facts(&mut text, &MODAL, &without)?;
     text += "## Flow facts with side\n\n";
     facts(&mut text, &SIDED_CAPSULE, &with_side)?;
+    text += "## Flow facts of a tracker's tick\n\n";
+    facts(&mut text, &TRACKED, &of_ticks)?;
     text += "## Of all\n\n";
     for (callee, caller) in ONLY_FROM {
         writeln!(

@@ -86,6 +86,17 @@ macro_rules! promises {
                 note(concat!("bound.", $kind, "-sphere.node-test")),
                 note(concat!("bound.", $kind, "-sphere.triangle-test")),
             )*
+            Promise {
+                id: "bound.tick.node-test",
+                says: "The proven node test of a tracker's tick, unsigned, within its budget: a capsule on a surface between two frames",
+                criterion: TIMING,
+                bound: Bound::Informs,
+                unit: "instructions, after {bound.tick.base} and {bound.tick.root} a, with {bound.tick.triangle-test} a triangle test",
+                limits: "Of a tracker of 512 opened nodes that was never asked for a side.",
+            },
+            note("bound.tick.base"),
+            note("bound.tick.root"),
+            note("bound.tick.triangle-test"),
             note("bound.sphere.base"),
             note("bound.sphere.root"),
             note("bound.sphere.node-test"),
@@ -125,9 +136,9 @@ pub const CHECK: Check = Check {
 const TRACED: usize = 50;
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let probe = build_for_board(&board()?, "probe")?;
+    let [probe, tracker] = ["probe", "track"].map(|name| build_for_board(&board()?, name));
     let queries = effort.costs;
-    let found = findings(&probe, queries, (queries / TRACED).min(2_000))?;
+    let found = findings([&probe?, &tracker?], queries, (queries / TRACED).min(2_000))?;
     if effort.is_record {
         write(&found, &Run::now(effort.size()))?;
     }

@@ -152,16 +152,26 @@ pub fn executions(
     Ok(counts)
 }
 
-/// Answers from the emulated board, and calls `visit` with the address of each executed instruction in some ranges:
-/// QEMU executes one instruction at a time, and logs it.
+/// Answers from the emulated board; see [`traced_words`].
 pub fn traced(
     program: &Path,
     script: &Script,
     ranges: &[Range<u64>],
-    mut visit: impl FnMut(u64) -> Result<()>,
+    visit: impl FnMut(u64) -> Result<()>,
 ) -> Result<Answers> {
+    Answers::new(traced_words(program, &script.bytes(), ranges, visit)?, script)
+}
+
+/// Runs a program that executes a script on the emulated board, and calls `visit` with the address of each executed
+/// instruction in some ranges: QEMU executes one instruction at a time, and logs it. Returns the words that it answers.
+pub fn traced_words(
+    program: &Path,
+    script: &[u8],
+    ranges: &[Range<u64>],
+    mut visit: impl FnMut(u64) -> Result<()>,
+) -> Result<Vec<u32>> {
     let folder = tempfile::tempdir()?;
-    fs::write(folder.path().join("script.bin"), script.bytes())?;
+    fs::write(folder.path().join("script.bin"), script)?;
     let filter: Vec<String> = ranges
         .iter()
         .map(|range| format!("0x{:x}..0x{:x}", range.start, range.end.saturating_sub(1)))
@@ -185,7 +195,7 @@ pub fn traced(
     let status = emulator.wait()?;
     ensure!(visited? > 0, "QEMU logged no instruction");
     ensure!(status.success(), "the emulator ended with {status}");
-    Answers::new(words(&folder.path().join("answers.bin"))?, script)
+    words(&folder.path().join("answers.bin"))
 }
 
 /// Visits the addresses of a log, whose lines are `Trace 0: HOST [flags/ADDRESS/...] name`. Returns their number.

@@ -1,0 +1,139 @@
+//! The ticks of a tracker that have a bound, and measurements on the emulated board.
+
+// Requirement: A-06
+
+use std::path::Path;
+
+use anyhow::Result;
+use dibs_build::{Builder, IndexWidth, Mesh, Motion, generate};
+use dibs_nostd::Capsule;
+use dibs_tests::deform::unit;
+use dibs_tests::motions::trembling;
+use dibs_tests::surfaces::ball;
+use fastrand::Rng;
+use glam::Vec3;
+use probe::track::{ANSWER_WORDS, tick};
+
+use super::follow::{Asked, Fault, ROOT, Traced, planted, trace_ticks};
+use super::queries::{Counted, Kind, Proven, beside};
+use super::tracked::{TRACKED, TRACKED_WITHOUT_EDGES};
+use super::walk::UNIT;
+use crate::probe::script::Table;
+use crate::probe::ticks::Script;
+use crate::probe::{COUNTING, run_on_board};
+
+/// Ticks within a budget, of the closest pair without a side.
+pub const TICK: Kind = Kind {
+    name: "capsule, a tracker's tick on a moving surface",
+    id: "tick",
+    root: "closest<dibs_nostd::surface::moving::SurfaceBlend",
+    is_capsule: true,
+    table: Table::Moving,
+    is_signed: false,
+    facts: &TRACKED,
+    fitted: None,
+};
+
+/// The [`Fallback`](dibs_nostd::Fallback) of an answer after which a whole query follows: its tests count more than once.
+const FULL: u32 = 4;
+
+/// The due triangles of a leaf are counted before the first of them, which the budget may not cover.
+const MAX_LEAF: i64 = 8;
+
+/// Ticks from frame to frame.
+const FRAME: u32 = 33;
+
+/// Ticks in a row.
+struct Ticks {
+    bytes: Vec<u8>,
+    /// Roots of the tree besides the first.
+    roots: i64,
+}
+
+impl Ticks {
+    /// A tool that starts in the middle of a surface, wanders about, and leaps now and then. Each tick has another budget, from hardly any to
+    /// more than enough.
+    fn about((mesh, motion): &(Mesh, Motion), ticks: u32, seed: u64) -> Result<Self> {
+        let built = Builder::new().index(IndexWidth::Bits16).stretch(2.0).build(mesh)?;
+        let roots = i64::from(built.tree::<u16>()?.roots() - 1);
+        let rows: Vec<Vec<Vec3>> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+        let mut rng = Rng::with_seed(seed);
+        let mut script = Script::new(&built, &rows[0]);
+        let (mut at, mut axis, mut way) = (Vec3::ZERO, Vec3::X * 0.1, Vec3::ZERO);
+        for number in 0..ticks {
+            let frame = &rows[(1 + number / FRAME) as usize % rows.len()];
+            if number % FRAME == 0 {
+                script.frame(frame);
+            }
+            if rng.u32(..40) == 0 {
+                let towards = frame[rng.usize(..frame.len())] * [0.0, 0.5, 1.0][rng.usize(..3)];
+                at = towards + unit(&mut rng) * 20.0 * rng.f32() * rng.f32();
+                axis = unit(&mut rng) * 80.0 * rng.f32();
+            }
+            if rng.u32(..10) == 0 {
+                way = unit(&mut rng) * 10_f32.powf(rng.f32() * 2.5 - 2.0);
+            }
+            at += way;
+            let budget = 1 + 2_f32.powf(rng.f32() * 13.0) as u32;
+            let tool = Capsule::new(at, at + axis, 2.5)?;
+            let share = (number % FRAME) as f32 / FRAME as f32;
+            script.tick(tick::INTERPOLATED | budget << tick::BUDGET, share, &tool);
+        }
+        Ok(Self { bytes: script.end(), roots })
+    }
+
+    /// The counts of each tick, with its instructions and its fallback.
+    fn read(&self, words: &[u32]) -> impl Iterator<Item = ([i64; 3], u64, u32)> {
+        let (answers, _) = words.as_chunks::<ANSWER_WORDS>();
+        answers.iter().map(|&[took, _, nodes, triangles, fallback, ..]| {
+            let counts = [self.roots, i64::from(nodes), i64::from(triangles)];
+            // The board's clock counts 1.6 for each instruction.
+            (counts, u64::from(took) * 5 / 8, fallback)
+        })
+    }
+}
+
+/// Ticks about a heart, a coarse one, three hearts in one tree, and a ball, from whose middle all is equally far: there
+/// the front is soon full.
+fn scripts(ticks: u32, seed: u64) -> Result<Vec<Ticks>> {
+    let generate::MovingMesh { mesh, motion } = generate::heart(10_272)?;
+    let coarse = trembling(1_280, 4, seed);
+    let three = beside(&coarse, 3);
+    let ball = ball(5);
+    let frames = [1.0, 1.02].map(|by| ball.positions.iter().map(|&at| at * by).collect());
+    let breathing = Motion { frames: frames.to_vec(), ..Motion::default() };
+    let all = [(mesh, motion), coarse, three, (ball, breathing)];
+    all.iter().zip(seed..).map(|(one, seed)| Ticks::about(one, ticks / 4, seed)).collect()
+}
+
+/// Proves the bound, counts the instructions of many ticks, and compares each with it.
+pub fn count(proven: &Proven, probe: &Path, ticks: u32) -> Result<Counted> {
+    let mut found = Counted::default();
+    for script in scripts(ticks, 71)? {
+        let words = run_on_board(probe, &script.bytes, COUNTING)?;
+        for (counts, instructions, _) in script.read(&words) {
+            found.add(i128::from(instructions) * UNIT, proven.at(counts));
+        }
+    }
+    Ok(found.end())
+}
+
+/// Follows ticks, instruction by instruction.
+pub fn trace(proven: &Proven, probe: &Path, ticks: u32) -> Result<Traced> {
+    let scripts = scripts(ticks, 81)?;
+    let bytes = scripts.iter().map(|script| script.bytes.as_slice());
+    trace_ticks(proven, probe, bytes, |script, words| {
+        let ticks = scripts[script].read(words);
+        let asked = |(counts, _, fallback)| Asked {
+            counts,
+            spare: (fallback != FULL).then_some(ROOT + MAX_LEAF),
+        };
+        ticks.map(asked).collect()
+    })
+}
+
+/// Whether a trace finds each of two planted errors.
+pub fn faults(probe: &Path) -> Result<[bool; 2]> {
+    let fault = Fault { narrowed: "visits without a price", shorter: &TRACKED_WITHOUT_EDGES };
+    planted(&TICK, probe, &fault, |proven| trace(&proven, probe, 60))
+}
