@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use dibs_build::glam::DVec3;
+use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{Motion, MotionStretch, Volume};
 
 use crate::nodes::{heart, msh, vtk, vtu};
@@ -66,7 +66,7 @@ fn a_query_takes_a_frame_of_every_motion() {
     let volume = heart(folder);
     succeeds(folder, "build heart.ply -o h.dibs --nodes volume.vtk");
     let motion = Motion::read(folder.join("nodes.pc2")).unwrap();
-    let numbers = motion.frames.iter().flatten().flat_map(|at| at.to_array());
+    let numbers = motion.frames.iter().flatten().flat_map(Vec3::to_array);
     let numbers: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
     let shape = format!("({}, {}, 3)", motion.frames.len(), volume.nodes().len());
     write_npy(&folder.join("nodes.npy"), &shape, &numbers);
