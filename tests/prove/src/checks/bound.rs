@@ -28,10 +28,11 @@ macro_rules! promises {
                 says: "Queries above the path bound, which is proven from the linked program",
                 criterion: TIMING,
                 bound: Bound::Is(0.0),
-                unit: "of {bound.queries} plain queries on the emulated Cortex-M7, whole and cut short",
-                limits: "Of this linked program. The proof trusts the flow facts of `facts.rs` and `sided.rs`. Unsigned queries of a \
+                unit: "of {bound.queries} queries and ticks on the emulated Cortex-M7, whole and cut short",
+                limits: "Of this linked program. The proof trusts the flow facts of `facts.rs`, `sided.rs` and `tracked.rs`. Unsigned queries of a \
                          table of vertices, of a surface between two frames, and of one that nodes or eight modes move; queries with \
-                         side of a table of vertices, of a sphere, and of a capsule outside; instructions, not cycles.",
+                         side of a table of vertices, of a sphere, and of a capsule outside; a tracker's ticks without a side, of a capsule on a surface \
+                         between two frames; instructions, not cycles.",
             },
             Promise {
                 id: "bound.broken",
