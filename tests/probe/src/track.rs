@@ -35,6 +35,8 @@ pub mod tick {
     pub const CHAIN: u32 = 1 << 3;
     /// With the side alone: where the axis crosses, any depth will do.
     pub const SIDE: u32 = 1 << 4;
+    /// In a function of its own, so that a bound on a tick's instructions has a root.
+    pub const APART: u32 = 1 << 5;
     /// From this bit on the tracker's budget, in tests; 0 for none. Within one there is no whole query beside it.
     pub const BUDGET: u32 = 8;
 }
@@ -257,8 +259,10 @@ impl Session<'_, '_> {
         } else {
             let [Some(tracker), ..] = &mut *self.trackers else { return Err(Fault) };
             let before = machine.clock();
-            let tracked = if kind & tick::CONTACTS == 0 {
+            let tracked = if KINDS & tick::APART != 0 {
                 closest(tracker, surface, &first, &options)
+            } else if kind & tick::CONTACTS == 0 {
+                tracker.closest(surface, &first, &options)
             } else {
                 tracker.contacts(surface, &first, MARGIN, &options, list)
             };
@@ -321,7 +325,7 @@ impl Session<'_, '_> {
     }
 }
 
-/// A tick's closest pair. A function of its own, so that a bound on its instructions has a root.
+/// A tick's closest pair.
 #[inline(never)]
 fn closest(
     tracker: &mut Follower,

@@ -79,7 +79,7 @@ pub fn run(options: &Options) -> Result<()> {
     qemu::find()?;
     let run = Run::now(String::new());
     let cross = Cross::find()?;
-    let [probe, tracker] = ["probe", "track"].map(|name| build_for_board(&cross, name));
+    let [probe, tracker] = ["probe", "bound"].map(|name| build_for_board(&cross, name));
     write(&findings([&probe?, &tracker?], options.queries, options.traces)?, &run)
 }
 

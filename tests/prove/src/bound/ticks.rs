@@ -51,8 +51,8 @@ struct Ticks {
 }
 
 impl Ticks {
-    /// A tool that starts in the middle of a surface, wanders about, and leaps now and then. Each tick has another budget, from hardly any to
-    /// more than enough.
+    /// A tool that starts in the middle of a surface, wanders about, and leaps now and then. Each tick has another
+    /// budget, from hardly any to more than enough.
     fn about((mesh, motion): &(Mesh, Motion), ticks: u32, seed: u64) -> Result<Self> {
         let built = Builder::new().index(IndexWidth::Bits16).stretch(2.0).build(mesh)?;
         let roots = i64::from(built.tree::<u16>()?.roots() - 1);

@@ -137,7 +137,7 @@ pub const CHECK: Check = Check {
 const TRACED: usize = 50;
 
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
-    let [probe, tracker] = ["probe", "track"].map(|name| build_for_board(&board()?, name));
+    let [probe, tracker] = ["probe", "bound"].map(|name| build_for_board(&board()?, name));
     let queries = effort.costs;
     let found = findings([&probe?, &tracker?], queries, (queries / TRACED).min(2_000))?;
     if effort.is_record {

@@ -121,9 +121,11 @@ pub const ON_REQUEST: [&str; 14] = [
     fuzz::CHECK.name,
 ];
 
-/// Checks that run in parallel on the other core: most need no emulator; also the demo in C, the other processors, and
-/// the boards.
-pub const BESIDE: [&str; 13] = [
+/// Checks that run in parallel on the other core: most need no emulator; also bound and cost model, the demo in C, the
+/// other processors, and the boards, so that both take as long.
+pub const BESIDE: [&str; 15] = [
+    cost::BOARD.name,
+    bound::CHECK.name,
     sanitizers::ADDRESS.name,
     sanitizers::THREAD.name,
     interleavings::CHECK.name,
