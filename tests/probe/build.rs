@@ -20,8 +20,8 @@ fn main() -> io::Result<()> {
         println!("cargo:rustc-link-arg-bin=riscv=-T{}/riscv.x", env!("CARGO_MANIFEST_DIR"));
         for argument in ["--nmagic", "-Tlink.x"] {
             for name in [
-                "probe", "torn", "receive", "bus", "track", "side", "chain", "filter", "weights",
-                "nodes", "carried", "tick",
+                "probe", "torn", "receive", "bus", "track", "bound", "side", "chain", "filter",
+                "weights", "nodes", "carried", "tick",
             ] {
                 println!("cargo:rustc-link-arg-bin={name}={argument}");
             }

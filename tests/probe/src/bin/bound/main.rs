@@ -1,5 +1,5 @@
-//! As `track`, with each tick in a function of its own. With `-icount shift=6`
-//! an instruction takes 64 ns, or 1.6 counts of the 25 MHz clock.
+//! As `track`, with each tick in a function of its own. With `-icount shift=6` an instruction takes 64 ns, or 1.6 counts of
+//! the 25 MHz clock.
 #![no_std]
 #![no_main]
 
