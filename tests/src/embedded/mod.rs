@@ -3,6 +3,7 @@
 mod answers;
 mod judge;
 mod motions;
+mod radii;
 mod receiver;
 mod shapes;
 
@@ -13,6 +14,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 pub use judge::{Tally, cover, judge};
 pub use motions::{NodeMotion, gradient, nudged, pulled};
+pub use radii::node_tests;
 pub use shapes::{Carried, all, hull, shrunk};
 
 /// The nodes at rest.

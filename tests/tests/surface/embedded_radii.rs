@@ -1,82 +1,14 @@
-//! Radii through a volume beside radii along the surface: the node tests of the same queries, at the same stretch.
+//! Radii of trees whose surface a volume moves.
 
 // Requirement: F-07
 
-use dibs_build::{Builder, Mesh, Volume, generate};
-use dibs_nostd::format::MAX_STACK;
+use dibs_build::generate;
 use dibs_nostd::nodes::Nodes;
-use dibs_nostd::{Options, Query};
-use dibs_tests::ask;
-use dibs_tests::embedded::{NodeMotion, rows};
-use dibs_tests::oracle::Instrument;
+use dibs_tests::embedded::{Carried, all, node_tests, rest, rows, sections};
 use fastrand::Rng;
-use glam::Vec3;
 
-/// The limit on stretch of both trees.
-const STRETCH: f32 = 1.1;
-
-/// A sphere or a capsule outside of the surface, most of them within 30 mm.
-fn beside(at: &[Vec3], middle: Vec3, rng: &mut Rng) -> Instrument {
-    // The sum of twelve numbers is almost normal.
-    let normal = |rng: &mut Rng| (0..12).map(|_| rng.f32()).sum::<f32>() - 6.0;
-    let random = |rng: &mut Rng| Vec3::from([(); 3].map(|()| normal(rng)));
-    let near = at[rng.usize(..at.len())];
-    let away = (near - middle).normalize() * 30.0 * normal(rng).abs();
-    let start = near + away + 5.0 * random(rng);
-    let end = if rng.bool() { start } else { start + 20.0 * random(rng) };
-    Instrument::capsule(start, end, 2.5)
-}
-
-/// Node tests on a surface in a lattice of about two thousand nodes over those with geodesics along the surface, both
-/// with the same limit on stretch, on the frames of nodes in motion.
-fn ratio(name: &str, mesh: &Mesh) -> f64 {
-    let mut rng = Rng::with_seed(8);
-    let lattice = Volume::lattice(mesh, [14, 12, 10]).expect("a lattice");
-    let embedded = Builder::new().stretch(STRETCH).nodes(&lattice).build(mesh).expect("held");
-    let plain = Builder::new().stretch(STRETCH).build(mesh).expect("valid");
-    let trees = [&embedded, &plain].map(|built| built.tree::<u16>().expect("valid"));
-    let mut queries =
-        trees.each_ref().map(|tree| Query::<u16, MAX_STACK>::new(tree).expect("deep enough"));
-    let nodes = Nodes::of(&trees[0]).expect("valid");
-    let mut counts = [0_u64; 2];
-    for _ in 0..20 {
-        let frame = NodeMotion::Waves.apply(&nodes, &mut rng);
-        // The other tree has its own order of vertices.
-        let mut of_mesh = mesh.positions.clone();
-        for (&vertex, at) in embedded.vertex_order().iter().zip(rows(&nodes.surface(&frame[..]))) {
-            of_mesh[vertex as usize] = at;
-        }
-        let tables = [&embedded, &plain].map(|built| built.to_rows(&of_mesh));
-        let middle = of_mesh.iter().sum::<Vec3>() / of_mesh.len() as f32;
-        for _ in 0..100 {
-            let tool = beside(&of_mesh, middle, &mut rng);
-            for ((query, table), count) in queries.iter_mut().zip(&tables).zip(&mut counts) {
-                let options = Options::cold().unsigned();
-                let answer = ask::closest(query, &table[..], &tool, &options).expect("sound");
-                *count += u64::from(answer.node_tests);
-            }
-        }
-    }
-    let ratio = counts[0] as f64 / counts[1] as f64;
-    println!("{name}: {} instead of {} node tests, {ratio:.3}", counts[0], counts[1]);
-    ratio
-}
-/// Of the human brain and heart.
 #[test]
-#[cfg_attr(not(real_meshes), ignore = "../shared/data is absent")]
 fn radii_through_the_volume_take_fewer_node_tests() {
-    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
-    let most = [("brain_5k", 0.7), ("brain_50k", 0.65), ("heart_10272", 0.75)];
-    let found = most.map(|(name, most)| {
-        let mesh = dibs_build::read(data.join(name).with_extension("ply")).expect("a mesh").mesh;
-        (name, ratio(name, &mesh), most)
-    });
-    assert!(found.iter().all(|(_, ratio, most)| ratio <= most), "{found:?}");
-}
-
-/// Of generated surfaces.
-#[test]
-fn radii_through_the_volume_take_fewer_node_tests_on_generated_surfaces() {
     let brain = |triangles| generate::brain(triangles).expect("a valid size");
     let heart = generate::heart(10_272).expect("a valid size").mesh;
     let meshes = [
@@ -84,6 +16,42 @@ fn radii_through_the_volume_take_fewer_node_tests_on_generated_surfaces() {
         ("brain of 50,000", brain(50_000), 0.7),
         ("heart", heart, 0.75),
     ];
-    let found = meshes.map(|(name, mesh, most)| (name, ratio(name, &mesh), most));
-    assert!(found.iter().all(|(_, ratio, most)| ratio <= most), "{found:?}");
+    for (name, mesh, most) in meshes {
+        let [through, along] = node_tests(&mesh);
+        let ratio = through as f64 / along as f64;
+        println!("{name}: {through} instead of {along} node tests, {ratio:.3}");
+        assert!(ratio <= most, "{name}: {ratio}");
+    }
+}
+
+/// The largest radius of a section over the straight line from its pin to its farthest vertex; 1 where all are straight.
+fn detour(carried: &Carried) -> f64 {
+    let tree = carried.built.tree::<u16>().expect("valid");
+    let nodes = Nodes::of(&tree).expect("valid");
+    let at = rows(&nodes.surface(&rest(&nodes)[..]));
+    let unit = carried.built.blob()[32..36].try_into().expect("four bytes");
+    let unit = f64::from(f32::from_le_bytes(unit));
+    let longer = sections(&tree).into_iter().map(|section| {
+        let pin = at[section.pin as usize].as_dvec3();
+        let farthest = section.covered.iter().map(|&row| at[row as usize].as_dvec3().distance(pin));
+        let farthest = farthest.fold(0.0, f64::max);
+        // Radii are rounded up to a multiple of this unit.
+        (section.radius - unit) / farthest
+    });
+    longer.fold(0.0, f64::max)
+}
+
+/// A box of cells holds every straight line between two vertices; a volume with gaps does not.
+#[test]
+fn radii_in_a_box_of_cells_are_straight_lines() {
+    let shapes = all(&mut Rng::with_seed(0));
+    let of = |name| detour(shapes.iter().find(|shape| shape.name == name).expect("in the list"));
+    for name in ["heart in a lattice", "brain in a cell", "needles", "several in a lattice"] {
+        let most = of(name);
+        assert!(most < 1.0 + 1e-5, "{name}: {most}");
+    }
+    for name in ["rolled sheet", "brain in a hull"] {
+        let most = of(name);
+        assert!(most > 1.1, "{name}: {most}");
+    }
 }

@@ -17,7 +17,7 @@ const HEAD: &str = "\n## Table 7: surfaces that nodes move\n\n\
     - Refitted trees move all vertices by four nodes each, in their own order and layout: once a frame where the \
     surface is held, at every tick where it is continuous.\n\
     - *Boxes over the elements* are around nodes. When a query enters one, the vertices below it are moved and their \
-    boxes refitted. Nothing is checked. (A static tree in each element was slower: half of the triangles lie across \
+    boxes refitted. Nothing is checked. (A static tree in each element, asked at rest, took five to ten times as long: half of the triangles lie across \
     elements.)\n\
     - *Boxes over both frames* are refitted once a frame.\n\
     - *Ratio* is the peer's total over the tracker's; in brackets the 95 % interval of the median of each period's.\n\n";

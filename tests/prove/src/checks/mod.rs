@@ -35,6 +35,7 @@ mod nodes;
 pub mod other_processors;
 mod path;
 mod python;
+mod radii;
 mod receive;
 mod rot;
 mod sanitizers;
@@ -93,6 +94,7 @@ pub const CHECKS: &[Check] = &[
     tracked_modes::CHECK,
     nodes::CHECK,
     carried::CHECK,
+    radii::CHECK,
     sanitizers::ADDRESS,
     sanitizers::THREAD,
     miri::CHECK,
@@ -142,12 +144,13 @@ pub const BESIDE: [&str; 15] = [
 ];
 
 /// Checks that build no program and boot none: in `cargo xtask evidence` they run in the lane that is idle first.
-pub const EITHER: [&str; 5] = [
+pub const EITHER: [&str; 6] = [
     anytime::CHECK.name,
     sides::CHECK.name,
     hand::CHECK.name,
     filter::CHECK.name,
     carried::CHECK.name,
+    radii::CHECK.name,
 ];
 
 /// Fits all constants, or those whose names contain `only`.

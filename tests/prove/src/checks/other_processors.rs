@@ -1,6 +1,6 @@
-//! The same bits on an emulated Cortex-M55 and an emulated RISC-V, and their instructions.
+//! The same bits on an emulated Cortex-M55 and an emulated RISC-V, and their instructions; frames without compare-and-swap.
 
-// Requirement: A-11
+// Requirements: A-11, F-01
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,11 +13,12 @@ use xtask::toolchain::add_target;
 use xtask::{apt, qemu, workspace};
 
 use super::bits::differences;
+use super::torn;
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::FLOW, golden, note};
 use crate::harness::{Check, Effort, record};
 use crate::probe::script::{Asks, Draw, Record, Script, Start};
-use crate::probe::{Answers, Build, on_machine};
+use crate::probe::{Answers, Build, on_machine, run_emulated};
 
 pub const CHECK: Check = Check {
     name: "the same bits on other processors",
@@ -43,6 +44,20 @@ pub const CHECK: Check = Check {
         },
         golden("processors.m55.mean"),
         golden("processors.riscv.mean"),
+        Promise {
+            id: "processors.m0.mixed",
+            says: "No query sees vertices of two frames, published in its midst, on a processor without compare-and-swap",
+            criterion: FLOW,
+            bound: Bound::Is(0.0),
+            unit: "of {processors.m0.queries} queries while {processors.m0.published} frames were published and \
+                   {processors.m0.put-off} put off; without the protocol {processors.m0.mixed-without} queries do",
+            limits: "The code of a Cortex-M0, with the feature `portable-atomic`, on an emulated Cortex-M3: no emulated M0 has the \
+                     memory.",
+        },
+        note("processors.m0.queries"),
+        note("processors.m0.published"),
+        note("processors.m0.put-off"),
+        note("processors.m0.mixed-without"),
     ],
 };
 
@@ -87,6 +102,19 @@ const MACHINES: [Machine; 2] = [
     },
 ];
 
+/// The code of a processor without compare-and-swap.
+const NO_SWAP: Machine = Machine {
+    name: "m0",
+    target: "thumbv6m-none-eabi",
+    feature: "no-swap",
+    program: "torn",
+    emulator: "qemu-system-arm",
+    package: "qemu-system-arm",
+    arguments: &["-machine", "mps2-an385", "-icount", "shift=1"],
+    // 25 MHz, and an instruction takes 2 ns.
+    instructions: |clock| f64::from(clock) * 20.0,
+};
+
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     if let Err(error) = prepare() {
         return Ok(Outcome::Skipped(format!("{error:#}")));
@@ -110,12 +138,15 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
         figures.note(&format!("processors.{name}.different"), different as f64);
         figures.note(&format!("processors.{name}.mean"), machine.mean(&on_path)?);
     }
+    let program = NO_SWAP.build()?;
+    let counts = run_emulated(&mut NO_SWAP.boot(&program), &torn::script(effort.torn / 10)?)?;
+    torn::note_counts("processors.m0", &counts, figures)?;
     Ok(Outcome::Passed)
 }
 
 /// Finds or installs compilers and emulators.
 pub fn prepare() -> Result<()> {
-    for machine in &MACHINES {
+    for machine in MACHINES.iter().chain([&NO_SWAP]) {
         add_target(machine.target).and_then(|()| machine.find()).context(machine.name)?;
     }
     Ok(())

@@ -36,17 +36,28 @@ pub const CHECK: Check = Check {
 /// Runs queries under interrupts that publish frames.
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let program = build_for_board(&board()?, "torn")?;
+    let counts = run_on_board(&program, &script(effort.torn)?, qemu::BOARD)?;
+    note_counts("torn", &counts, figures)?;
+    Ok(Outcome::Passed)
+}
+
+/// The program's script.
+pub fn script(queries: u32) -> Result<Vec<u8>> {
     let built = Builder::new().index(IndexWidth::Bits16).build(&surfaces::ball(3))?;
-    let mut script = effort.torn.to_le_bytes().to_vec();
+    let mut script = queries.to_le_bytes().to_vec();
     script.extend((built.blob().len() as u32).to_le_bytes());
     script.extend(built.blob());
-    let counts = run_on_board(&program, &script, qemu::BOARD)?;
+    Ok(script)
+}
+
+/// Notes what the program counted.
+pub fn note_counts(of: &str, counts: &[u32], figures: &mut Figures) -> Result<()> {
     ensure!(counts.len() == 5, "{} counts, not 5", counts.len());
     let names = ["queries", "mixed", "published", "put-off", "mixed-without"];
-    for (name, count) in names.into_iter().zip(&counts) {
-        figures.note(&format!("torn.{name}"), f64::from(*count));
+    for (name, count) in names.into_iter().zip(counts) {
+        figures.note(&format!("{of}.{name}"), f64::from(*count));
     }
     // Without the protocol the check must detect torn reads.
     ensure!(counts[4] > 0, "no query saw two epochs even without the protocol");
-    Ok(Outcome::Passed)
+    Ok(())
 }

@@ -114,7 +114,8 @@ pub fn on_machine(emulator: &mut Command, script: &Script) -> Result<Answers> {
     Answers::new(run_emulated(emulator, &script.bytes())?, script)
 }
 
-fn run_emulated(emulator: &mut Command, script: &[u8]) -> Result<Vec<u32>> {
+/// Runs a script on an emulated machine, and returns the words that its program answers.
+pub fn run_emulated(emulator: &mut Command, script: &[u8]) -> Result<Vec<u32>> {
     let folder = tempfile::tempdir()?;
     fs::write(folder.path().join("script.bin"), script)?;
     run(emulator.current_dir(folder.path()).stdin(Stdio::null()))?;

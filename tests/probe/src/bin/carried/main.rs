@@ -8,11 +8,11 @@ mod board;
 
 use cortex_m_rt::entry;
 use dibs_nostd::nodes::Nodes;
-use probe::track::{Memory, Trackers, run};
+use probe::track::{Memory, Trackers, run, tick};
 
 #[entry]
 fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
-    board::answer(|board| run::<Nodes, { u32::MAX }>(MEMORY, TRACKERS, board))
+    board::answer(|board| run::<Nodes, { !tick::APART }>(MEMORY, TRACKERS, board))
 }
