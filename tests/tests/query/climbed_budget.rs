@@ -1,10 +1,11 @@
-//! Climbs towards a false interval of a tracker, over the tool's motion and each tick's budget. Truth in f64.
+//! Climbs towards a false interval of a tracker, and a wall let go, over the tool's motion and each tick's budget. Truth
+//! in f64.
 
 // Requirement: T-02
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Budget, Capsule, Odometer, Options, Tracker, VertexTable};
+use dibs_nostd::{Budget, Capsule, Odometer, Options, Side, Tracker, VertexTable};
 use dibs_tests::climb::climb;
 use dibs_tests::deform::unit;
 use dibs_tests::oracle::Instrument;
@@ -35,7 +36,7 @@ impl Scene {
 }
 
 /// The change of a tick.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Tick {
     /// Motion (mm) of the tool's ends.
     steps: [Vec3; 2],
@@ -95,7 +96,7 @@ impl Run {
     }
 
     /// By how much (mm) the truth is outside of a certified interval, in the worst tick; and the same of ticks with a wide
-    /// interval, as a fraction of its width. Both are negative inside.
+    /// interval, as a fraction of its width. Both are negative inside. No tick loses a side once one had it.
     fn outside(&self, scene: &Scene) -> Option<[f64; 2]> {
         let tree = scene.built.tree::<u16>().expect("16-bit indices");
         let triangles = surfaces::triangles(&tree);
@@ -104,7 +105,7 @@ impl Run {
         let [from, to] = [self.frame, self.frame + 1].map(|frame| scene.frames[frame].as_slice());
         let step = odometer.step(from, to);
         let rest = Tick { steps: [Vec3::ZERO; 2], share: 0.0, budget: self.first };
-        let (mut tool, mut share) = (self.tool, 0.0);
+        let (mut tool, mut share, mut had_side) = (self.tool, 0.0, false);
         let mut worst: Option<[f64; 2]> = None;
         for tick in [&[rest], self.ticks.as_slice()].concat() {
             share += tick.share;
@@ -115,6 +116,9 @@ impl Run {
             let options = Options::new().budget(Budget::new(tick.budget));
             let capsule = Capsule::new(tool[0], tool[1], RADIUS).expect("finite");
             let found = tracker.closest(&surface, &capsule, &options).expect("an answer").closest;
+            let has_side = !matches!(found.side, Side::Undefined(_));
+            assert!(has_side || !had_side, "{:?}: {found:?}", self.ticks);
+            had_side |= has_side;
             let known = found.interval();
             let rows = (0..surface.len() as u32).map(|row| surface.position(row).expect("a row"));
             let rows: Vec<Vec3> = rows.collect();

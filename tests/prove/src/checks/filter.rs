@@ -55,7 +55,7 @@ pub const CHECK: Check = Check {
             criterion: TIMING,
             bound: Bound::AtMost(200_000.0),
             unit: "instructions by the cost model, of 200,000 or less",
-            limits: "The same walks. The rows' solution comes on top.",
+            limits: "The same walks. The rows' solution comes in addition.",
         },
         Promise {
             id: "filter.mean",

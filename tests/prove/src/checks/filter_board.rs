@@ -61,7 +61,7 @@ pub const CHECK: Check = Check {
             criterion: TIMING,
             bound: Bound::AtMost(200_000.0),
             unit: "instructions; {filter.board.start} in the first 100 ticks, {filter.board.walks} in the walks",
-            limits: "",
+            limits: "Queries keep to 200,000 by the cost model; the rows' solution comes in addition.",
         },
         note("filter.board.start"),
         note("filter.board.walks"),

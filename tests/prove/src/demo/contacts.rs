@@ -1,5 +1,5 @@
 //! All contacts of every tick, and the force of a proxy that they keep outside: computed on the host after the run,
-//! because the board has no time for them in a tick.
+//! because the controller's wall acts on the closest pair.
 
 use anyhow::Result;
 use controller::telemetry::Tick;
