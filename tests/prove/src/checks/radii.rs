@@ -17,17 +17,17 @@ pub const CHECK: Check = Check {
     promises: &[
         fewer(
             "radii.brain_5k",
-            0.75,
+            0.7,
             "on a human brain of 5,000 triangles: {radii.brain_5k.through} instead of {radii.brain_5k.along}",
         ),
         fewer(
             "radii.brain_50k",
-            0.83,
+            0.65,
             "on a human brain of 50,000 triangles: {radii.brain_50k.through} instead of {radii.brain_50k.along}",
         ),
         fewer(
             "radii.heart_10272",
-            0.87,
+            0.75,
             "on a human heart: {radii.heart_10272.through} instead of {radii.heart_10272.along}",
         ),
         note("radii.brain_5k.through"),
@@ -49,7 +49,7 @@ const fn fewer(id: &'static str, most: f64, unit: &'static str) -> Promise {
         bound: Bound::AtMost(most),
         unit,
         limits: "Both with a stretch of at most 1.1. The same 2,000 spheres and capsules, cold and unsigned, on 20 frames of \
-                 about 2,000 nodes.",
+                 about 2,000 nodes. The goals were 0.75, 0.83 and 0.87.",
     }
 }
 
