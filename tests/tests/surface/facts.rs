@@ -97,6 +97,33 @@ fn a_frame_is_searched_with_its_own_stretch_and_error() {
     assert!(fewer > 0, "the stretch made no difference");
 }
 
+/// A frame that is being written has nothing of the label that its buffer had before.
+#[test]
+fn a_frame_has_no_label_before_it_is_published() {
+    let Heart { built, moved, .. } = heart();
+    let tree = built.tree::<u16>().expect("valid");
+    let measured = measure_stretch(&tree, moved.as_slice()).expect("within the limit");
+    let frames = Frames::<1>::new();
+    let (mut writer, mut reader) = frames.split().expect("new");
+    for epoch in 1..=4 {
+        writer.begin();
+        writer.push(Vec3::ZERO).expect("room");
+        let back = writer.back();
+        assert_eq!((back.epoch(), back.position_error()), (None, 0.0), "{epoch}");
+        assert!(back.stretch().is_none(), "{epoch}");
+        let label = FrameLabel {
+            epoch,
+            received: Millis(0),
+            position_error: ERROR,
+            stretch: Some(measured),
+        };
+        writer.publish(label).expect("complete");
+        let front = reader.read().expect("published");
+        assert_eq!((front.epoch(), front.position_error()), (Some(epoch), ERROR));
+        assert_eq!(front.stretch().map(|stretch| stretch.sigma()), Some(measured.sigma()));
+    }
+}
+
 #[test]
 fn a_measurement_with_another_tree_is_refused_with_its_frame() {
     let heart = heart();

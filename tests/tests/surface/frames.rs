@@ -4,11 +4,10 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use dibs_build::{Builder, generate};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
     FrameAge, FrameLabel, FrameReader, Frames, Millis, PublishError, SplitError, Unavailable,
-    VertexTable, measure_stretch,
+    VertexTable,
 };
 
 fn label(epoch: u32) -> FrameLabel {
@@ -68,28 +67,6 @@ fn a_frame_is_published_once_and_begun_anew() {
     writer.publish(label(2)).unwrap();
     assert_eq!(reader.read().unwrap().position(0), Some(Vec3::Y));
     assert_eq!(writer.front().unwrap().position(0), Some(Vec3::Y));
-}
-
-/// A frame that is being written has nothing of the label that its buffer had before.
-#[test]
-fn a_frame_has_no_label_before_it_is_published() {
-    let mesh = generate::heart(320).unwrap().mesh;
-    let built = Builder::new().build(&mesh).unwrap();
-    let tree = built.tree::<u16>().unwrap();
-    let measured = measure_stretch(&tree, built.to_rows(&mesh.positions).as_slice()).unwrap();
-    let frames = Frames::<1>::new();
-    let (mut writer, mut reader) = frames.split().unwrap();
-    for epoch in 1..=4 {
-        writer.begin();
-        writer.push(vertex_of(epoch, 0)).unwrap();
-        let back = writer.back();
-        assert_eq!((back.epoch(), back.position_error()), (None, 0.0), "{epoch}");
-        assert!(back.stretch().is_none(), "{epoch}");
-        writer.publish(FrameLabel { stretch: Some(measured), ..label(epoch) }).unwrap();
-        let front = reader.read().unwrap();
-        assert_eq!((front.epoch(), front.position_error()), (Some(epoch), 0.5));
-        assert_eq!(front.stretch().map(|stretch| stretch.sigma()), Some(measured.sigma()));
-    }
 }
 
 #[test]
