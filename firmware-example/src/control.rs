@@ -59,7 +59,7 @@ const APPROACH: f32 = 0.02;
 
 /// Limit on a vertex's speed, in mm/s: twice the generated heart's largest speed in real time, 1.57 mm in a thirtieth
 /// of a second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
-const SPEED: f32 = 100.0;
+pub const SPEED: f32 = 100.0;
 
 /// The controller's two ends of a surface, on a bus with these limits of trust.
 ///

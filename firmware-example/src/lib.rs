@@ -32,7 +32,7 @@ use core::num::NonZeroU32;
 use dibs_nostd::{Millis, Ticks};
 
 pub use control::{
-    Control, DAMPING, MARGIN, MAX_FORCE, SPRING, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS,
+    Control, DAMPING, MARGIN, MAX_FORCE, SPEED, SPRING, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS,
     instructions, start,
 };
 pub use fingerprint::fingerprint;

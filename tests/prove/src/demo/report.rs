@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use controller::TICK_RATE;
+use controller::{SPEED, TICK_RATE};
 use controller::telemetry::{Summary, Tick, cause_code, fallback_code};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
@@ -267,6 +267,13 @@ impl Report {
             bridged.broken().into_iter().for_each(|sentence| promise(false, sentence));
         } else {
             promise(rejected == 0, format!("{rejected} packets or frames were rejected"));
+            let fast = self.bus_events.get(Event::TooFast.name()).copied().unwrap_or(0);
+            promise(
+                fast == 0,
+                format!(
+                    "{fast} frames moved faster than the controller's {SPEED} mm/s: give a lower --motion-rate"
+                ),
+            );
             // The last frame may have been in flight when the run ended.
             promise(published + 1 >= sent, format!("{published} of {sent} frames were published"));
         }

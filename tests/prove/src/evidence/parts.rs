@@ -126,6 +126,8 @@ fn real_heart(program: PathBuf) -> Part {
         prove.args(["demo", "--script", "--seconds", &Effort::RELEASE.demo_seconds.to_string()]);
         prove.arg("--mesh").arg(data.join("heart_10272.ply"));
         prove.arg("--motion").arg(data.join("heart_10272.pc2"));
+        // At the 25 frames a second of a beat it is faster than the controller's limit, which is the generated heart's.
+        prove.args(["--motion-rate", "10"]);
         prove.arg("--output").arg(folder.join(FILES).join("demo/real-heart"));
         logged(&mut prove, folder)
     })
