@@ -428,3 +428,29 @@ impl<'p> Builder<'p> {
 
 /// Triangles a leaf of the default construction.
 const DEFAULT_LEAF: usize = 8;
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// With neighbours, 16-bit indices end at 262,144 triangles; without, only the number of vertices counts.
+    #[test]
+    fn the_indices_suffice_for_the_neighbours() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        let mesh = |triangles| Mesh {
+            positions: positions.clone(),
+            triangles: vec![[0, 1, 2]; triangles],
+            ..Mesh::default()
+        };
+        let (most, more) = (mesh(262_144), mesh(262_145));
+        let fitting = Builder::new();
+        assert!(fitting.is_narrow(&most) && !fitting.is_narrow(&more));
+        assert!(fitting.check_width::<u32>(&more).is_ok());
+        assert!(fitting.with_adjacency(false).is_narrow(&more));
+        let error = Builder::new().index(IndexWidth::Bits16).build(&more).unwrap_err();
+        let expected = BuildError::TooManyTriangles { triangles: 262_145, most: 262_144 };
+        assert_eq!(error.to_string(), expected.to_string());
+    }
+}
