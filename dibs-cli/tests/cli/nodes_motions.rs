@@ -119,8 +119,8 @@ fn named(error: &str) -> Vec<u32> {
     numbers
 }
 
-/// Where every element has its own limit, a stretch is that of the element, and a refusal names the element's nodes,
-/// its stretch and its limit.
+/// In a tree with a limit for each tetrahedron, `dibs query` tells the largest stretch of a tetrahedron, not its ratio to
+/// the limit. It refuses a frame beyond a limit with the tetrahedron's nodes, its stretch and its limit.
 #[test]
 fn an_elements_own_stretch_and_limit_are_told() {
     let folder = tempfile::tempdir().unwrap();
