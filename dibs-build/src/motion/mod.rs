@@ -18,8 +18,8 @@ pub(crate) fn series_files(path: &Path) -> Option<Vec<PathBuf>> {
 }
 
 impl Motion {
-    /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices x 3, or a numbered series of mesh files,
-    /// named as `heart_%03d.vtp` (`%d` takes numbers with or without leading zeros). The mesh's
+    /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices (or nodes) x 3, or a numbered series of mesh
+    /// files, named as `heart_%03d.vtp` (`%d` takes numbers with or without leading zeros). The mesh's
     /// [origin](crate::Mesh::origin) must be zero; for others see [`read_around`](Self::read_around). Only the PC2
     /// files of [`write_pc2`](Self::write_pc2) state the frames a second; for others [`rate`](Self::rate) is 0.
     ///
