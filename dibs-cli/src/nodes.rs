@@ -72,7 +72,7 @@ impl VolumeSpec {
 
 /// An error unless the tree's stretch limit covers a recorded motion of its nodes.
 pub fn check_covered(tree: &BuiltTree, path: &Path, lengths: &Lengths) -> Result<()> {
-    let motion = lengths.motion(path, tree.origin())?;
+    let motion = lengths.motion_of_nodes(path, tree.origin())?;
     match tree.index_bits() {
         16 => check_frames(&tree.tree::<u16>()?, path, &motion.frames),
         _ => check_frames(&tree.tree::<u32>()?, path, &motion.frames),

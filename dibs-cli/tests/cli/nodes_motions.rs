@@ -7,7 +7,7 @@ use std::path::Path;
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{Motion, MotionStretch, Volume};
 
-use crate::nodes::{heart, msh, vtk, vtu};
+use crate::nodes::{curved, heart, msh, vtk, vtu};
 use crate::program::{fails, json, succeeds};
 
 /// A frame of the motion as nodes of a volume's file.
@@ -55,6 +55,28 @@ fn a_series_of_volumes_is_a_motion_for_every_command() {
         assert_eq!(stretch(&series), needed, "{format}");
         assert_eq!(build(&series), built, "{format}");
         assert_eq!(track(&series), tracked, "{format}");
+    }
+}
+
+/// A series of curved cells is refused with the remedy for what its files hold: nodes of a volume, or a surface.
+#[test]
+fn a_series_of_curved_cells_has_its_own_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let volume = heart(folder);
+    succeeds(folder, "build heart.ply -o h.dibs --nodes volume.vtk");
+    std::fs::write(folder.join("tools.csv"), "sphere:0,0,120,5\n").unwrap();
+    std::fs::write(folder.join("q_00.vtk"), curved(volume.nodes())).unwrap();
+    let of_volume = "linear tetrahedra: in ParaView, the filter Tetrahedralize";
+    for (line, part) in [
+        ("stretch heart.ply --nodes volume.vtk --motion q_%02d.vtk", of_volume),
+        ("build heart.ply -o i.dibs --nodes volume.vtk --motion q_%02d.vtk", of_volume),
+        ("track h.dibs --motion q_%02d.vtk --motion-rate 30 --path tools.csv", of_volume),
+        ("stream h.dibs --motion q_%02d.vtk --motion-rate 30 --to udp:127.0.0.1:9", of_volume),
+        ("stretch heart.ply --motion q_%02d.vtk", "flat cells: in ParaView, the filter Extract"),
+    ] {
+        let error = fails(folder, line);
+        assert!(error.starts_with("q_00.vtk: ") && error.contains(part), "{line}: {error}");
     }
 }
 
