@@ -16,7 +16,7 @@ use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
 use crate::tool::ToolSpec;
 use crate::tree_file::{self, AnyTree};
-use crate::{modes, overwrite, tool};
+use crate::{modes, nodes, overwrite, tool};
 use anyhow::{Context, Result, anyhow, bail};
 use coordinates::{Axes, SourceCoordinates};
 use dibs_build::glam::{DVec3, Vec3};
@@ -278,14 +278,23 @@ fn live(
 
 /// Reads a recorded motion of a tree, and checks that all of its frames can be sent.
 fn recorded(args: &Args, path: &Path, order: &SurfaceOrder, tree: &[u8]) -> Result<Source> {
-    let motion = match tree_file::validate(tree, &args.tree)? {
-        AnyTree::Narrow(tree) => args.lengths.motion_of(&tree, path),
-        AnyTree::Wide(tree) => args.lengths.motion_of(&tree, path),
+    let tree = tree_file::validate(tree, &args.tree)?;
+    let motion = match &tree {
+        AnyTree::Narrow(tree) => args.lengths.motion_of(tree, path),
+        AnyTree::Wide(tree) => args.lengths.motion_of(tree, path),
     }?;
     let rate = args.motion_rate.of(&motion, path)?;
     let name = path.display();
     for (number, frame) in motion.frames.iter().enumerate() {
         order.to_rows(frame).map_err(|error| anyhow!("{name}, frame {number}: {error}"))?;
+    }
+    // The receiver refuses such a frame, and takes the others.
+    let admitted = match &tree {
+        AnyTree::Narrow(tree) => nodes::check_frames(tree, path, &motion.frames),
+        AnyTree::Wide(tree) => nodes::check_frames(tree, path, &motion.frames),
+    };
+    if let Err(refused) = admitted {
+        eprintln!("warning: {refused}");
     }
     let weights =
         if args.weights { Some(modes::weights(&args.tree, order, &motion)?) } else { None };

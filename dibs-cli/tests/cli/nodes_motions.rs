@@ -2,13 +2,14 @@
 
 // Requirements: F-07, P-08
 
+use std::net::UdpSocket;
 use std::path::Path;
 
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{Motion, MotionStretch, Volume};
 
 use crate::nodes::{curved, heart, msh, vtk, vtu};
-use crate::program::{fails, json, succeeds};
+use crate::program::{dibs, fails, json, succeeds};
 
 /// A frame of the motion as nodes of a volume's file.
 fn nodes(motion: &Motion, frame: usize) -> Vec<DVec3> {
@@ -131,6 +132,14 @@ fn write_npy(path: &Path, shape: &str, numbers: &[u8]) {
     std::fs::write(path, bytes).unwrap();
 }
 
+/// The warnings of a command that succeeds.
+fn warnings(folder: &Path, line: &str) -> Vec<String> {
+    let output = dibs(folder, line);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{line}: {said}");
+    said.lines().filter_map(|line| line.strip_prefix("warning: ")).map(str::to_owned).collect()
+}
+
 /// The nodes that an error names, by their numbers in the volume's file.
 fn named(error: &str) -> Vec<u32> {
     let part = error.split_once("the element of the nodes ");
@@ -224,6 +233,15 @@ fn a_frame_that_turns_an_element_inside_out_is_told_apart() {
         // Its nodes have the numbers of the volume's file.
         let named = named(&error);
         assert!(named.len() == 4 && named.contains(&corners[0]), "{error}");
+    }
+    // It is sent with a warning: the receiver refuses it alone.
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let to = socket.local_addr().unwrap();
+    let line = "build heart.ply -o i.dibs --nodes volume.vtk --stretch 9 --motion inverted.pc2";
+    let refused = fails(folder, line);
+    for (motion, expected) in [("nodes.pc2", vec![]), ("inverted.pc2", vec![refused])] {
+        let line = format!("stream h.dibs --motion {motion} --motion-rate 500 --to udp:{to}");
+        assert_eq!(warnings(folder, &line), expected, "{motion}");
     }
     // As a file of its own.
     let frame = nodes(&Motion::read(folder.join("inverted.pc2")).unwrap(), 2);
