@@ -79,6 +79,11 @@ pub fn run(args: &Args) -> Result<()> {
     }?;
     let paths = if args.edges { Paths::Edges } else { args.construction.paths() };
     let volume = args.nodes.as_ref().map(|nodes| nodes.volume(mesh, lengths)).transpose()?;
+    // The limits are right, but `dibs build` may refuse the volume.
+    let held = volume.as_ref().map_or(Ok(()), |volume| volume.check_surface(mesh));
+    if let (Some(nodes), Err(error)) = (&args.nodes, held) {
+        eprintln!("warning: {nodes}: {error}");
+    }
     let elements = volume.as_ref().map_or(Elements::Triangles(mesh), Elements::Tetrahedra);
     let needed = match &volume {
         Some(volume) => MotionStretch::of_nodes(volume, &motion, &|_| ())

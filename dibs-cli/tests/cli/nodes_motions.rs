@@ -140,6 +140,23 @@ fn warnings(folder: &Path, line: &str) -> Vec<String> {
     said.lines().filter_map(|line| line.strip_prefix("warning: ")).map(str::to_owned).collect()
 }
 
+/// Limits are learned for a volume that does not hold the surface, with a warning in the words of `dibs build`.
+#[test]
+fn a_volume_far_from_its_surface_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let volume = heart(folder);
+    let far: Vec<DVec3> = volume.nodes().iter().map(|at| *at + DVec3::X * 1_000.0).collect();
+    std::fs::write(folder.join("far.vtk"), vtk(&far, volume.tetrahedra())).unwrap();
+    let refused = fails(folder, "build heart.ply -o h.dibs --nodes far.vtk");
+    let warning = refused.replace("no tree can be built: ", "");
+    assert!(warning.starts_with("far.vtk: vertex 0 (counted from 0) of the surface is outside"));
+    for (nodes, expected) in [("volume.vtk", vec![]), ("far.vtk", vec![warning])] {
+        let line = format!("stretch heart.ply --nodes {nodes} --motion nodes.pc2 --limits l");
+        assert_eq!(warnings(folder, &line), expected, "{nodes}");
+    }
+}
+
 /// The nodes that an error names, by their numbers in the volume's file.
 fn named(error: &str) -> Vec<u32> {
     let part = error.split_once("the element of the nodes ");
