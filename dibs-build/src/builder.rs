@@ -14,9 +14,6 @@ use crate::nodes::{Embedding, Volume};
 use crate::rest::{LimitRatios, Paths, SHARED, has_area, least_limits};
 use crate::rounding::round_up;
 
-/// Most triangles whose neighbours a tree of 16-bit indices stores.
-const NARROW_TRIANGLES: usize = 1 << 18;
-
 /// Width of the vertex indices in the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum IndexWidth {
@@ -228,15 +225,36 @@ impl<'p> Builder<'p> {
     /// # Errors
     /// [`BuildError`] names the defect of the mesh or the options.
     pub fn build(&self, surface: &(impl RestSurface + ?Sized)) -> Result<BuiltTree, BuildError> {
-        self.check(surface.mesh())?;
         let mesh = surface.mesh();
-        let is_small = mesh.positions.len() <= u16::MAX_VERTICES as usize
-            && (!self.with_adjacency || mesh.triangles.len() <= NARROW_TRIANGLES);
-        match self.index {
-            IndexWidth::Bits16 => self.build_with::<u16>(surface),
-            IndexWidth::Fitting if is_small => self.build_with::<u16>(surface),
-            IndexWidth::Bits32 | IndexWidth::Fitting => self.build_with::<u32>(surface),
+        self.check(mesh)?;
+        if self.is_narrow(mesh) {
+            self.build_with::<u16>(surface)
+        } else {
+            self.build_with::<u32>(surface)
         }
+    }
+
+    /// Whether the tree's indices have 16 bits.
+    fn is_narrow(&self, mesh: &Mesh) -> bool {
+        match self.index {
+            IndexWidth::Fitting => self.check_width::<u16>(mesh).is_ok(),
+            IndexWidth::Bits16 => true,
+            IndexWidth::Bits32 => false,
+        }
+    }
+
+    /// An error unless indices of this width number the mesh's vertices and, for a tree with neighbours, its triangles.
+    fn check_width<I: Index>(&self, mesh: &Mesh) -> Result<(), BuildError> {
+        let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
+        if vertices > I::MAX_VERTICES as usize {
+            let (most, bits) = (I::MAX_VERTICES, 8 * I::BYTES);
+            return Err(BuildError::TooManyVertices { vertices, most, bits });
+        }
+        let most = I::MAX_ADJACENT_TRIANGLES as usize;
+        if self.with_adjacency && triangles > most {
+            return Err(BuildError::TooManyTriangles { triangles, most });
+        }
+        Ok(())
     }
 
     fn build_with<I: Index>(
@@ -244,15 +262,7 @@ impl<'p> Builder<'p> {
         surface: &(impl RestSurface + ?Sized),
     ) -> Result<BuiltTree, BuildError> {
         let mesh = surface.mesh();
-        let vertices = mesh.positions.len();
-        if vertices > I::MAX_VERTICES as usize {
-            let (most, bits) = (I::MAX_VERTICES, 8 * I::BYTES);
-            return Err(BuildError::TooManyVertices { vertices, most, bits });
-        }
-        let triangles = mesh.triangles.len();
-        if I::BYTES == 2 && self.with_adjacency && triangles > NARROW_TRIANGLES {
-            return Err(BuildError::TooManyTriangles { triangles, most: NARROW_TRIANGLES });
-        }
+        self.check_width::<I>(mesh)?;
         if let Some(volume) = &self.nodes {
             return self.build_embedded::<I>(surface, volume);
         }
@@ -418,3 +428,29 @@ impl<'p> Builder<'p> {
 
 /// Triangles a leaf of the default construction.
 const DEFAULT_LEAF: usize = 8;
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// With neighbours, 16-bit indices end at 262,144 triangles; without, only the number of vertices counts.
+    #[test]
+    fn the_indices_suffice_for_the_neighbours() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y];
+        let mesh = |triangles| Mesh {
+            positions: positions.clone(),
+            triangles: vec![[0, 1, 2]; triangles],
+            ..Mesh::default()
+        };
+        let (most, more) = (mesh(262_144), mesh(262_145));
+        let fitting = Builder::new();
+        assert!(fitting.is_narrow(&most) && !fitting.is_narrow(&more));
+        assert!(fitting.check_width::<u32>(&more).is_ok());
+        assert!(fitting.with_adjacency(false).is_narrow(&more));
+        let error = Builder::new().index(IndexWidth::Bits16).build(&more).unwrap_err();
+        let expected = BuildError::TooManyTriangles { triangles: 262_145, most: 262_144 };
+        assert_eq!(error.to_string(), expected.to_string());
+    }
+}

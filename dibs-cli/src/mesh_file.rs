@@ -3,7 +3,7 @@
 use anyhow::{Result, anyhow};
 use dibs_build::glam::DVec3;
 use dibs_build::{FrameCheck, Import, Motion, ReadOptions, Unit};
-use dibs_nostd::{Index, Tree};
+use dibs_nostd::{Index, PathKind, Tree};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
 use std::time::Duration;
@@ -63,9 +63,18 @@ impl Lengths {
         Ok(Motion::read_around(path, self.unit(), origin)?)
     }
 
+    /// The same, of a volume's nodes.
+    pub fn motion_of_nodes(&self, path: &Path, origin: DVec3) -> Result<Motion> {
+        Ok(Motion::read_nodes_around(path, self.unit(), origin)?)
+    }
+
     /// Reads a motion in this unit, of the surface of a tree.
     pub fn motion_of<I: Index>(&self, tree: &Tree<'_, I>, path: &Path) -> Result<Motion> {
-        let motion = self.motion(path, tree.origin().into())?;
+        let origin = tree.origin().into();
+        let motion = match tree.paths() {
+            PathKind::Volume => self.motion_of_nodes(path, origin),
+            _ => self.motion(path, origin),
+        }?;
         let faces = FrameCheck::of(tree).check_faces(&motion.faces);
         faces.map_err(|error| anyhow!("{}: {error}", path.display())).map(|()| motion)
     }

@@ -1,11 +1,12 @@
 //! Volumes whose nodes move a surface, on the command line.
 
 use crate::mesh_file::Lengths;
+use crate::query::ALLOW;
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::glam::Vec3;
 use dibs_build::{BuiltTree, FrameCheck, Mesh, SurfaceRows, Volume};
 use dibs_nostd::nodes::Nodes;
-use dibs_nostd::{Index, Tree};
+use dibs_nostd::{Index, PathKind, Tree};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -72,21 +73,24 @@ impl VolumeSpec {
 
 /// An error unless the tree's stretch limit covers a recorded motion of its nodes.
 pub fn check_covered(tree: &BuiltTree, path: &Path, lengths: &Lengths) -> Result<()> {
-    let motion = lengths.motion(path, tree.origin())?;
+    let motion = lengths.motion_of_nodes(path, tree.origin())?;
     match tree.index_bits() {
         16 => check_frames(&tree.tree::<u16>()?, path, &motion.frames),
         _ => check_frames(&tree.tree::<u32>()?, path, &motion.frames),
     }
 }
 
-fn check_frames<I: Index>(tree: &Tree<'_, I>, path: &Path, frames: &[Vec<Vec3>]) -> Result<()> {
+/// An error for the first of a motion's frames that a receiver of nodes refuses; none for a tree without nodes.
+pub fn check_frames<I: Index>(tree: &Tree<'_, I>, path: &Path, frames: &[Vec<Vec3>]) -> Result<()> {
+    if tree.paths() != PathKind::Volume {
+        return Ok(());
+    }
     let check = FrameCheck::of(tree);
     for (number, frame) in frames.iter().enumerate() {
         let at = || format!("{}, frame {number}", path.display());
         let rows = check.to_rows(frame).map_err(|error| anyhow!("{}: {error}", at()))?;
         if let Err(error) = Nodes::of(tree)?.measure(rows.as_slice()) {
-            let remedy = "build with a larger --stretch, or with --limits that allow it";
-            bail!("{}: {}", at(), SurfaceRows::refusal(tree, error, remedy));
+            bail!("{}: {}", at(), SurfaceRows::refusal(tree, error, ALLOW));
         }
     }
     Ok(())

@@ -72,10 +72,18 @@ pub fn run(args: &Args) -> Result<()> {
     overwrite::check(inputs, args.limits.iter().chain(&args.picture))?;
     let import = mesh_file::read(&args.mesh, &args.reading, false)?;
     let mesh = &import.mesh;
-    let motion = args.reading.lengths.motion(path, mesh.origin)?;
-    let paths = if args.edges { Paths::Edges } else { args.construction.paths() };
     let lengths = &args.reading.lengths;
+    let motion = match &args.nodes {
+        Some(_) => lengths.motion_of_nodes(path, mesh.origin),
+        None => lengths.motion(path, mesh.origin),
+    }?;
+    let paths = if args.edges { Paths::Edges } else { args.construction.paths() };
     let volume = args.nodes.as_ref().map(|nodes| nodes.volume(mesh, lengths)).transpose()?;
+    // The limits are right, but `dibs build` may refuse the volume.
+    let held = volume.as_ref().map_or(Ok(()), |volume| volume.check_surface(mesh));
+    if let (Some(nodes), Err(error)) = (&args.nodes, held) {
+        eprintln!("warning: {nodes}: {error}");
+    }
     let elements = volume.as_ref().map_or(Elements::Triangles(mesh), Elements::Tetrahedra);
     let needed = match &volume {
         Some(volume) => MotionStretch::of_nodes(volume, &motion, &|_| ())

@@ -6,7 +6,7 @@ mod series;
 
 pub use pc2::MotionMismatchError;
 
-use crate::read::{FileCoordinates, ReadError, ReadErrorKind, file};
+use crate::read::{FileCoordinates, ReadError, ReadErrorKind, Wanted, file};
 use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -18,8 +18,8 @@ pub(crate) fn series_files(path: &Path) -> Option<Vec<PathBuf>> {
 }
 
 impl Motion {
-    /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices x 3, or a numbered series of mesh files,
-    /// named as `heart_%03d.vtp` (`%d` takes numbers with or without leading zeros). The mesh's
+    /// Reads a motion: a PC2 file, a NumPy array (.npy) of frames x vertices (or nodes) x 3, or a numbered series of mesh
+    /// files, named as `heart_%03d.vtp` (`%d` takes numbers with or without leading zeros). The mesh's
     /// [origin](crate::Mesh::origin) must be zero; for others see [`read_around`](Self::read_around). Only the PC2
     /// files of [`write_pc2`](Self::write_pc2) state the frames a second; for others [`rate`](Self::rate) is 0.
     ///
@@ -41,9 +41,30 @@ impl Motion {
         unit: impl Into<Option<Unit>>,
         origin: DVec3,
     ) -> Result<Self, ReadError> {
-        let (path, unit) = (path.as_ref(), unit.into());
+        Self::read_of(path.as_ref(), Wanted::Surface, unit.into(), origin)
+    }
+
+    /// As [`read_around`](Self::read_around), for a motion of a [volume](crate::Volume)'s nodes: an error in a file of a
+    /// series then names the remedy for a volume.
+    ///
+    /// # Errors
+    /// As [`read_around`](Self::read_around).
+    pub fn read_nodes_around(
+        path: impl AsRef<Path>,
+        unit: impl Into<Option<Unit>>,
+        origin: DVec3,
+    ) -> Result<Self, ReadError> {
+        Self::read_of(path.as_ref(), Wanted::Volume, unit.into(), origin)
+    }
+
+    fn read_of(
+        path: &Path,
+        wanted: Wanted,
+        unit: Option<Unit>,
+        origin: DVec3,
+    ) -> Result<Self, ReadError> {
         if let Some(series) = series::Series::named(path) {
-            return series.read(unit, origin);
+            return series.read(wanted, unit, origin);
         }
         let place = FileCoordinates { unit: unit.unwrap_or_default(), origin };
         let parse = |bytes: Vec<u8>| match &bytes[..] {

@@ -1,4 +1,4 @@
-//! NumPy arrays of frames x vertices x 3, as `numpy.save` writes them.
+//! NumPy arrays of frames x vertices (or nodes) x 3, as `numpy.save` writes them.
 //!
 //! Our own reader, although `npyz` and `ndarray-npy` exist: both depend on a parser generator and big integers to read
 //! one line of three keys.

@@ -54,7 +54,12 @@ impl<'a> Series<'a> {
         Ok(files)
     }
 
-    pub fn read(&self, unit: Option<Unit>, origin: DVec3) -> Result<Motion, ReadError> {
+    pub fn read(
+        &self,
+        wanted: Wanted,
+        unit: Option<Unit>,
+        origin: DVec3,
+    ) -> Result<Motion, ReadError> {
         let fail = |path: &Path, kind| ReadError { path: path.to_path_buf(), kind };
         let files = self.files().map_err(|error| fail(self.path, error.into()))?;
         let Some((first, path)) = files.first() else {
@@ -72,7 +77,7 @@ impl<'a> Series<'a> {
                 let missing = self.file(number, width);
                 return Err(fail(&missing, ReadErrorKind::Gap { next: *found }));
             }
-            let frame = frame(path, number - first, &mut faces, unit, origin);
+            let frame = frame(path, wanted, number - first, &mut faces, unit, origin);
             frames.push(frame.map_err(|kind| fail(path, kind))?);
         }
         Ok(Motion { frames, rate: 0.0, origin, faces: faces.unwrap_or_default() })
@@ -82,12 +87,13 @@ impl<'a> Series<'a> {
 /// Reads the positions in a file. Faces that differ from the first file's are an error.
 fn frame(
     path: &Path,
+    wanted: Wanted,
     number: u64,
     of_first: &mut Option<Vec<Vec<u32>>>,
     unit: Option<Unit>,
     origin: DVec3,
 ) -> Result<Vec<Vec3>, ReadErrorKind> {
-    let (positions, faces) = read::frame(path, Wanted::Surface, number as usize, unit, origin)?;
+    let (positions, faces) = read::frame(path, wanted, number as usize, unit, origin)?;
     if *of_first.get_or_insert_with(|| faces.clone()) != faces {
         return Err(ReadErrorKind::OtherTriangles);
     }

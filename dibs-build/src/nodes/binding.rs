@@ -183,6 +183,20 @@ impl Embedding {
     }
 }
 
+impl Volume {
+    /// Checks that it can move a surface: that it holds the vertices, or they are near enough to
+    /// [bind](Self::bind_within).
+    ///
+    /// # Errors
+    /// [`VolumeError::Outside`] and [`VolumeError::Lever`], as of [`Builder::build`](crate::Builder::build).
+    ///
+    /// # Panics
+    /// If the mesh names vertices that it does not have.
+    pub fn check_surface(&self, mesh: &Mesh) -> Result<(), VolumeError> {
+        Embedding::new(self, mesh).map(|_| ())
+    }
+}
+
 /// A tetrahedron, prepared for locating points.
 #[derive(Debug)]
 pub(super) struct Cell {

@@ -35,7 +35,8 @@ pub enum LimitsErrorKind {
         "is no file of stretch limits: `dibs stretch MESH --motion MOTION --limits FILE` writes one"
     )]
     NotLimits,
-    /// It has limits of triangles where those of tetrahedra are needed, or the reverse.
+    /// It has limits of triangles and those of tetrahedra are needed, or it has those of tetrahedra and needs those of
+    /// triangles.
     #[error("has limits of {found}, and those of {expected} are needed: {}", remedy(found))]
     OtherKind {
         /// `triangles`, or `tetrahedra` if a volume moves the surface.

@@ -16,7 +16,7 @@ use crate::mesh_file::Lengths;
 use crate::motion::{MotionFile, MotionRate};
 use crate::tool::ToolSpec;
 use crate::tree_file::{self, AnyTree};
-use crate::{modes, overwrite, tool};
+use crate::{modes, nodes, overwrite, tool};
 use anyhow::{Context, Result, anyhow, bail};
 use coordinates::{Axes, SourceCoordinates};
 use dibs_build::glam::{DVec3, Vec3};
@@ -165,7 +165,7 @@ pub fn run(args: &Args) -> Result<()> {
         bail!("--partial: a tolerance is a length of at least 0");
     }
     let source = match args.motion.given() {
-        Some(motion) => recorded(args, motion, &order, origin)?,
+        Some(motion) => recorded(args, motion, &order, &bytes)?,
         None => live(args, args.motion_rate.given()?, (&order, origin, bytes))?,
     };
     if args.mtu == "64" {
@@ -276,14 +276,25 @@ fn live(
     Ok(Source { name, frames: Frames::Live { live, exchange }, rate })
 }
 
-/// Reads a recorded motion, and checks that all of its frames can be sent.
-fn recorded(args: &Args, path: &Path, order: &SurfaceOrder, origin: DVec3) -> Result<Source> {
-    let motion = args.lengths.motion(path, origin)?;
+/// Reads a recorded motion of a tree, and checks that all of its frames can be sent.
+fn recorded(args: &Args, path: &Path, order: &SurfaceOrder, tree: &[u8]) -> Result<Source> {
+    let tree = tree_file::validate(tree, &args.tree)?;
+    let motion = match &tree {
+        AnyTree::Narrow(tree) => args.lengths.motion_of(tree, path),
+        AnyTree::Wide(tree) => args.lengths.motion_of(tree, path),
+    }?;
     let rate = args.motion_rate.of(&motion, path)?;
     let name = path.display();
-    order.check_faces(&motion.faces).map_err(|error| anyhow!("{name}: {error}"))?;
     for (number, frame) in motion.frames.iter().enumerate() {
         order.to_rows(frame).map_err(|error| anyhow!("{name}, frame {number}: {error}"))?;
+    }
+    // The receiver refuses such a frame, and takes the others.
+    let admitted = match &tree {
+        AnyTree::Narrow(tree) => nodes::check_frames(tree, path, &motion.frames),
+        AnyTree::Wide(tree) => nodes::check_frames(tree, path, &motion.frames),
+    };
+    if let Err(refused) = admitted {
+        eprintln!("warning: {refused}");
     }
     let weights =
         if args.weights { Some(modes::weights(&args.tree, order, &motion)?) } else { None };

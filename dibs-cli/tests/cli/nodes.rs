@@ -73,6 +73,12 @@ pub fn vtu(nodes: &[DVec3], tetrahedra: &[[u32; 4]]) -> String {
     )
 }
 
+/// A legacy VTK file with one tetrahedron of second order.
+pub fn curved(nodes: &[DVec3]) -> String {
+    let cell = "CELLS 1 11\n10 0 1 2 3 4 5 6 7 8 9";
+    vtk(nodes, &[[0, 1, 2, 3]]).replace("CELLS 1 5\n4 0 1 2 3", cell).replace("\n10\n", "\n24\n")
+}
+
 /// A heart, a volume around it in three formats, and a motion of its nodes.
 pub fn heart(folder: &Path) -> Volume {
     succeeds(folder, "generate heart --triangles 1000 -o heart.ply");
@@ -237,14 +243,12 @@ fn what_is_wrong_with_a_volume_is_said_of_the_volume() {
         let elements = format!("$Elements\n1\n{element} 1 2 3 4 5 6 7 8 9 10\n$EndElements\n");
         put(name, &(msh(nodes, &[]).split("$Elements").next().unwrap().to_owned() + &elements));
     }
-    let one = vtk(nodes, &[[0, 1, 2, 3]]);
-    let curved = one.replace("CELLS 1 5\n4 0 1 2 3", &format!("CELLS 1 11\n10 {ten}"));
-    put("ten.vtk", &curved.replace("\n10\n", "\n24\n"));
+    put("ten.vtk", &curved(nodes));
     let one = vtu(nodes, &[[0, 1, 2, 3]]);
-    let curved = one.replace(">0 1 2 3<", &format!(">{ten}<")).replace(">4<", ">10<");
+    let ten = one.replace(">0 1 2 3<", &format!(">{ten}<")).replace(">4<", ">10<");
     put(
         "ten.vtu",
-        &curved.replace("\"ascii\">10</DataArray></Cells>", "\"ascii\">24</DataArray></Cells>"),
+        &ten.replace("\"ascii\">10</DataArray></Cells>", "\"ascii\">24</DataArray></Cells>"),
     );
     put("pieces.vtu", &vtu(nodes, all).replace("</Piece>", "</Piece><Piece/>"));
     put("image.vtk", "# vtk DataFile Version 3.0\n\nASCII\nDATASET STRUCTURED_POINTS\n");

@@ -2,13 +2,14 @@
 
 // Requirements: F-07, P-08
 
+use std::net::UdpSocket;
 use std::path::Path;
 
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_build::{Motion, MotionStretch, Volume};
 
-use crate::nodes::{heart, msh, vtk, vtu};
-use crate::program::{fails, json, succeeds};
+use crate::nodes::{curved, heart, msh, vtk, vtu};
+use crate::program::{dibs, fails, json, succeeds};
 
 /// A frame of the motion as nodes of a volume's file.
 fn nodes(motion: &Motion, frame: usize) -> Vec<DVec3> {
@@ -55,6 +56,28 @@ fn a_series_of_volumes_is_a_motion_for_every_command() {
         assert_eq!(stretch(&series), needed, "{format}");
         assert_eq!(build(&series), built, "{format}");
         assert_eq!(track(&series), tracked, "{format}");
+    }
+}
+
+/// A series of curved cells is refused with the remedy for what its files hold: nodes of a volume, or a surface.
+#[test]
+fn a_series_of_curved_cells_has_its_own_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let volume = heart(folder);
+    succeeds(folder, "build heart.ply -o h.dibs --nodes volume.vtk");
+    std::fs::write(folder.join("tools.csv"), "sphere:0,0,120,5\n").unwrap();
+    std::fs::write(folder.join("q_00.vtk"), curved(volume.nodes())).unwrap();
+    let of_volume = "linear tetrahedra: in ParaView, the filter Tetrahedralize";
+    for (line, part) in [
+        ("stretch heart.ply --nodes volume.vtk --motion q_%02d.vtk", of_volume),
+        ("build heart.ply -o i.dibs --nodes volume.vtk --motion q_%02d.vtk", of_volume),
+        ("track h.dibs --motion q_%02d.vtk --motion-rate 30 --path tools.csv", of_volume),
+        ("stream h.dibs --motion q_%02d.vtk --motion-rate 30 --to udp:127.0.0.1:9", of_volume),
+        ("stretch heart.ply --motion q_%02d.vtk", "flat cells: in ParaView, the filter Extract"),
+    ] {
+        let error = fails(folder, line);
+        assert!(error.starts_with("q_00.vtk: ") && error.contains(part), "{line}: {error}");
     }
 }
 
@@ -109,6 +132,31 @@ fn write_npy(path: &Path, shape: &str, numbers: &[u8]) {
     std::fs::write(path, bytes).unwrap();
 }
 
+/// The warnings of a command that succeeds.
+fn warnings(folder: &Path, line: &str) -> Vec<String> {
+    let output = dibs(folder, line);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{line}: {said}");
+    said.lines().filter_map(|line| line.strip_prefix("warning: ")).map(str::to_owned).collect()
+}
+
+/// Limits are learned for a volume that does not hold the surface, with a warning in the words of `dibs build`.
+#[test]
+fn a_volume_far_from_its_surface_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let volume = heart(folder);
+    let far: Vec<DVec3> = volume.nodes().iter().map(|at| *at + DVec3::X * 1_000.0).collect();
+    std::fs::write(folder.join("far.vtk"), vtk(&far, volume.tetrahedra())).unwrap();
+    let refused = fails(folder, "build heart.ply -o h.dibs --nodes far.vtk");
+    let warning = refused.replace("no tree can be built: ", "");
+    assert!(warning.starts_with("far.vtk: vertex 0 (counted from 0) of the surface is outside"));
+    for (nodes, expected) in [("volume.vtk", vec![]), ("far.vtk", vec![warning])] {
+        let line = format!("stretch heart.ply --nodes {nodes} --motion nodes.pc2 --limits l");
+        assert_eq!(warnings(folder, &line), expected, "{nodes}");
+    }
+}
+
 /// The nodes that an error names, by their numbers in the volume's file.
 fn named(error: &str) -> Vec<u32> {
     let part = error.split_once("the element of the nodes ");
@@ -119,8 +167,8 @@ fn named(error: &str) -> Vec<u32> {
     numbers
 }
 
-/// Where every element has its own limit, a stretch is that of the element, and a refusal names the element's nodes,
-/// its stretch and its limit.
+/// In a tree with a limit for each tetrahedron, `dibs query` tells the largest stretch of a tetrahedron, not its ratio to
+/// the limit. It refuses a frame beyond a limit with the tetrahedron's nodes, its stretch and its limit.
 #[test]
 fn an_elements_own_stretch_and_limit_are_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -202,6 +250,15 @@ fn a_frame_that_turns_an_element_inside_out_is_told_apart() {
         // Its nodes have the numbers of the volume's file.
         let named = named(&error);
         assert!(named.len() == 4 && named.contains(&corners[0]), "{error}");
+    }
+    // It is sent with a warning: the receiver refuses it alone.
+    let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let to = socket.local_addr().unwrap();
+    let line = "build heart.ply -o i.dibs --nodes volume.vtk --stretch 9 --motion inverted.pc2";
+    let refused = fails(folder, line);
+    for (motion, expected) in [("nodes.pc2", vec![]), ("inverted.pc2", vec![refused])] {
+        let line = format!("stream h.dibs --motion {motion} --motion-rate 500 --to udp:{to}");
+        assert_eq!(warnings(folder, &line), expected, "{motion}");
     }
     // As a file of its own.
     let frame = nodes(&Motion::read(folder.join("inverted.pc2")).unwrap(), 2);

@@ -136,10 +136,10 @@ impl Now<f32> {
         let (mut low, mut high) = (from, limit);
         // Enough for a limit of a million.
         for _ in 0..64 {
-            let middle = low + (high - low) * 0.5;
-            if high - low <= high * HEADROOM || middle <= low || middle >= high {
+            if high - low <= high * HEADROOM {
                 break;
             }
+            let middle = low + (high - low) * 0.5;
             if self.is_within(rest, middle) {
                 high = middle;
             } else {

@@ -146,14 +146,14 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             0.0 => ALWAYS,
             most => spare / most * ROUND_DOWN,
         };
-        // The pair at the end clears the time from `end` on.
+        // The pair at the end clears the time from `end` on, which is at most 1.
         let end = 1.0 - part(at_end.spare);
         if at_end.touches {
             swept.contact = Some(1.0);
         }
         let unsigned = options.unsigned();
         let mut time = 0.0;
-        while swept.samples < samples && !(time > end) && time <= 1.0 {
+        while swept.samples < samples && !(time > end) {
             let now = sample(time, &unsigned)?;
             swept.samples += 1;
             if now.touches {
@@ -167,7 +167,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             }
             time = next;
         }
-        swept.clear_until = if time > end || time > 1.0 { ALWAYS } else { time };
+        swept.clear_until = if time > end { ALWAYS } else { time };
         Ok(swept)
     }
 }

@@ -259,12 +259,8 @@ impl Collector {
 
     /// The name of the next frame of this process: later than all received ones.
     pub fn next_id(&self) -> FrameId {
-        let in_work = self.frame.as_ref().map(|frame| frame.id);
-        let published = self.published_id();
-        let later = match (in_work, published) {
-            (Some(in_work), Some(published)) if published.is_after(&in_work) => Some(published),
-            _ => in_work.or(published),
-        };
+        // A frame in work is later than the published one: `begin` refuses every other.
+        let later = self.frame.as_ref().map(|frame| frame.id).or(self.published_id());
         let first = FrameId { mesh_id: self.mesh_id, session: 0, epoch: 1 };
         later.map_or(first, |last| FrameId { epoch: last.epoch.wrapping_add(1), ..last })
     }

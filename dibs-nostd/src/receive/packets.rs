@@ -240,13 +240,9 @@ pub(super) fn check(
     if all {
         return Ok(());
     }
-    for (row, position) in (first..).zip(positions) {
-        if !position.is_finite() {
-            return Err(ReceiveError::NotFinite { row });
-        }
-        if !is_within(position, limit) {
-            return Err(ReceiveError::TooFar { row });
-        }
-    }
-    Ok(())
+    let beyond = (first..).zip(positions).find(|(_, position)| !is_within(*position, limit));
+    beyond.map_or(Ok(()), |(row, position)| match position.is_finite() {
+        true => Err(ReceiveError::TooFar { row }),
+        false => Err(ReceiveError::NotFinite { row }),
+    })
 }

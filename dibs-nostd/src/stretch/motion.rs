@@ -88,3 +88,21 @@ pub(crate) fn too_fast<V: VertexTable + ?Sized>(
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// Whichever of the two surfaces lacks it. The other rows are compared.
+    #[test]
+    fn the_step_of_a_missing_row_is_not_a_number() {
+        let (whole, short) = ([Vec3::ONE; 3], [Vec3::ZERO; 2]);
+        let (whole, short) = (whole.as_slice(), short.as_slice());
+        for [now, before] in [[whole, short], [short, whole]] {
+            assert_eq!(largest_step(now, before, 0..2, 0.0), 3.0);
+            assert!(largest_step(now, before, 0..3, 9.0).is_nan());
+        }
+    }
+}

@@ -7,9 +7,6 @@
 use super::{FormatError, Tree, TriangleRow, format};
 use crate::Index;
 
-/// Most triangles of a 16-bit tree with adjacency: then at most four rows share their low 16 bits.
-pub(crate) const MAX_NARROW_TRIANGLES: u32 = 1 << 18;
-
 impl<I: Index> Tree<'_, I> {
     /// Whether the tree has adjacency, so that its surface has sides.
     #[must_use]
@@ -102,7 +99,7 @@ pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<bool, FormatEr
     if !tree.has_adjacency() {
         return Ok(false);
     }
-    if I::BYTES == 2 && triangles > MAX_NARROW_TRIANGLES {
+    if triangles > I::MAX_ADJACENT_TRIANGLES {
         return Err(FormatError::Section { kind: format::section::ADJACENCY });
     }
     let (mut triangle, mut is_closed) = (0, true);
@@ -152,7 +149,7 @@ mod tests {
     #[test]
     fn a_narrow_tree_has_at_most_four_rows_alike() {
         let missing = FormatError::Neighbour { triangle: 320, edge: 0 };
-        let (most, more) = (MAX_NARROW_TRIANGLES, MAX_NARROW_TRIANGLES + 1);
+        let (most, more) = (u16::MAX_ADJACENT_TRIANGLES, u16::MAX_ADJACENT_TRIANGLES + 1);
         let too_many = FormatError::Section { kind: format::section::ADJACENCY };
         assert_eq!(refusal::<u16>(IndexWidth::Bits16, most), missing);
         assert_eq!(refusal::<u16>(IndexWidth::Bits16, more), too_many);

@@ -37,16 +37,20 @@ pub trait Index: core::fmt::Debug + sealed::Sealed + Copy + 'static {
     const MAX_RADIUS_CODE: u32;
     /// Vertices that this width can address.
     const MAX_VERTICES: u32;
+    /// Most triangles of a tree of this width with adjacency. In 16 bits at most four rows then share their low bits.
+    const MAX_ADJACENT_TRIANGLES: u32;
 }
 
 impl Index for u16 {
     const BYTES: usize = 2;
     const MAX_RADIUS_CODE: u32 = 0xFFFF;
     const MAX_VERTICES: u32 = 0x1_0000;
+    const MAX_ADJACENT_TRIANGLES: u32 = 0x4_0000;
 }
 
 impl Index for u32 {
     const BYTES: usize = 4;
     const MAX_RADIUS_CODE: u32 = 0x100_0000;
     const MAX_VERTICES: u32 = 0x1000_0000;
+    const MAX_ADJACENT_TRIANGLES: u32 = u32::MAX;
 }

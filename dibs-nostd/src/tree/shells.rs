@@ -106,7 +106,7 @@ pub(super) const fn check<I: Index>(tree: &Tree<'_, I>) -> Result<(), FormatErro
         }
         if solid != OPEN {
             match tree.shell(solid) {
-                Some((_, own)) if solid <= tree.header.other_roots && own == solid => (),
+                Some((_, own)) if own == solid => (),
                 _ => return Err(ERROR),
             }
         }

@@ -110,6 +110,20 @@ impl Default for Trackers {
     }
 }
 
+/// The board's program that follows a script of frames with these rows and of ticks of these kinds, by
+/// [`run`](crate::track::run).
+#[macro_export]
+macro_rules! follow {
+    ($rows:ty, $kinds:expr) => {
+        #[cortex_m_rt::entry]
+        fn main() -> ! {
+            static mut MEMORY: $crate::track::Memory = $crate::track::Memory::new();
+            static mut TRACKERS: $crate::track::Trackers = $crate::track::Trackers::new();
+            board::answer(|board| $crate::track::run::<$rows, { $kinds }>(MEMORY, TRACKERS, board))
+        }
+    };
+}
+
 /// Follows a script to its end, whose frames have these rows. Of a tick's bits those in `KINDS` count, so that a program may
 /// hold the tracker once, as a controller does.
 ///

@@ -252,7 +252,7 @@ fn a_tick_ends_within_its_instructions() {
     let same = |one: Proximity, other: Proximity| format!("{one:?}") == format!("{other:?}");
     assert!(same(cut, asked(limits.budget(budget))));
     assert!(same(whole, asked(limits.instructions(instructions).budget(Budget::UNLIMITED))));
-    // Only what a budget counts besides the tests comes on top.
+    // Within a limit the answer's node tests include the other work that a budget counts. Nothing else differs.
     let mut ample = asked(limits.budget(budget).instructions(u32::MAX));
     ample.node_tests = whole.node_tests;
     assert!(same(ample, whole));

@@ -347,8 +347,8 @@ fn nothing_unverified_is_admitted() {
     assert!((1..5).contains(&admitted), "{admitted}");
 }
 
-/// Searches count against the budget at the cost that the filter was given: by default that of a tick. One that costs
-/// more than the budget is not made.
+/// Each search takes instructions from the filter's budget, by the filter's [`Cost`], which is that of a tracker's tick
+/// unless another is given. A search that would take more than the budget has is not made.
 #[test]
 fn a_search_costs_what_the_filter_was_told() {
     let mut bench = Bench::new(&ball(3), 1.0);

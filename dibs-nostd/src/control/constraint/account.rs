@@ -89,9 +89,9 @@ impl EnergyAccount {
         Ok(Self { tank, step, stiffness, fall, speed, balance: tank, force: Vec3::ZERO })
     }
 
-    /// The most energy (mJ) that a wall gives beyond what it received and what recovered, at this period (s) and speeds
-    /// up to the stated one: the tank, and what the largest force `F` gives while it falls to zero, at most
-    /// `speed period (F + step / 2)^2 / (2 step)`.
+    /// The most energy (mJ) that a wall gives, less the energy that it received and that by which its account recovered over
+    /// time, at this period (s) and speeds up to the stated one: the tank, and what the largest force `F` gives while it
+    /// falls to zero, at most `speed period (F + step / 2)^2 / (2 step)`.
     #[must_use]
     pub const fn most(&self, period: f32) -> f32 {
         self.tank + self.fall * (self.speed * period)
@@ -257,9 +257,9 @@ mod tests {
         assert!(exceeded > 50, "{exceeded}");
     }
 
-    /// The most energy given, less what recovered, in 10 s by a wall that asks for a force of up to 5 N in any direction,
-    /// at motions of up to the stated speed that know the force: into the wall slowly or fast, and along its force as fast
-    /// as they can. Some are not measured.
+    /// The most energy given in 10 s, less that by which the account recovered over time, by a wall that asks for a force of
+    /// up to 5 N in any direction, at motions of up to the stated speed that know the force: into the wall slowly or fast,
+    /// and along its force as fast as they can. Some are not measured.
     fn taken(seed: u32) -> f32 {
         let mut account = account();
         let mut seed = seed.wrapping_mul(2_654_435_761) | 1;

@@ -40,7 +40,7 @@ impl HalfSpace {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nearest {
     pub point: Vector,
-    /// Whether it is in every half-space. If not, no point is.
+    /// Whether it is in every half-space. If not, either no point is, or none was found in [`STEPS`] steps.
     pub is_inside: bool,
 }
 

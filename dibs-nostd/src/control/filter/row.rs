@@ -1,5 +1,7 @@
 //! Inequalities on a motion: a caller's, and those of walls.
 
+use core::ops::RangeInclusive;
+
 use glam::Vec3;
 use heapless::Vec;
 
@@ -15,7 +17,7 @@ const MOST: usize = 16;
 pub(super) const MOST_OWN: usize = 8;
 
 /// Range of the length of a row's factors, whose squares f32 holds.
-const LENGTHS: [f32; 2] = [1e-15, 1e15];
+const LENGTHS: RangeInclusive<f32> = 1e-15..=1e15;
 
 /// Shortfall (mm) of a caller's row that is ignored.
 const SHORTFALL: f32 = 1e-4;
@@ -51,24 +53,22 @@ impl MotionRow {
 
     /// The half-space; `None` if a number is not finite, or a length is out of range. Factors of zero have none.
     fn checked(&self, lever: f32) -> Option<HalfSpace> {
-        let (row, length) = self.scaled(lever);
-        let is_zero = [self.linear, self.angular] == [[0.0; 3]; 2];
-        let [shortest, longest] = LENGTHS;
-        let has_length = length >= shortest && length <= longest;
-        ((is_zero || has_length) && row.least.is_finite()).then_some(row)
+        if [self.linear, self.angular] == [[0.0; 3]; 2] {
+            let row = HalfSpace { factors: [0.0; 6], least: self.least };
+            return row.least.is_finite().then_some(row);
+        }
+        let (row, length) = self.scaled(lever)?;
+        LENGTHS.contains(&length).then_some(row)
     }
 
     /// The half-space, with rotations as lengths at the end of a lever, and the length of the factors before
-    /// normalisation.
-    fn scaled(&self, lever: f32) -> (HalfSpace, f32) {
+    /// normalisation; `None` if these have no direction, or its limit is not finite.
+    fn scaled(&self, lever: f32) -> Option<(HalfSpace, f32)> {
         let ([a, b, c], [d, e, f]) = (self.linear, self.angular);
-        let mut factors = [a, b, c, d / lever, e / lever, f / lever];
+        let factors = [a, b, c, d / lever, e / lever, f / lever];
         let length = sqrt(dot(&factors, &factors));
-        if !(length > 0.0) {
-            return (HalfSpace { factors: [0.0; 6], least: self.least }, 0.0);
-        }
-        factors.iter_mut().for_each(|x| *x /= length);
-        (HalfSpace { factors, least: self.least / length }, length)
+        let row = HalfSpace { factors: factors.map(|x| x / length), least: self.least / length };
+        (length > 0.0 && row.least.is_finite()).then_some((row, length))
     }
 }
 
@@ -115,12 +115,9 @@ impl Rows {
         let sum = normal.dot(at.translation) + angular.dot(at.rotation);
         let least = sum - distance;
         let row = MotionRow { linear: normal.to_array(), angular: angular.to_array(), least };
-        let (HalfSpace { factors, least: zero }, length) = row.scaled(self.lever);
         // A normal of zero or NaN has no direction.
-        if !(length > 0.0 && zero.is_finite()) {
-            return;
-        }
-        let wall = Wall { pair, factors, zero, length };
+        let Some((row, length)) = row.scaled(self.lever) else { return };
+        let wall = Wall { pair, factors: row.factors, zero: row.least, length };
         if self.walls.len() + self.own.len() >= MOST {
             let point = at.to_vector(self.lever);
             let clear = |wall: &Wall| dot(&wall.factors, &point) - wall.zero;

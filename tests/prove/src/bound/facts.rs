@@ -124,7 +124,7 @@ pub(super) const TEST: Count =
     Count::Calls(&[Function("leaf"), Function("test_triangle")], "closest_to_");
 pub(super) const WARM: Count =
     Count::Calls(&[Function("start"), Function("test_triangle")], "closest_to_");
-pub(super) const POP: Count =
+const POP: Count =
     Count::Heads(&[Line(SEARCH, "while let Some(Waiting { lower, link }) = self.pop() {")]);
 pub(super) const PUSH: Count = Count::Passes(&[
     Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
@@ -156,6 +156,28 @@ pub(super) const MOVES_FOR_EACH_ENTRY: Fact = Fact {
     because: "a node's entries are sorted among themselves: k of them take at most k (k - 1) / 2 moves, and k is at most 8",
 };
 
+pub(super) const WAITING_ENTRIES: Fact = Fact {
+    name: "waiting entries",
+    terms: &[(1, Count::Heads(&[Function("least_waiting")])), (1, POP), (-1, PUSH)],
+    most: Most { base: 3, roots: 1, nodes: 0, triangles: 0 },
+    because: "what waits was pushed and not popped; the roots are pushed before; each loop has a turn more where it ends",
+};
+
+pub(super) const TURNS_OF_A_LEAF: Fact = Fact {
+    name: "turns of a leaf",
+    terms: &[(1, TURN), (-1, TRIANGLE), (-1, VISIT)],
+    most: Most::base(1),
+    because: "only the best triangle is passed over without a count, at most once a visit; out of budget the search ends",
+};
+
+pub(super) const VISITS_OF_LEAVES: Fact = Fact {
+    name: "visits of leaves",
+    terms: &[(1, VISIT), (-1, LEAF_PLANE)],
+    most: Most { base: 1, roots: 1, nodes: 0, triangles: 0 },
+    because: "a leaf waits once its plane did not reject it, except a root, and where the budget cannot cover its visit \
+              either",
+};
+
 const ROWS: &[Fact] = &[
     Fact {
         name: "node tests",
@@ -171,25 +193,9 @@ const ROWS: &[Fact] = &[
     },
     EIGHT_CHILDREN,
     MOVES_FOR_EACH_ENTRY,
-    Fact {
-        name: "waiting entries",
-        terms: &[(1, Count::Heads(&[Function("least_waiting")])), (1, POP), (-1, PUSH)],
-        most: Most { base: 3, roots: 1, nodes: 0, triangles: 0 },
-        because: "what waits was pushed and not popped; the roots are pushed before; each loop has a turn more where it ends",
-    },
-    Fact {
-        name: "turns of a leaf",
-        terms: &[(1, TURN), (-1, TRIANGLE), (-1, VISIT)],
-        most: Most::base(1),
-        because: "only the best triangle is passed over without a count, at most once a visit; out of budget the search ends",
-    },
-    Fact {
-        name: "visits of leaves",
-        terms: &[(1, VISIT), (-1, LEAF_PLANE)],
-        most: Most { base: 1, roots: 1, nodes: 0, triangles: 0 },
-        because: "a leaf waits once its plane did not reject it, except a root, and where the budget cannot cover its visit \
-                  either",
-    },
+    WAITING_ENTRIES,
+    TURNS_OF_A_LEAF,
+    VISITS_OF_LEAVES,
     Fact {
         name: "the first entry",
         terms: &[(1, Count::Heads(&[Line(SEARCH, "search.push(0, subtree)"), Function("push")]))],

@@ -155,9 +155,10 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
          [sided.rs](../../tests/prove/src/bound/sided.rs). Its base holds up to 32 tied triangles, each at another \
          vertex; its node test holds the work in f64, by software on this processor, which is counted as node tests of typical \
          time.\n\n\
-         A *tracker's tick* is `Tracker::closest` within a budget, unsigned, of a tracker of {SLOTS} opened nodes that was never asked for a side, \
-         on a surface between two frames: the whole tick, with what it remembers and a whole query where its front is full. `n` is all \
-         that its budget counts ([prices.rs](../../dibs-nostd/src/query/prices.rs)). Its facts are of [tracked.rs](../../tests/prove/src/bound/tracked.rs).\n\n\
+         A *tracker's tick* is a call of `Tracker::closest`, unsigned and with a budget, on a surface between two frames, by a tracker that \
+         has room for {SLOTS} opened nodes and was never asked for a side. The bound is on the whole call: the visits of the opened nodes, and the \
+         query from the root that follows where the room is used up. A tick's `n` also counts the work besides node tests that a budget pays \
+         for ([prices.rs](../../dibs-nostd/src/query/prices.rs)). Its facts are of [tracked.rs](../../tests/prove/src/bound/tracked.rs).\n\n\
          | query | base | root | node test | triangle test | times the typical base, node and triangle test | functions | instructions in the graph |\n\
          |---|---:|---:|---:|---:|---|---:|---:|\n",
         run.commit, run.compiler, run.emulator

@@ -4,8 +4,8 @@
 
 use super::facts::{
     CHILD, COPIES, Count, EIGHT_CHILDREN, Fact, Facts, KEPT, LEAF_PLANE, MOVES_FOR_EACH_ENTRY,
-    Most, NO_SIDE, NO_TIES, Never, OTHERS, POP, PUSH, ROOT_MOVE, ROOT_TURN, SEARCH, TEST, TRIANGLE,
-    TURN, VISIT, WARM, WITHOUT_EDGE,
+    Most, NO_SIDE, NO_TIES, Never, OTHERS, ROOT_MOVE, ROOT_TURN, SEARCH, TEST, TRIANGLE,
+    TURNS_OF_A_LEAF, VISIT, VISITS_OF_LEAVES, WAITING_ENTRIES, WARM, WITHOUT_EDGE,
 };
 use super::lines::Within::{self, Function, Line};
 
@@ -176,25 +176,9 @@ const TWICE_FOR_EACH_ROOT: Most = Most { base: 0, roots: 2, nodes: 0, triangles:
 const WHOLE: &[Fact] = &[
     EIGHT_CHILDREN,
     MOVES_FOR_EACH_ENTRY,
-    Fact {
-        name: "waiting entries",
-        terms: &[(1, Count::Heads(&[Function("least_waiting")])), (1, POP), (-1, PUSH)],
-        most: Most { base: 3, roots: 1, nodes: 0, triangles: 0 },
-        because: "what waits was pushed and not popped; the roots are pushed before; each loop has a turn more where it ends",
-    },
-    Fact {
-        name: "turns of a leaf",
-        terms: &[(1, TURN), (-1, TRIANGLE), (-1, VISIT)],
-        most: Most::base(1),
-        because: "only the best triangle is passed over without a count, at most once a visit; out of budget the search ends",
-    },
-    Fact {
-        name: "visits of leaves",
-        terms: &[(1, VISIT), (-1, LEAF_PLANE)],
-        most: Most { base: 1, roots: 1, nodes: 0, triangles: 0 },
-        because: "a leaf waits once its plane did not reject it, except a root, and where the budget cannot cover its visit \
-                  either",
-    },
+    WAITING_ENTRIES,
+    TURNS_OF_A_LEAF,
+    VISITS_OF_LEAVES,
     Fact {
         name: "the first entries",
         terms: &[(1, Count::Heads(&[Line(SEARCH, "search.push(0, subtree)"), Function("push")]))],

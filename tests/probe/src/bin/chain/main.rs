@@ -1,18 +1,11 @@
-//! Follows the ticks of the script `script.bin` on the emulated board, of any kind, and writes `answers.bin`. With
-//! `-icount shift=6` an instruction takes 64 ns, or 1.6 counts of the 25 MHz clock.
+//! As `track`, with ticks of any kind.
 #![no_std]
 #![no_main]
 
 #[path = "../board/mod.rs"]
 mod board;
 
-use cortex_m_rt::entry;
 use probe::rows::Vertices;
-use probe::track::{Memory, Trackers, run, tick};
+use probe::track::tick;
 
-#[entry]
-fn main() -> ! {
-    static mut MEMORY: Memory = Memory::new();
-    static mut TRACKERS: Trackers = Trackers::new();
-    board::answer(|board| run::<Vertices, { !tick::APART }>(MEMORY, TRACKERS, board))
-}
+probe::follow!(Vertices, !tick::APART);

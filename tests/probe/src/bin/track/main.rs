@@ -6,13 +6,7 @@
 #[path = "../board/mod.rs"]
 mod board;
 
-use cortex_m_rt::entry;
 use probe::rows::Vertices;
-use probe::track::{Memory, Trackers, run, tick};
+use probe::track::tick;
 
-#[entry]
-fn main() -> ! {
-    static mut MEMORY: Memory = Memory::new();
-    static mut TRACKERS: Trackers = Trackers::new();
-    board::answer(|board| run::<Vertices, { tick::INTERPOLATED }>(MEMORY, TRACKERS, board))
-}
+probe::follow!(Vertices, tick::INTERPOLATED);
