@@ -56,6 +56,8 @@ protected:
 /** A validated tree. The bytes outlive it. */
 struct Tree : Object<dibs_tree, DIBS_TREE_SIZE, dibs_tree_init> {
     Code init(Span<const uint8_t> tree) { return Object::init(tree.data(), tree.size()); }
+    /** The number in the mesh's file of the vertex in a row, such as one of an answer's `corners`. */
+    Code vertex_number(uint32_t row, uint32_t &number) { return dibs_tree_vertex_number(*this, row, &number); }
     /** Copies the positions, or velocities, of the mesh file's vertices into the tree's order, which a frame needs: `rows`
      *  are the first of `room`, in which as many as `values` are enough. */
     Code to_rows(Span<const float> values, Span<float> room, Span<float> &rows) {

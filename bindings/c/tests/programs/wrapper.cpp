@@ -181,6 +181,20 @@ int main(int argc, char **argv) {
     MUST(query.closest(frame, tool, at_rest));
     EXPECT(true, on_bus.separation == at_rest.separation && at_rest.separation > 0.0f);
 
+    /* A corner's number in the mesh's file is the one whose position its row takes. */
+    std::vector<float> numbers, numbered(positions.size());
+    for (std::uint32_t number = 0; number < facts.file_vertices; number++) {
+        numbers.insert(numbers.end(), {static_cast<float>(number), 0.0f, 0.0f});
+    }
+    dibs::Span<float> by_row;
+    std::uint32_t number;
+    MUST(tree.to_rows(numbers, numbered, by_row));
+    for (const auto row : at_rest.corners) {
+        MUST(tree.vertex_number(row, number));
+        EXPECT(true, by_row[3 * row] == static_cast<float>(number));
+    }
+    EXPECT(DIBS_CODE_ARGUMENT, tree.vertex_number(facts.vertices, number));
+
     std::array<dibs_row, DIBS_CONTACTS> room;
     dibs::Span<dibs_row> rows;
     MUST(query.contacts(frame, tool, 60.0f, contacts));
