@@ -118,8 +118,8 @@ impl<'p> Builder<'p> {
 
     /// A volume whose nodes move the surface: a frame then holds the nodes' positions, and the stretch limit is that of
     /// each tetrahedron. Radii are lengths of paths through the volume, and the tree carries no metric of triangles.
-    /// [`construction`](Self::construction) and [`paths`](Self::paths) have no effect, except for the leaves of the
-    /// paper's construction.
+    /// [`construction`](Self::construction) and [`paths`](Self::paths) have no effect, except that the paper's construction
+    /// has one triangle a leaf, and two children a node.
     ///
     /// A vertex is bound to the tetrahedron around it by weights of 16 bits; the tree's rest shape is computed from
     /// these. Its distance from the mesh, times the stretch limit, is added to the error of every answer.

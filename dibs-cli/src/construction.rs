@@ -6,7 +6,8 @@ use dibs_build::{Construction, Paths};
 /// How a tree is built.
 #[derive(clap::Args)]
 pub struct ConstructionArgs {
-    /// How sections are pinned and split, and their radii measured
+    /// How sections are pinned and split, and their radii measured; of a build with --nodes, only how many triangles a
+    /// leaf has, and children a node
     #[arg(long, value_enum, default_value = "default")]
     construction: Name,
 }

@@ -1351,7 +1351,7 @@ typedef struct {
    */
   uint32_t triangle;
   /**
-   * That triangle's corners: rows of vertices.
+   * That triangle's corners: rows of vertices, for `dibs_tree_vertex_number`.
    */
   uint32_t corners[3];
   /**
@@ -1468,7 +1468,7 @@ typedef struct {
    */
   uint32_t triangle;
   /**
-   * That triangle's corners: rows of vertices.
+   * That triangle's corners: rows of vertices, for `dibs_tree_vertex_number`.
    */
   uint32_t corners[3];
   /**
@@ -3493,6 +3493,13 @@ dibs_code dibs_tree_get_facts(dibs_tree *tree, dibs_tree_facts *facts);
 dibs_code dibs_tree_rest_position(dibs_tree *tree,
                                   uint32_t row,
                                   dibs_vec3 *position);
+
+/**
+ * The number, from 0, that the vertex in a row has in the mesh's file. An answer's `corners` are rows.
+ *
+ * @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or if the tree was built without its vertex order.
+ */
+dibs_code dibs_tree_vertex_number(dibs_tree *tree, uint32_t row, uint32_t *number);
 
 /**
  * Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows,

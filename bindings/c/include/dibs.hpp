@@ -56,6 +56,8 @@ protected:
 /** A validated tree. The bytes outlive it. */
 struct Tree : Object<dibs_tree, DIBS_TREE_SIZE, dibs_tree_init> {
     Code init(Span<const uint8_t> tree) { return Object::init(tree.data(), tree.size()); }
+    /** The number in the mesh's file of the vertex in a row, such as one of an answer's `corners`. */
+    Code vertex_number(uint32_t row, uint32_t &number) { return dibs_tree_vertex_number(*this, row, &number); }
     /** Copies the positions, or velocities, of the mesh file's vertices into the tree's order, which a frame needs: `rows`
      *  are the first of `room`, in which as many as `values` are enough. */
     Code to_rows(Span<const float> values, Span<float> room, Span<float> &rows) {
@@ -124,11 +126,23 @@ template <uint32_t Vertices> struct Tracker : Object<dibs_tracker, DIBS_TRACKER_
     Code contacts(const dibs_tool &tool, float margin, dibs_contacts *list, Options options = {}) {
         return dibs_tracker_contacts(*this, &tool, margin, options, list, nullptr);
     }
+    /** Whether tool and surface come closer than a margin between two ticks, and when first. */
+    Code sweep(const dibs_sweep &sweep, dibs_swept &swept, Options options = {}) {
+        return dibs_tracker_sweep(*this, &sweep, options, &swept);
+    }
 };
 /** The closest pair of several trackers, each with a tool. */
 inline Code closest_of(Span<dibs_tracker *const> trackers, Tools tools, dibs_tracked &pair, Options options = {}) {
     return dibs_tracker_closest_of(trackers.data(), tools.data(), common(trackers, tools), options, &pair);
 }
+/** An account of the energy that a wall's force gives to the hand, which bounds it. */
+struct Account : Object<dibs_account, DIBS_ACCOUNT_SIZE, dibs_account_init> {
+    /** The force to apply for the next period, at every tick. */
+    Code pass(dibs_vec3 force, dibs_vec3 velocity, float period, dibs_vec3 &applied) {
+        return dibs_account_pass(*this, force, velocity, period, &applied);
+    }
+    Code balance(float &balance) { return dibs_account_balance(*this, &balance); }
+};
 /** A filter of commands: the motion nearest to a commanded one that keeps a chain of tools out of the tissue. */
 struct Filter : dibs_filter {
     Filter(float stand_off, float speed, Span<const dibs_stand_off_of> of_labels = {})

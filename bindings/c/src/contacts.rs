@@ -67,7 +67,7 @@ pub struct dibs_contact {
     pub tool: u32,
     /// Row of the triangle.
     pub triangle: u32,
-    /// That triangle's corners: rows of vertices.
+    /// That triangle's corners: rows of vertices, for `dibs_tree_vertex_number`.
     pub corners: [u32; 3],
     /// Weights of the corners at `point_on_surface`.
     pub barycentric: [f32; 3],

@@ -190,7 +190,7 @@ pub struct dibs_proximity {
     pub axis_parameter: f32,
     /// Row of the triangle of `point_on_surface`, or `DIBS_NO_TRIANGLE`.
     pub triangle: u32,
-    /// That triangle's corners: rows of vertices.
+    /// That triangle's corners: rows of vertices, for `dibs_tree_vertex_number`.
     pub corners: [u32; 3],
     /// Weights of the corners at `point_on_surface`: not negative, sum 1.
     pub barycentric: [f32; 3],

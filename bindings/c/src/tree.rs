@@ -147,6 +147,22 @@ pub extern "C" fn dibs_tree_rest_position(
     })
 }
 
+/// The number, from 0, that the vertex in a row has in the mesh's file. An answer's `corners` are rows.
+///
+/// @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or if the tree was built without its vertex order.
+#[unsafe(no_mangle)]
+pub extern "C" fn dibs_tree_vertex_number(
+    tree: *mut dibs_tree,
+    row: u32,
+    number: *mut u32,
+) -> dibs_code {
+    dibs_code::of(|| {
+        let (number, tree) = (number.check()?, &tree.share()?.tree);
+        number.set(tree.vertex_number(row).ok_or(dibs_code::Argument)?.0);
+        Ok(())
+    })
+}
+
 /// Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows,
 /// as a frame needs them. A frame in the file's order gives wrong distances without an error, unless it is measured.
 /// Only the order changes. Positions are in mm, less the tree's origin, which is not zero for a mesh far from the origin

@@ -3,6 +3,7 @@
 //! One program for all, because each would compile the queries of Rust anew.
 
 mod account;
+mod corners;
 mod filter;
 mod guard;
 mod header;

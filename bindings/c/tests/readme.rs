@@ -116,7 +116,7 @@ fn expected<I: Index>(built: &BuiltTree, positions: &[Vec3]) -> String {
 }
 
 /// A generated heart whose vertices are in another order, with one of no triangle.
-fn shuffled(triangles: u32) -> Mesh {
+pub fn shuffled(triangles: u32) -> Mesh {
     let heart = generate::heart(triangles).expect("a size").mesh;
     let count = heart.positions.len() as u32;
     let turned = |vertex: u32| (vertex * 7 + 3) % count;

@@ -89,7 +89,8 @@ class Guard(Remade):
     test counts as 8.
 
     Times `now` are whole milliseconds of one clock, which may wrap at 2**32. Any thread may call; calls wait for each
-    other. A pickled copy has no surface yet.
+    other: a tick for another thread's slice of `work`, whole `frame` or bytes of one `receive`. A pickled copy has no
+    surface yet.
     """
 
     def __init__(

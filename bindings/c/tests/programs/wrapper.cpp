@@ -1,5 +1,5 @@
-/* Tests dibs.hpp: queries, scenes and trackers, a frame held and released by scope, and codes instead of exceptions.
- * Run by tests/wrapper.rs. */
+/* Tests dibs.hpp: queries, scenes, trackers and sweeps, nodes, an account, a frame held and released by
+ * scope, and codes instead of exceptions. Run by tests/wrapper.rs. */
 #include <dibs.hpp>
 
 #include <array>
@@ -37,7 +37,7 @@ void must(dibs_code code, int line) {
 } // namespace
 
 int main(int argc, char **argv) {
-    if (argc != 3) {
+    if (argc != 5) {
         return EXIT_FAILURE;
     }
     const auto bytes = read(argv[1]);
@@ -181,6 +181,44 @@ int main(int argc, char **argv) {
     MUST(query.closest(frame, tool, at_rest));
     EXPECT(true, on_bus.separation == at_rest.separation && at_rest.separation > 0.0f);
 
+    /* A corner's number in the mesh's file is the one whose position its row takes. */
+    std::vector<float> numbers, numbered(positions.size());
+    for (std::uint32_t number = 0; number < facts.file_vertices; number++) {
+        numbers.insert(numbers.end(), {static_cast<float>(number), 0.0f, 0.0f});
+    }
+    dibs::Span<float> by_row;
+    std::uint32_t number;
+    MUST(tree.to_rows(numbers, numbered, by_row));
+    for (const auto row : at_rest.corners) {
+        MUST(tree.vertex_number(row, number));
+        EXPECT(true, by_row[3 * row] == static_cast<float>(number));
+    }
+    EXPECT(DIBS_CODE_ARGUMENT, tree.vertex_number(facts.vertices, number));
+
+    /* The same heart, carried by nodes: the intervals of both answers have the true separation. */
+    const auto bytes_of_nodes = read(argv[3]);
+    const auto file = read(argv[4]);
+    const dibs::Span<const float> nodes(reinterpret_cast<const float *>(file.data()), file.size() / sizeof(float));
+    static dibs::Tree of_nodes;
+    static dibs::Query on_nodes;
+    dibs::Frame carried;
+    dibs_frame_facts of_frame;
+    dibs_proximity by_nodes;
+    dibs_interval one, other;
+    MUST(of_nodes.init(bytes_of_nodes));
+    MUST(on_nodes.init(of_nodes));
+    MUST(carried.init());
+    EXPECT(DIBS_CODE_VERTEX_COUNT, carried.set_nodes(of_nodes, {nodes.data(), nodes.size() - 3}));
+    MUST(carried.set_nodes(of_nodes, nodes, 0.25f));
+    MUST(dibs_frame_get_facts(carried, &of_frame));
+    EXPECT(true, of_frame.vertices == facts.vertices && of_frame.position_error >= 0.25f);
+    MUST(carried.set_nodes(of_nodes, nodes));
+    MUST(carried.measure(of_nodes));
+    MUST(on_nodes.closest(carried, tool, by_nodes));
+    MUST(dibs_proximity_interval(&at_rest, &one));
+    MUST(dibs_proximity_interval(&by_nodes, &other));
+    EXPECT(true, one.lower <= other.upper && other.lower <= one.upper);
+
     std::array<dibs_row, DIBS_CONTACTS> room;
     dibs::Span<dibs_row> rows;
     MUST(query.contacts(frame, tool, 60.0f, contacts));
@@ -222,6 +260,27 @@ int main(int argc, char **argv) {
     MUST(dibs::closest_of(both, chain, of_chain));
     EXPECT(true, of_chain.proximity.separation <= at_rest.separation);
     EXPECT(DIBS_CODE_ARGUMENT, dibs::closest_of(both, dibs::Tools(chain, 1), of_chain));
+
+    /* Between two ticks the tool goes through the surface, or stays. */
+    const dibs_tool within = {{0.0f, 0.0f, 20.0f}, {40.0f, 0.0f, 50.0f}, 2.5f};
+    dibs_swept swept;
+    MUST(trackers[0].sweep({tool, within, {1.0f, 1.0f}, 0.0f, 24}, swept));
+    EXPECT(true, swept.contact > 0.0f && swept.contact < 1.0f && swept.clear_until <= swept.contact);
+    MUST(trackers[0].sweep({tool, tool, {1.0f, 1.0f}, 0.0f, 24}, swept));
+    EXPECT(true, swept.contact == -1.0f && swept.clear_until >= 1.0f && swept.at_end.separation == at_rest.separation);
+    EXPECT(DIBS_CODE_MARGIN, trackers[0].sweep({tool, tool, {1.0f, 1.0f}, -1.0f, 24}, swept));
+
+    /* The force rises in steps, and what it gives leaves the tank. */
+    static dibs::Account account;
+    dibs_vec3 applied;
+    float full, balance;
+    EXPECT(DIBS_CODE_NULL, account.balance(full));
+    EXPECT(DIBS_CODE_GAIN, account.init(0.0f, 0.5f, 1.0f, 5.0f, 300.0f));
+    MUST(account.init(1.0f, 0.5f, 1.0f, 5.0f, 300.0f));
+    MUST(account.balance(full));
+    MUST(account.pass({3.0f, 0.0f, 0.0f}, {100.0f, 0.0f, 0.0f}, 0.001f, applied));
+    MUST(account.balance(balance));
+    EXPECT(true, applied.x == 0.5f && full == 1.0f && balance < full);
 
     /* The loop: the same frames, and an answer on the last of them. */
     static dibs::GuardedSurface<502> guarded;

@@ -99,6 +99,8 @@ pub fn accepted(server: &TcpListener) -> TcpStream {
     loop {
         if let Ok((peer, _)) = server.accept() {
             peer.set_nonblocking(false).unwrap();
+            // Else a message may wait until the bridge's system acknowledges the one before.
+            peer.set_nodelay(true).unwrap();
             peer.set_read_timeout(Some(PATIENCE)).unwrap();
             return peer;
         }

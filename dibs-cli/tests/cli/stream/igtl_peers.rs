@@ -6,14 +6,18 @@ use std::fs;
 use std::io::Write;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use dibs_build::glam::Vec3;
+use serde_json::Value;
 
 use super::igtl::{bridged, organ};
+use super::igtl_tool::{queried, text};
+use super::receiver::Seen;
 use super::{FRAMES, assert_all, heart, totals};
 
-/// A server of frames that a file has: big-endian f32, and the triangles as u32.
+/// A server of frames that a file has: big-endian f32, and the triangles as u32. For TRANSFORM a tool's pose comes before
+/// each, and the answers are printed.
 const SERVER: &str = "
 import sys, time
 import numpy as np, pyigtl
@@ -25,12 +29,16 @@ polygons = np.insert(faces, 0, 3, axis=1).reshape(-1)
 server = pyigtl.OpenIGTLinkServer(port=port)
 while not server.is_connected():
     time.sleep(0.01)
+pose = np.array([[0, -1, 0, 100], [1, 0, 0, -20], [0, 0, 1, 30], [0, 0, 0, 1]])
 for frame in frames:
-    if kind == 'POLYDATA':
-        message = pyigtl.PolyDataMessage(points=frame, polygons=polygons, device_name='heart')
-    else:
+    if kind == 'TRANSFORM':
+        server.send_message(pyigtl.TransformMessage(matrix=pose, device_name='pointer'), wait=True)
+        print(server.wait_for_message('pointer').string, flush=True)
+    if kind == 'POINT':
         message = pyigtl.PointMessage(positions=frame, device_name='heart')
-    message.header_version = 2 if kind == 'POLYDATA' else 1
+    else:
+        message = pyigtl.PolyDataMessage(points=frame, polygons=polygons, device_name='heart')
+    message.header_version = 1 if kind == 'POINT' else 2
     server.send_message(message, wait=True)
 time.sleep(60)
 ";
@@ -63,11 +71,16 @@ pub struct Peer {
 
 pub fn pyigtl() -> Peer {
     let python = std::env::var("DIBS_PYIGTL").expect("DIBS_PYIGTL: a Python with pyigtl");
-    let kinds = &["POLYDATA", "POINT"];
-    kinds.iter().for_each(|kind| arrive(Command::new(&python).args(["-c", SERVER]), kind));
+    let server = || {
+        let mut server = Command::new(&python);
+        server.args(["-c", SERVER]);
+        server
+    };
+    ["POLYDATA", "POINT"].iter().for_each(|kind| arrive(&mut server(), kind));
+    answered(&mut server());
     let version = "import importlib.metadata as found; print(found.version('pyigtl'))";
     let version = said(Command::new(&python).args(["-c", version]));
-    Peer { name: "pyigtl", version, kinds }
+    Peer { name: "pyigtl", version, kinds: &["POLYDATA", "POINT", "TRANSFORM"] }
 }
 
 pub fn cpp_library() -> Peer {
@@ -120,18 +133,55 @@ pub fn said(command: &mut Command) -> String {
 /// Every frame of a server's messages reaches the receiver as it was.
 fn arrive(server: &mut Command, kind: &str) {
     let folder = heart();
+    let (seen, output, _) = served(folder.path(), "", server, kind);
+    assert_all(&seen, &totals(&output));
+    assert_eq!(seen.error, 0.0, "{kind}");
+}
+
+/// Each pose of a tool, a quarter turn about z and a shift, is answered as `dibs query` does about a frame, and the server
+/// reads that.
+fn answered(server: &mut Command) {
+    let folder = heart();
     let folder = folder.path();
+    let asked = |frame| queried(folder, "100,-20,30,100,20.5,80,2.5", frame);
+    let asked: Vec<Value> = (0..FRAMES).map(asked).collect();
+    let line = "--tool 0,0,0,40.5,0,50,2.5 --tool-device pointer --tool-age 60000";
+    let (seen, output, said) = served(folder, line, server, "TRANSFORM");
+    assert_eq!((seen.published, seen.error), (FRAMES as u32, 0.0));
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!((lines.len(), said.lines().count()), (FRAMES, FRAMES), "{said}");
+    let mut found = 0;
+    for (line, said) in lines.iter().zip(said.lines()) {
+        if line["separation"].is_null() {
+            assert_eq!(line["reason"], said);
+            continue;
+        }
+        let asked = asked.iter().find(|asked| asked["separation"] == line["separation"]);
+        let asked = asked.unwrap_or_else(|| panic!("of no frame: {line}"));
+        for (field, value) in asked.as_object().unwrap() {
+            assert_eq!(line[field], *value, "{field}");
+        }
+        assert!(said.starts_with(&text(asked)), "{said}: {line}");
+        found += 1;
+    }
+    // Those before the first surface have none.
+    assert!(found > FRAMES / 2, "{found}: {said}");
+}
+
+/// What the receiver gets of a server's messages by a bridge with `line`, and what the bridge and the server say.
+fn served(folder: &Path, line: &str, server: &mut Command, kind: &str) -> (Seen, Output, String) {
     let (frames, triangles) = organ(folder);
     let mut data: Vec<u8> = triangles.iter().flatten().flat_map(|x| x.to_be_bytes()).collect();
     data.extend(frames.iter().flatten().flat_map(Vec3::to_array).flat_map(f32::to_be_bytes));
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let (count, corners) = (FRAMES.to_string(), triangles.len().to_string());
     server.args([&port.to_string(), &count, &corners, kind]);
-    let mut server = server.stdin(Stdio::piped()).spawn().unwrap();
+    let mut server = server.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     server.stdin.take().unwrap().write_all(&data).unwrap();
-    let (seen, output, ()) = bridged(folder, &format!("--from igtl:127.0.0.1:{port}"), || ());
+    let line = format!("--from igtl:127.0.0.1:{port} {line}");
+    let (seen, output, ()) = bridged(folder, &line, || ());
     server.kill().unwrap();
-    server.wait().unwrap();
-    assert_all(&seen, &totals(&output));
-    assert_eq!(seen.error, 0.0, "{kind}");
+    let said = server.wait_with_output().unwrap().stdout;
+    (seen, output, String::from_utf8(said).unwrap())
 }

@@ -88,7 +88,7 @@ fn answered(
 }
 
 /// What `dibs query` answers about a frame.
-fn queried(folder: &Path, tool: &str, frame: usize) -> Value {
+pub fn queried(folder: &Path, tool: &str, frame: usize) -> Value {
     let line =
         format!("query heart.dibs --vertices heart.pc2 --frame {frame} --json --tool {tool}");
     let output = program(folder, &line).output().unwrap();
@@ -97,7 +97,7 @@ fn queried(folder: &Path, tool: &str, frame: usize) -> Value {
 }
 
 /// How an answer begins that has this separation.
-fn text(answer: &Value) -> String {
+pub fn text(answer: &Value) -> String {
     let side = answer["side"].as_str().unwrap();
     format!("{:.2} mm, {side}, surface ", answer["separation"].as_f64().unwrap())
 }

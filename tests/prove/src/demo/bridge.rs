@@ -180,6 +180,8 @@ fn accept(listener: &TcpListener) -> Result<TcpStream> {
     loop {
         if let Ok((peer, _)) = listener.accept() {
             peer.set_nonblocking(false)?;
+            // Else a message may wait until the bridge's system acknowledges the one before.
+            peer.set_nodelay(true)?;
             return Ok(peer);
         }
         ensure!(start.elapsed() < PATIENCE, "`dibs bridge` does not connect");
