@@ -33,14 +33,14 @@ pub fn environment(folder: &Path, packages: &[&str]) -> Result<PathBuf> {
     Ok(own)
 }
 
-/// Installs packages into the environment of this Python, from wheels.
+/// Installs packages into the environment of this Python, from wheels where there are any: some have none.
 ///
 /// # Errors
 /// If a package is unavailable.
 pub fn install(python: &Path, packages: &[&str]) -> Result<()> {
     let mut pip = Command::new(python);
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
-    pip.args(["--only-binary", ":all:"]).args(packages);
+    pip.arg("--prefer-binary").args(packages);
     quiet(&mut pip, DOWNLOAD).context("Python packages cannot be had").map(drop)
 }
 

@@ -130,7 +130,8 @@ fn follow<I: Index>(
             times.push(start.elapsed().as_secs_f64() * 1e6);
             // Where the axis crosses or is wholly inside, other parts of it may be inside, less deep.
             let is_inside = matches!(closest.side, Side::Crossing | Side::Inside);
-            let is_bounded = is_inside && list.bound() == closest.lower;
+            // A tracker's own lower end is rounded once more.
+            let is_bounded = is_inside && (list.bound() - closest.lower).abs() <= closest.accuracy;
             let is_whole = list.bound() >= MARGIN || is_bounded;
             ensure!(is_whole, "tick {tick}: contacts only within {} of {closest:?}", list.bound());
             contacts.push(list.len() as f64);

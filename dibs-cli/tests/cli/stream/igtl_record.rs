@@ -135,8 +135,7 @@ fn the_bridge_is_recorded() {
     );
     for peer in [pyigtl(), cpp_library(), rust_crate()] {
         let (name, version, kinds) = (peer.name, peer.version, peer.kinds.join(", "));
-        writeln!(page, "| {name} | {version} | {kinds} | every one arrived to the bit |")
-            .unwrap();
+        writeln!(page, "| {name} | {version} | {kinds} | every one arrived to the bit |").unwrap();
     }
     let version = rclpy();
     writeln!(

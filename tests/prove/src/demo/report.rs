@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use controller::{SPEED, TICK_RATE};
 use controller::telemetry::{Summary, Tick, cause_code, fallback_code};
+use controller::{SPEED, TICK_RATE};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::wire::Event;
 use dibs_nostd::{Fallback, QueryError, Unavailable};
