@@ -3499,7 +3499,9 @@ dibs_code dibs_tree_rest_position(dibs_tree *tree,
  *
  * @return `DIBS_CODE_OK`, or `DIBS_CODE_ARGUMENT` outside the table or if the tree was built without its vertex order.
  */
-dibs_code dibs_tree_vertex_number(dibs_tree *tree, uint32_t row, uint32_t *number);
+dibs_code dibs_tree_vertex_number(dibs_tree *tree,
+                                  uint32_t row,
+                                  uint32_t *number);
 
 /**
  * Copies positions, or velocities, of the mesh file's vertices from that file's order into the tree's order of rows,
