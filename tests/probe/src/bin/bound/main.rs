@@ -15,6 +15,8 @@ fn main() -> ! {
     static mut MEMORY: Memory = Memory::new();
     static mut TRACKERS: Trackers = Trackers::new();
     board::answer(|board| {
-        run::<Vertices, { tick::INTERPOLATED | tick::APART }>(MEMORY, TRACKERS, board)
+        run::<Vertices, { tick::INTERPOLATED | tick::SIGNED | tick::APART }>(
+            MEMORY, TRACKERS, board,
+        )
     })
 }
