@@ -63,11 +63,9 @@ impl Sample {
         square(point, &self.corners)
     }
 
-    /// A bound on the depth from here to the end of a free length that is outside, if it is at most `enough`.
+    /// A bound on the depth from here to the end of a free length that is outside, if it is at most `enough`. It takes up
+    /// to two distances.
     fn passes(&self, way: &Free, point: impl Fn(f32) -> Vec3, enough: f32) -> Option<f32> {
-        if !way.is_outside {
-            return None;
-        }
         if way.from == self.along {
             return Some(0.0);
         }
@@ -132,16 +130,17 @@ impl Bound {
             (from.along + above_zero(-depth), to.along - above_zero(-to_depth));
         let (mut beside, mut distances) = (0.0, 0);
         let (ahead, behind) = (touches.ahead(from.along), touches.behind(to.along));
-        if ahead.from < to.along
-            && let Some(most) = from.passes(&ahead, point, enough)
-        {
-            (first, beside, distances) = (larger(first, ahead.to), most, 2);
+        if ahead.is_outside && ahead.from < to.along {
+            distances += 2;
+            if let Some(most) = from.passes(&ahead, point, enough) {
+                (first, beside) = (larger(first, ahead.to), most);
+            }
         }
-        if behind.from > from.along
-            && let Some(most) = to.passes(&behind, point, enough)
-        {
-            last = smaller(last, behind.to);
-            (beside, distances) = (larger(beside, most), distances + 2);
+        if behind.is_outside && behind.from > from.along {
+            distances += 2;
+            if let Some(most) = to.passes(&behind, point, enough) {
+                (last, beside) = (smaller(last, behind.to), larger(beside, most));
+            }
         }
         if !(first < last) {
             let middle = (from.along + to.along) * 0.5;

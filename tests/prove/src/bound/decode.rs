@@ -111,6 +111,10 @@ pub fn may_write(register: u32, first: u32, second: u32) -> bool {
     if first & 0xFE80 == 0xF880 {
         return is_field(second, 12);
     }
+    // Arithmetic with a number, of which parts are in place of registers; MUL, MLA and MLS.
+    if first >> 11 == 0b11110 && second >> 15 == 0 || first >> 4 == 0xFB0 {
+        return is_field(second, 8);
+    }
     let is_list = first & 0xFE40 == 0xE800;
     [(first, 0), (second, 0), (second, 8), (second, 12)]
         .into_iter()
@@ -140,16 +144,18 @@ pub fn signed(value: u32, bits: u32) -> u32 {
     ((value << shift).cast_signed() >> shift).cast_unsigned()
 }
 
+/// The number in MOVW or MOVT.
+pub fn half_word(first: u32, second: u32) -> u32 {
+    (first & 15) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
+}
+
 /// Target of a long branch that the linker inserted, from flash to the TCM: MOVW ip, MOVT ip, BX ip.
 pub fn long_branch(halves: [u32; 5]) -> Option<u32> {
     let [first, second, third, fourth, last] = halves;
-    let half = |first: u32, second: u32| {
-        (first & 15) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
-    };
     let loads_ip = first & 0xFBF0 == 0xF240
         && third & 0xFBF0 == 0xF2C0
         && second >> 8 & 15 == 12
         && fourth >> 8 & 15 == 12;
-    let target = half(third, fourth) << 16 | half(first, second);
+    let target = half_word(third, fourth) << 16 | half_word(first, second);
     (loads_ip && last == 0x4760).then_some(target & !1)
 }

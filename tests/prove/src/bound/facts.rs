@@ -22,8 +22,8 @@ pub enum Count {
     Heads(&'static [Within]),
     /// Entries to these loops.
     Entries(&'static [Within]),
-    /// Bytes copied, by the constant length of each call of a copying function.
-    Bytes(&'static str),
+    /// Bytes copied or cleared, by the constant in this register at each call of a function whose name contains this.
+    Bytes(&'static str, u32),
 }
 
 /// The right side of an inequality: a constant, plus so much for each of a query's counts.
@@ -112,12 +112,14 @@ pub(super) const PLANE: &str = "dibs-nostd/src/query/plane.rs";
 const SURFACE: &str = "dibs-nostd/src/modes/surface.rs";
 pub(super) const SEARCH: &str = "dibs-nostd/src/query/search.rs";
 
-pub(super) const CHILD: Count = Count::Passes(&[Line(NODE, "if squared > far * far {")]);
+pub(super) const CHILD_LINE: Within = Line(NODE, "if squared > far * far {");
+pub(super) const TRIANGLE_LINE: Within = Line(LEAF, "if patch_plane.has_beyond(a) &&");
+
+pub(super) const CHILD: Count = Count::Passes(&[CHILD_LINE]);
 pub(super) const LEAF_PLANE: Count =
     Count::Calls(&[Function("run"), Function("expand")], "Plane::beyond");
 pub(super) const VISIT: Count = Count::Calls(&[Function("run"), Function("leaf")], "Plane::beyond");
-pub(super) const TRIANGLE: Count =
-    Count::Passes(&[Function("run"), Line(LEAF, "if patch_plane.has_beyond(a) &&")]);
+pub(super) const TRIANGLE: Count = Count::Passes(&[Function("run"), TRIANGLE_LINE]);
 pub(super) const TURN: Count =
     Count::Passes(&[Function("run"), Line(LEAF, "if triangle == self.best_triangle {")]);
 pub(super) const TEST: Count =
@@ -228,7 +230,7 @@ pub(super) const COPIES: &[Fact] = &[
         name: "copied words",
         terms: &[
             (16, Count::Heads(&[Function("__aeabi_memcpy4")])),
-            (-1, Count::Bytes("__aeabi_memcpy4")),
+            (-1, Count::Bytes("__aeabi_memcpy4", 2)),
         ],
         most: Most::base(0),
         because: "each turn copies four words; the lengths are constants at the calls",

@@ -10,6 +10,7 @@
 
 pub mod analysis;
 pub mod decode;
+pub mod depth;
 pub mod facts;
 pub mod follow;
 pub mod graph;

@@ -9,11 +9,12 @@ use anyhow::{Context, Result, ensure};
 use xtask::toolchain::Cross;
 use xtask::{qemu, workspace};
 
+use super::depth::TRACKED_DEPTH;
 use super::facts::{Facts, MODAL, ONLY_FROM};
 use super::follow::{Traced, faults, planted_in_queries, trace};
 use super::queries::{Counted, KINDS, Proven, count, to_trace};
 use super::sided::{RING, SIDED_CAPSULE};
-use super::ticks::{self, TICK};
+use super::ticks::{self, TICKS};
 use super::tracked::{SLOTS, TRACKED};
 use super::walk::UNIT;
 use crate::harness::run::Run;
@@ -54,7 +55,8 @@ pub fn findings([probe, tracker]: [&Path; 2], queries: usize, traces: usize) -> 
     let start = Instant::now();
     let proven: Vec<Proven> =
         KINDS.iter().map(|kind| Proven::new(kind, probe, kind.facts)).collect::<Result<_>>()?;
-    let tick = Proven::new(&TICK, tracker, TICK.facts)?;
+    let ticks: Vec<Proven> =
+        TICKS.iter().map(|kind| Proven::new(kind, tracker, kind.facts)).collect::<Result<_>>()?;
     let seconds = start.elapsed().as_secs_f64();
     let counted = count(&proven, probe, queries)?;
     let traced = trace(&proven, probe, &to_trace(traces)?)?;
@@ -63,12 +65,14 @@ pub fn findings([probe, tracker]: [&Path; 2], queries: usize, traces: usize) -> 
         let decoded = proven.decoded(probe)?;
         rows.push(Row { proven, counted, traced, decoded });
     }
-    let counted = ticks::count(&tick, tracker, queries as u32)?;
-    let traced = ticks::trace(&tick, tracker, traces as u32)?;
-    let decoded = tick.decoded(tracker)?;
-    rows.push(Row { proven: tick, counted, traced, decoded });
+    for proven in ticks {
+        let counted = ticks::count(&proven, tracker, queries as u32)?;
+        let traced = ticks::trace(&proven, tracker, traces as u32)?;
+        let decoded = proven.decoded(tracker)?;
+        rows.push(Row { proven, counted, traced, decoded });
+    }
     let found = faults().map(|(kind, fault)| planted_in_queries(kind, probe, &fault));
-    let found: Vec<_> = found.chain([ticks::faults(tracker)]).collect::<Result<_>>()?;
+    let found: Vec<_> = found.chain(ticks::faults(tracker)).collect::<Result<_>>()?;
     let found = found.as_flattened();
     let unnoticed = found.iter().filter(|is_found| !**is_found).count();
     Ok(Findings { rows, planted: found.len(), unnoticed, seconds })
@@ -159,6 +163,9 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
          has room for {SLOTS} opened nodes and was never asked for a side. The bound is on the whole call: the visits of the opened nodes, and the \
          query from the root that follows where the room is used up. A tick's `n` also counts the work besides node tests that a budget pays \
          for ([prices.rs](../../dibs-nostd/src/query/prices.rs)). Its facts are of [tracked.rs](../../tests/prove/src/bound/tracked.rs).\n\n\
+         A tick *with side and depth* is of a surface as a query with side; the axis may be anywhere, and the tracker remembers the depth \
+         of earlier ticks. Its facts are also of [sided.rs](../../tests/prove/src/bound/sided.rs) and \
+         [depth.rs](../../tests/prove/src/bound/depth.rs).\n\n\
          | query | base | root | node test | triangle test | times the typical base, node and triangle test | functions | instructions in the graph |\n\
          |---|---:|---:|---:|---:|---|---:|---:|\n",
         run.commit, run.compiler, run.emulator
@@ -220,15 +227,18 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
         findings.planted,
         findings.unnoticed
     )?;
-    let (of_ticks, of_queries): (Vec<_>, Vec<_>) =
-        findings.rows.iter().partition(|row| row.proven.kind.id == TICK.id);
-    let (with_side, without): (Vec<_>, Vec<_>) =
-        of_queries.into_iter().partition(|row| row.proven.kind.is_signed);
+    let is_tick = |row: &&Row| TICKS.iter().any(|kind| kind.id == row.proven.kind.id);
+    let (of_ticks, of_queries): (Vec<_>, Vec<_>) = findings.rows.iter().partition(is_tick);
+    let is_signed = |row: &&Row| row.proven.kind.is_signed;
+    let (with_side, without): (Vec<_>, Vec<_>) = of_queries.into_iter().partition(is_signed);
+    let (with_depth, unsigned): (Vec<_>, Vec<_>) = of_ticks.into_iter().partition(is_signed);
     facts(&mut text, &MODAL, &without)?;
     text += "## Flow facts with side\n\n";
     facts(&mut text, &SIDED_CAPSULE, &with_side)?;
     text += "## Flow facts of a tracker's tick\n\n";
-    facts(&mut text, &TRACKED, &of_ticks)?;
+    facts(&mut text, &TRACKED, &unsigned)?;
+    text += "## Flow facts of a tick with side and depth\n\n";
+    facts(&mut text, &TRACKED_DEPTH, &with_depth)?;
     text += "## Of all\n\n";
     for (callee, caller) in ONLY_FROM {
         writeln!(

@@ -14,26 +14,27 @@ pub const RING: u32 = 16;
 
 /// For a sphere, whose axis is a point: it has no depth.
 pub const SIDED_SPHERE: Facts = Facts {
-    groups: &[SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
+    groups: &[COUNTED, SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
     never: &[ONE_SOLID, ONE_ROOT, CLOSED],
 };
 
 /// For a capsule whose axis is outside: no depth is searched.
 pub const SIDED_CAPSULE: Facts = Facts {
-    groups: &[SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
+    groups: &[COUNTED, SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
     never: &[ONE_SOLID, ONE_ROOT, CLOSED, NO_DEPTH, NO_MEMORY, NO_TOUCHES],
 };
 
 /// The same with a wrong fact, which a trace must refute.
 pub const SIDED_WITHOUT_EDGES: Facts = Facts {
-    groups: &[SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
+    groups: &[COUNTED, SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, COPIES],
     never: &[ONE_SOLID, ONE_ROOT, CLOSED, NO_DEPTH, NO_MEMORY, NO_TOUCHES, WITHOUT_EDGE],
 };
 
-const ONE_SOLID: Never = ("query::separation::signed", "solids::signed", "the tree has one root");
-const ONE_ROOT: Never = ("", "Roots::with_others", "the tree has one root");
+pub(super) const ONE_SOLID: Never =
+    ("query::separation::signed", "solids::signed", "the tree has one root");
+pub(super) const ONE_ROOT: Never = ("", "Roots::with_others", "the tree has one root");
 
-const CLOSED: Never = ("side::of_point", "is_crowded", "the surface is closed");
+pub(super) const CLOSED: Never = ("side::of_point", "is_crowded", "the surface is closed");
 
 const NO_DEPTH: Never = (
     "query::separation::signed",
@@ -55,11 +56,11 @@ const SIDE: &str = "dibs-nostd/src/query/side.rs";
 const EXACT: &str = "dibs-nostd/src/query/exact.rs";
 const NORMAL: &str = "dibs-nostd/src/query/normal.rs";
 
-const POPS: &str = "while let Some(Waiting { lower, link }) = self.pop() {";
-const SEARCH_POPS: &[Within] = &[Line(SEARCH, POPS)];
-const TIE_POPS: &[Within] = &[Line(TIES, POPS)];
+pub(super) const POPS: &str = "while let Some(Waiting { lower, link }) = self.pop() {";
+pub(super) const SEARCH_POPS: &[Within] = &[Line(SEARCH, POPS)];
+pub(super) const TIE_POPS: &[Within] = &[Line(TIES, POPS)];
 const SEARCHED: Count = Count::Entries(SEARCH_POPS);
-const TIE_TEST: Count = Count::Calls(&[Function("each_tie")], "closest_to_");
+pub(super) const TIE_TEST: Count = Count::Calls(&[Function("each_tie")], "closest_to_");
 const TIE_TURNS: &[Within] = &[Line(TIES, "if self.meter.triangle().is_none() {")];
 const FIRST_PUSH: &[Within] = &[Line(SEARCH, "search.push(0, subtree)"), Function("push")];
 
@@ -70,19 +71,23 @@ const AROUND: &[Within] =
 const RING_LINE: Within =
     Line(EXACT, "let Some((next, back)) = self.tree.across(row, corner) else {");
 const TURNED: Within = Line(EXACT, "let cosine = -P::dot(to_centre, edge);");
-const TURNED_F32: Count = Count::Passes(&[Of("add", "f32>"), TURNED]);
-const TURNED_F64: Count = Count::Passes(&[Of("add", "f64>"), TURNED]);
+pub(super) const TURNED_F32: Count = Count::Passes(&[Of("add", "f32>"), TURNED]);
+pub(super) const TURNED_F64: Count = Count::Passes(&[Of("add", "f64>"), TURNED]);
 const OTHER: Within = Line(EXACT, "Ok(seen.above_edge(&self.see(other)?))");
-const ACROSS_F32: Count = Count::Passes(&[Of("add", "f32>"), OTHER]);
-const ACROSS_F64: Count = Count::Passes(&[Of("add", "f64>"), OTHER]);
-const ADDED_F32: Count = Count::Calls(&[Of("add", "f32>")], "::closest");
-const ADDED_F64: Count = Count::Calls(&[Of("add", "f64>")], "::closest");
-const NORMALS: &[Within] = &[Line(NORMAL, "let [centre, from, to] = turned(at(row)?, corner);")];
+pub(super) const ACROSS_F32: Count = Count::Passes(&[Of("add", "f32>"), OTHER]);
+pub(super) const ACROSS_F64: Count = Count::Passes(&[Of("add", "f64>"), OTHER]);
+pub(super) const ADDED_F32: Count = Count::Calls(&[Of("add", "f32>")], "::closest");
+pub(super) const ADDED_F64: Count = Count::Calls(&[Of("add", "f64>")], "::closest");
+pub(super) const NORMALS: &[Within] =
+    &[Line(NORMAL, "let [centre, from, to] = turned(at(row)?, corner);")];
 const PLANES: &[Within] = &[Line(SIDE, "for row in rows {")];
+pub(super) const OUTWARD: Count = Count::Calls(&[Function("outward")], "pseudonormal");
+pub(super) const ROUGH: &[Within] = &[Line(SIDE, "let above = rough.of(rows)?;")];
+pub(super) const FINE: &[Within] = &[Line(SIDE, "let above = fine.of(again)?;")];
 const DROP: &[Within] = &[Line(TIES, "self.rows.retain(|tie| tie.square <= self.limit);")];
 
-/// Of the searches: the query's own, and those for ties.
-pub(super) const SEARCHES: &[Fact] = &[
+/// What a query counts, and what waits in its searches: its own, and those for ties.
+const COUNTED: &[Fact] = &[
     Fact {
         name: "node tests",
         terms: &[
@@ -108,8 +113,6 @@ pub(super) const SEARCHES: &[Fact] = &[
         most: Most { base: 0, roots: 0, nodes: 0, triangles: 1 },
         because: "the meter counts each exact test before its call, the warm ones and those of ties too",
     },
-    EIGHT_CHILDREN,
-    MOVES_FOR_EACH_ENTRY,
     Fact {
         name: "waiting entries",
         terms: &[
@@ -123,6 +126,12 @@ pub(super) const SEARCHES: &[Fact] = &[
         most: Most::base(0),
         because: "what waits was pushed and not popped; each search pushes the root before; each loop has a turn more where it ends",
     },
+];
+
+/// Of all searches.
+pub(super) const SEARCHES: &[Fact] = &[
+    EIGHT_CHILDREN,
+    MOVES_FOR_EACH_ENTRY,
     Fact {
         name: "turns of a leaf",
         terms: &[(1, TURN), (-1, TRIANGLE), (-1, VISIT), (-1, SEARCHED)],
@@ -188,9 +197,9 @@ pub(super) const SIDE_OF_POINT: &[Fact] = &[
             (1, Count::Heads(NORMALS)),
             (-1, TURNED_F32),
             (-1, TURNED_F64),
-            (-(RING as i64), Count::Calls(&[Function("outward")], "pseudonormal")),
-            (-(RING as i64), Count::Entries(&[Line(SIDE, ROUGH)])),
-            (-(RING as i64), Count::Entries(&[Line(SIDE, FINE)])),
+            (-(RING as i64), OUTWARD),
+            (-(RING as i64), Count::Entries(ROUGH)),
+            (-(RING as i64), Count::Entries(FINE)),
             (-(RING as i64), Count::Entries(TIE_POPS)),
         ],
         most: Most::base(0),
@@ -205,11 +214,8 @@ pub(super) const SIDE_OF_POINT: &[Fact] = &[
     },
 ];
 
-const ROUGH: &str = "let above = rough.of(rows)?;";
-const FINE: &str = "let above = fine.of(again)?;";
-
 /// Facts of the side's exact comparison, in f32 or f64: how the names of its functions end, how those of the facts end, and
-/// the line that starts it.
+/// the loop over ties.
 macro_rules! exact {
     ($of:literal, $in:literal, $start:ident) => {
         &[
@@ -225,8 +231,8 @@ macro_rules! exact {
             Fact {
                 name: concat!("deciding ties", $in),
                 terms: &[
-                    (1, Count::Heads(&[Line(SIDE, $start)])),
-                    (-33, Count::Entries(&[Line(SIDE, $start)])),
+                    (1, Count::Heads($start)),
+                    (-33, Count::Entries($start)),
                 ],
                 most: Most::base(0),
                 because: "a list has at most 32 ties, each passed over or added; one turn where they end",
@@ -244,5 +250,5 @@ macro_rules! exact {
     };
 }
 
-const IN_F32: &[Fact] = exact!("f32>", "", ROUGH);
-const IN_F64: &[Fact] = exact!("f64>", ", in f64", FINE);
+pub(super) const IN_F32: &[Fact] = exact!("f32>", "", ROUGH);
+pub(super) const IN_F64: &[Fact] = exact!("f64>", ", in f64", FINE);

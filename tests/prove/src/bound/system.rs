@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
-use super::decode::may_write;
+use super::decode::{half_word, may_write};
 use super::facts::{Count, Fact, Most};
 use super::graph::{Function, Program};
 use super::image::Image;
@@ -110,10 +110,10 @@ impl<'a> Finder<'a> {
                 let edges = heads.iter().flat_map(|(at, own)| own.enter.iter().map(|&e| (*at, e)));
                 each(edges.map(|(at, edge)| Part::Edge(at, edge)))
             }
-            Count::Bytes(callee) => {
-                let calls = self.calls(&[], callee)?;
-                let copied = calls.into_iter().map(|part| Ok((part, self.copied(part)?)));
-                copied.collect::<Result<_>>()?
+            Count::Bytes(callee, register) => {
+                let calls = self.calls(&[], callee)?.into_iter();
+                let bytes = calls.map(|part| Ok((part, self.bytes(part, *register)?)));
+                bytes.collect::<Result<_>>()?
             }
         };
         ensure!(!found.is_empty(), "nothing in the program matches {count:?}");
@@ -192,35 +192,36 @@ impl<'a> Finder<'a> {
         Ok(found)
     }
 
-    /// The bytes that a call copies.
-    fn copied(&self, part: Part) -> Result<i64> {
+    /// The bytes that a call copies or clears: their number is in this register.
+    fn bytes(&self, part: Part, register: u32) -> Result<i64> {
         let Part::Block(at, number) = part else { anyhow::bail!("copied by a jump") };
-        length(self.image, &self.program.functions[&at].blocks[number].instructions)
+        let instructions = &self.program.functions[&at].blocks[number].instructions;
+        length(self.image, instructions, register)
     }
 }
 
-/// The constant in r2 after these instructions, which end in a call.
+/// The constant in a register, one of the lower eight, after these instructions, which end in a call.
 ///
 /// # Errors
 /// If they do not load a constant.
-pub fn length(image: &Image, instructions: &[u32]) -> Result<i64> {
+pub fn length(image: &Image, instructions: &[u32], register: u32) -> Result<i64> {
     let last = instructions.last().copied().unwrap_or_default();
     for (number, &place) in instructions.iter().enumerate().rev() {
-        // In an IT block the length may or may not be loaded.
-        if is_under_it(image, &instructions[..number])? {
-            break;
-        }
+        let is_conditional = is_under_it(image, &instructions[..number])?;
         let first = image.code(place)?;
         let is_wide = first >> 11 >= 0b11101;
         let second = if is_wide { image.code(place + 2)? } else { 0 };
-        let byte = i64::from(second & 0xFF);
-        // MOVS r2; MOV.W r2 with a byte; MOVW r2.
+        // MOVS; MOV.W with a byte; MOVW.
         match (first, second >> 8) {
-            _ if first >> 8 == 0x22 => return Ok(i64::from(first & 0xFF)),
-            (0xF04F, 2) => return Ok(byte),
-            (0xF240, high) if high & 15 == 2 => return Ok(byte | i64::from(high >> 4 & 7) << 8),
+            // In an IT block the length may or may not be loaded.
+            _ if is_conditional && (place == last || may_write(register, first, second)) => break,
+            _ if first >> 8 == 0x20 | register => return Ok(i64::from(first & 0xFF)),
+            (0xF04F, to) if to == register => return Ok(i64::from(second & 0xFF)),
+            (_, to) if first & 0xFBF0 == 0xF240 && to & 15 == register => {
+                return Ok(i64::from(half_word(first, second)));
+            }
             // The call itself writes no register.
-            _ if place != last && may_write(2, first, second) => break,
+            _ if place != last && may_write(register, first, second) => break,
             _ => {}
         }
     }

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use dibs_build::{Builder, IndexWidth, Mesh, Motion, generate};
 use dibs_nostd::Capsule;
 use dibs_tests::deform::unit;
@@ -14,25 +14,42 @@ use fastrand::Rng;
 use glam::Vec3;
 use probe::track::{ANSWER_WORDS, tick};
 
+use super::depth::{TRACKED_DEPTH, TRACKED_DEPTH_WITHOUT_EDGES};
 use super::follow::{Asked, Fault, ROOT, Traced, planted, trace_ticks};
 use super::queries::{Counted, Kind, Proven, beside};
+use super::sided::RING;
 use super::tracked::{TRACKED, TRACKED_WITHOUT_EDGES};
 use super::walk::UNIT;
-use crate::probe::script::Table;
+use crate::probe::script::{Table, are_clear, bounded};
 use crate::probe::ticks::Script;
 use crate::probe::{COUNTING, run_on_board};
 
-/// Ticks within a budget, of the closest pair without a side.
-pub const TICK: Kind = Kind {
-    name: "capsule, a tracker's tick on a moving surface",
-    id: "tick",
-    root: "closest<dibs_nostd::surface::moving::SurfaceBlend",
-    is_capsule: true,
-    table: Table::Moving,
-    is_signed: false,
-    facts: &TRACKED,
-    fitted: None,
-};
+/// A part of the name of their function in the probe.
+const CLOSEST: &str = "closest<dibs_nostd::surface::moving::SurfaceBlend";
+
+/// Ticks within a budget: of the closest pair without a side, then with side and depth.
+pub const TICKS: [Kind; 2] = [
+    Kind {
+        name: "capsule, a tracker's tick on a moving surface",
+        id: "tick",
+        root: CLOSEST,
+        is_capsule: true,
+        table: Table::Moving,
+        is_signed: false,
+        facts: &TRACKED,
+        fitted: None,
+    },
+    Kind {
+        name: "capsule, a tracker's tick with side and depth",
+        id: "tick-depth",
+        root: CLOSEST,
+        is_capsule: true,
+        table: Table::Moving,
+        is_signed: true,
+        facts: &TRACKED_DEPTH,
+        fitted: None,
+    },
+];
 
 /// The [`Fallback`](dibs_nostd::Fallback) of an answer after which a whole query follows: its tests count more than once.
 const FULL: u32 = 4;
@@ -53,22 +70,41 @@ struct Ticks {
 impl Ticks {
     /// A tool that starts in the middle of a surface, wanders about, and leaps now and then. Each tick has another
     /// budget, from hardly any to more than enough.
-    fn about((mesh, motion): &(Mesh, Motion), ticks: u32, seed: u64) -> Result<Self> {
+    fn about(
+        (mesh, motion): &(Mesh, Motion),
+        is_signed: bool,
+        ticks: u32,
+        seed: u64,
+    ) -> Result<Self> {
         let built = Builder::new().index(IndexWidth::Bits16).stretch(2.0).build(mesh)?;
         let roots = i64::from(built.tree::<u16>()?.roots() - 1);
         let rows: Vec<Vec<Vec3>> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
+        if is_signed {
+            let triangles = bounded("the surface", &built, RING)?;
+            ensure!(rows.iter().all(|rows| are_clear(&triangles, rows)), "a triangle is flat");
+        }
+        let kind = tick::INTERPOLATED | if is_signed { tick::SIGNED } else { 0 };
         let mut rng = Rng::with_seed(seed);
         let mut script = Script::new(&built, &rows[0]);
         let (mut at, mut axis, mut way) = (Vec3::ZERO, Vec3::X * 0.1, Vec3::ZERO);
         for number in 0..ticks {
-            let frame = &rows[(1 + number / FRAME) as usize % rows.len()];
+            let at_frame = |after: u32| &rows[(after + number / FRAME) as usize % rows.len()];
+            let (before, frame) = (at_frame(0), at_frame(1));
+            let share = (number % FRAME) as f32 / FRAME as f32;
             if number % FRAME == 0 {
                 script.frame(frame);
             }
-            if rng.u32(..40) == 0 {
-                let towards = frame[rng.usize(..frame.len())] * [0.0, 0.5, 1.0][rng.usize(..3)];
+            if rng.u32(..if is_signed { 8 } else { 40 }) == 0 {
+                let row = rng.usize(..frame.len());
+                let towards = frame[row] * [0.0, 0.5, 1.0][rng.usize(..3)];
                 at = towards + unit(&mut rng) * 20.0 * rng.f32() * rng.f32();
                 axis = unit(&mut rng) * 80.0 * rng.f32();
+                // On a vertex many triangles may be the closest, and decide the side.
+                if is_signed && rng.bool() {
+                    at = before[row].lerp(frame[row], share)
+                        + unit(&mut rng) * 10_f32.powf(6.0 * rng.f32() - 5.0);
+                    way = Vec3::ZERO;
+                }
             }
             if rng.u32(..10) == 0 {
                 way = unit(&mut rng) * 10_f32.powf(rng.f32() * 2.5 - 2.0);
@@ -76,8 +112,7 @@ impl Ticks {
             at += way;
             let budget = 1 + 2_f32.powf(rng.f32() * 13.0) as u32;
             let tool = Capsule::new(at, at + axis, 2.5)?;
-            let share = (number % FRAME) as f32 / FRAME as f32;
-            script.tick(tick::INTERPOLATED | budget << tick::BUDGET, share, &tool);
+            script.tick(kind | budget << tick::BUDGET, share, &tool);
         }
         Ok(Self { bytes: script.end(), roots })
     }
@@ -93,23 +128,28 @@ impl Ticks {
     }
 }
 
-/// Ticks about a heart, a coarse one, three hearts in one tree, and a ball, from whose middle all is equally far: there
-/// the front is soon full.
-fn scripts(ticks: u32, seed: u64) -> Result<Vec<Ticks>> {
+/// Ticks about a heart, a coarse one, three hearts in one tree, or with side a small ball, and a large one: from the middle of
+/// a ball all is equally far, and the front is soon full.
+fn scripts(is_signed: bool, ticks: u32, seed: u64) -> Result<Vec<Ticks>> {
     let generate::MovingMesh { mesh, motion } = generate::heart(10_272)?;
     let coarse = trembling(1_280, 4, seed);
-    let three = beside(&coarse, 3);
-    let ball = ball(5);
-    let frames = [1.0, 1.02].map(|by| ball.positions.iter().map(|&at| at * by).collect());
-    let breathing = Motion { frames: frames.to_vec(), ..Motion::default() };
-    let all = [(mesh, motion), coarse, three, (ball, breathing)];
-    all.iter().zip(seed..).map(|(one, seed)| Ticks::about(one, ticks / 4, seed)).collect()
+    let third = if is_signed { breathing(ball(2)) } else { beside(&coarse, 3) };
+    let all = [(mesh, motion), coarse, third, breathing(ball(5))];
+    let about = |(one, seed)| Ticks::about(one, is_signed, ticks / 4, seed);
+    all.iter().zip(seed..).map(about).collect()
+}
+
+/// A surface that grows and shrinks.
+fn breathing(mesh: Mesh) -> (Mesh, Motion) {
+    let frames = [1.0, 1.02].map(|by| mesh.positions.iter().map(|&at| at * by).collect());
+    let motion = Motion { frames: frames.to_vec(), ..Motion::default() };
+    (mesh, motion)
 }
 
 /// Proves the bound, counts the instructions of many ticks, and compares each with it.
 pub fn count(proven: &Proven, probe: &Path, ticks: u32) -> Result<Counted> {
     let mut found = Counted::default();
-    for script in scripts(ticks, 71)? {
+    for script in scripts(proven.kind.is_signed, ticks, 71)? {
         let words = run_on_board(probe, &script.bytes, COUNTING)?;
         for (counts, instructions, _) in script.read(&words) {
             found.add(i128::from(instructions) * UNIT, proven.at(counts));
@@ -120,20 +160,25 @@ pub fn count(proven: &Proven, probe: &Path, ticks: u32) -> Result<Counted> {
 
 /// Follows ticks, instruction by instruction.
 pub fn trace(proven: &Proven, probe: &Path, ticks: u32) -> Result<Traced> {
-    let scripts = scripts(ticks, 81)?;
+    let is_signed = proven.kind.is_signed;
+    let scripts = scripts(is_signed, ticks, 81)?;
     let bytes = scripts.iter().map(|script| script.bytes.as_slice());
     trace_ticks(proven, probe, bytes, |script, words| {
         let ticks = scripts[script].read(words);
         let asked = |(counts, _, fallback)| Asked {
             counts,
-            spare: (fallback != FULL).then_some(ROOT + MAX_LEAF),
+            // With side, work besides tests is counted in parts that need not all be done.
+            spare: (!is_signed && fallback != FULL).then_some(ROOT + MAX_LEAF),
         };
         ticks.map(asked).collect()
     })
 }
 
-/// Whether a trace finds each of two planted errors.
-pub fn faults(probe: &Path) -> Result<[bool; 2]> {
-    let fault = Fault { narrowed: "visits without a price", shorter: &TRACKED_WITHOUT_EDGES };
-    planted(&TICK, probe, &fault, |proven| trace(&proven, probe, 60))
+/// Whether a trace finds each of two planted errors, in each kind.
+pub fn faults(probe: &Path) -> impl Iterator<Item = Result<[bool; 2]>> {
+    let shorter = [&TRACKED_WITHOUT_EDGES, &TRACKED_DEPTH_WITHOUT_EDGES];
+    TICKS.iter().zip(shorter).map(move |(kind, shorter)| {
+        let fault = Fault { narrowed: "visits without a price", shorter };
+        planted(kind, probe, &fault, |proven| trace(&proven, probe, 60))
+    })
 }

@@ -3,24 +3,24 @@
 // Requirement: A-06
 
 use super::facts::{
-    CHILD, COPIES, Count, EIGHT_CHILDREN, Fact, Facts, KEPT, LEAF_PLANE, MOVES_FOR_EACH_ENTRY,
-    Most, NO_SIDE, NO_TIES, Never, OTHERS, ROOT_MOVE, ROOT_TURN, SEARCH, TEST, TRIANGLE,
-    TURNS_OF_A_LEAF, VISIT, VISITS_OF_LEAVES, WAITING_ENTRIES, WARM, WITHOUT_EDGE,
+    CHILD_LINE, COPIES, Count, EIGHT_CHILDREN, Fact, Facts, KEPT, MOVES_FOR_EACH_ENTRY, Most,
+    NO_SIDE, NO_TIES, Never, OTHERS, ROOT_MOVE, ROOT_TURN, SEARCH, TEST, TRIANGLE_LINE,
+    TURNS_OF_A_LEAF, VISITS_OF_LEAVES, WAITING_ENTRIES, WARM, WITHOUT_EDGE,
 };
-use super::lines::Within::{self, Function, Line};
+use super::lines::Within::{self, Function, Line, Of};
 
 /// Places of the front.
 pub const SLOTS: i64 = probe::track::OPENED as i64;
 
 /// For a tracker that was never asked for a side.
 pub const TRACKED: Facts = Facts {
-    groups: &[TICK, WHOLE, COPIES, KEPT],
+    groups: &[COUNTED, TICK, WHOLE, COPIES, KEPT],
     never: &[NO_SIDE, NO_TIES, NOTHING_CERTAIN, NO_DIRECTION],
 };
 
 /// The same with a wrong fact, which a trace must refute.
 pub const TRACKED_WITHOUT_EDGES: Facts = Facts {
-    groups: &[TICK, WHOLE, COPIES, KEPT],
+    groups: &[COUNTED, TICK, WHOLE, COPIES, KEPT],
     never: &[NO_SIDE, NO_TIES, NOTHING_CERTAIN, NO_DIRECTION, WITHOUT_EDGE],
 };
 
@@ -36,7 +36,7 @@ const NO_DIRECTION: Never =
 const FILE: &str = "dibs-nostd/src/query/search/tick.rs";
 const FRONT: &str = "dibs-nostd/src/query/memory/front.rs";
 
-const SEEN: Count =
+pub(super) const SEEN: Count =
     Count::Passes(&[Line(FILE, "if self.is_priced && self.search.meter.nodes(VISIT).is_none() {")]);
 const DUE: Count =
     Count::Calls(&[Line(FILE, "if let Expansion::OutOfBudget = self.test_due(at)? {")], "test_due");
@@ -44,11 +44,13 @@ const OPENED: Count = Count::Calls(
     &[Line(FILE, "if let Expansion::OutOfBudget = self.test_due(opened)? {")],
     "test_due",
 );
-const DUE_CHILD: Count = Count::Passes(&[Line(FILE, "if own > search.cutoff {")]);
-const DUE_PLANE: Count = Count::Calls(&[Function("test_children")], "Plane::excess");
-const DUE_TURN: Count = Count::Passes(&[Line(FILE, "if triangle == self.search.best_triangle {")]);
-const DUE_TRIANGLE: Count = Count::Passes(&[Line(FILE, "if facing > self.facing.within {")]);
-const DUE_TEST: Count = Count::Calls(&[Function("test_triangles")], "closest_to_");
+pub(super) const DUE_CHILD: Count = Count::Passes(&[Line(FILE, "if own > search.cutoff {")]);
+pub(super) const DUE_PLANE: Count = Count::Calls(&[Function("test_children")], "Plane::excess");
+pub(super) const DUE_TURN: Count =
+    Count::Passes(&[Line(FILE, "if triangle == self.search.best_triangle {")]);
+pub(super) const DUE_TRIANGLE: Count =
+    Count::Passes(&[Line(FILE, "if facing > self.facing.within {")]);
+pub(super) const DUE_TEST: Count = Count::Calls(&[Function("test_triangles")], "closest_to_");
 const DUE_PUSH: Count = Count::Passes(&[
     Line(FILE, "search.push(base, Waiting { lower: own, link }).ok_or(corrupt)?;"),
     Line(super::facts::NODE, "*self.stack.get_mut(at)? = subtree;"),
@@ -57,10 +59,16 @@ const DUE_SHIFT: Count = Count::Passes(&[
     Line(FILE, "search.push(base, Waiting { lower: own, link }).ok_or(corrupt)?;"),
     Line(super::facts::NODE, "*self.stack.get_mut(at)? = below;"),
 ]);
-const CLOSED: Count = Count::Passes(&[Line(
+pub(super) const CLOSED_SLOT: Count = Count::Passes(&[Line(
     FILE,
     "if own.units_after(self.threshold()).saturating_mul(2) >= left {",
 )]);
+pub(super) const WHOLE_CHILD: Count = Count::Passes(&[Of("expand", "Capsule"), CHILD_LINE]);
+pub(super) const WHOLE_LEAF_PLANE: Count =
+    Count::Calls(&[Of("run", "Capsule"), Function("expand")], "Plane::beyond");
+pub(super) const WHOLE_VISIT: Count =
+    Count::Calls(&[Of("run", "Capsule"), Function("leaf")], "Plane::beyond");
+pub(super) const WHOLE_TRIANGLE: Count = Count::Passes(&[Of("run", "Capsule"), TRIANGLE_LINE]);
 const WAITING: &[Within] = &[
     Function("visit"),
     Line(FILE, "let &Waiting { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;"),
@@ -74,21 +82,30 @@ const ONES: &[Within] = &[Line(
 const EXCESS: &[Within] = &[Function("excess")];
 const ROOTS: &[Within] = &[Line(FILE, "for row in 0..=self.search.tree.header().other_roots {")];
 
-const TICK: &[Fact] = &[
-    Fact {
-        name: "node tests",
-        terms: &[
+/// What the budget of a tick counts, twice: of the front, of a whole query where that is full, and by more terms.
+macro_rules! node_tests {
+    ($($more:expr),* $(,)?) => {
+        &[
             (6, SEEN),
             (2, DUE_CHILD),
             (6, DUE_PLANE),
             (2, DUE_TURN),
             (2, DUE_TRIANGLE),
-            (2, CLOSED),
-            (3, CHILD),
-            (3, LEAF_PLANE),
-            (3, VISIT),
-            (3, TRIANGLE),
-        ],
+            (2, CLOSED_SLOT),
+            (3, WHOLE_CHILD),
+            (3, WHOLE_LEAF_PLANE),
+            (3, WHOLE_VISIT),
+            (3, WHOLE_TRIANGLE),
+            $($more),*
+        ]
+    };
+}
+pub(super) use node_tests;
+
+const COUNTED: &[Fact] = &[
+    Fact {
+        name: "node tests",
+        terms: node_tests!(),
         most: Most { base: 6, roots: 0, nodes: 2, triangles: 0 },
         because: "twice what the meter counts: a visit of a slot as 3, the last of which may be beyond the budget, a child as 1, its \
                   plane as 3, a due triangle and its plane as 1 each; a test of a whole query as 1 and a half",
@@ -99,6 +116,10 @@ const TICK: &[Fact] = &[
         most: Most { base: 0, roots: 0, nodes: 0, triangles: 1 },
         because: "the meter counts each exact test before its call, the warm ones too",
     },
+];
+
+/// Of the front.
+pub(super) const TICK: &[Fact] = &[
     Fact {
         name: "slots passed over, eight at a time",
         terms: &[(1, Count::Heads(EIGHTS)), (-1, DUE)],

@@ -29,9 +29,9 @@ macro_rules! promises {
                 criterion: TIMING,
                 bound: Bound::Is(0.0),
                 unit: "of {bound.queries} queries and ticks on the emulated Cortex-M7, whole and cut short",
-                limits: "Of this linked program. The proof trusts the flow facts of `facts.rs`, `sided.rs` and `tracked.rs`. Unsigned queries of a \
+                limits: "Of this linked program. The proof trusts the flow facts of `facts.rs`, `sided.rs`, `tracked.rs` and `depth.rs`. Unsigned queries of a \
                          table of vertices, of a surface between two frames, and of one that nodes or eight modes move; queries with \
-                         side of a table of vertices, of a sphere, and of a capsule outside; a tracker's ticks without a side, of a capsule on a surface \
+                         side of a table of vertices, of a sphere, and of a capsule outside; a tracker's ticks, without a side and with side and depth, of a capsule on a surface \
                          between two frames; instructions, not cycles.",
             },
             Promise {
@@ -98,6 +98,17 @@ macro_rules! promises {
             note("bound.tick.base"),
             note("bound.tick.root"),
             note("bound.tick.triangle-test"),
+            Promise {
+                id: "bound.tick-depth.node-test",
+                says: "The same with side and depth, of a closed surface",
+                criterion: TIMING,
+                bound: Bound::Informs,
+                unit: "instructions, after {bound.tick-depth.base}, with {bound.tick-depth.triangle-test} a triangle test",
+                limits: "Of one root, without flat triangles, with at most 16 around a vertex; the axis anywhere.",
+            },
+            note("bound.tick-depth.base"),
+            note("bound.tick-depth.root"),
+            note("bound.tick-depth.triangle-test"),
             note("bound.sphere.base"),
             note("bound.sphere.root"),
             note("bound.sphere.node-test"),

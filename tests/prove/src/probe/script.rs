@@ -6,6 +6,8 @@
 mod moved;
 mod sided;
 
+pub use sided::{are_clear, bounded};
+
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, generate};
 use dibs_nostd::{Budget, Cost, Options, Query, Tool};
 use dibs_tests::deform::Deformation;

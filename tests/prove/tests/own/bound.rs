@@ -129,15 +129,20 @@ fn a_call_that_is_never_made_ends_its_path() {
 
 #[test]
 fn a_copied_length_is_a_constant_or_an_error() {
-    let of = |halves: &[u16], places: &[u32]| length(&Image::of_halves(halves), places);
+    let of = |halves: &[u16], places: &[u32]| length(&Image::of_halves(halves), places, 2);
     // MOVS r2; MOV.W r2; MOVW r2; then BL.
     assert_eq!(of(&[0x220C, 0xF7FF, 0xFFFE], &[0, 2]).expect("a constant"), 12);
     assert_eq!(of(&[0xF04F, 0x0210, 0xF7FF, 0xFFFE], &[0, 4]).expect("a constant"), 16);
     assert_eq!(of(&[0xF240, 0x2208, 0xF7FF, 0xFFFE], &[0, 4]).expect("a constant"), 0x208);
+    // MOVW r2 with more than eleven bits.
+    assert_eq!(of(&[0xF640, 0x12A4, 0xF7FF, 0xFFFE], &[0, 4]).expect("a constant"), 0x9A4);
     // The last one counts, another register does not, and IT of one instruction ends after it.
     let ended = [0xBF18, 0x2301, 0x220C, 0xF7FF, 0xFFFE];
     assert_eq!(of(&ended, &[0, 2, 4, 6]).expect("one"), 12);
     assert_eq!(of(&[0x2204, 0x220C, 0x2301, 0xF7FF, 0xFFFE], &[0, 2, 4, 6]).expect("one"), 12);
+    // An IT block that does not write the register may follow.
+    let before = [0x220C, 0xBF18, 0x2301, 0xF7FF, 0xFFFE];
+    assert_eq!(of(&before, &[0, 2, 4, 6]).expect("one"), 12);
     // After IT of one, and of two instructions; changed by ADDS; loaded from memory; not in the block.
     for (halves, places) in [
         (&[0xBF18, 0x220C, 0xF7FF, 0xFFFE][..], &[0, 2, 4][..]),
@@ -223,7 +228,8 @@ fn what_may_write_a_register_is_found() {
     ];
     assert!(writes.iter().all(|&(first, second)| may_write(2, first, second)), "{writes:x?}");
     // STR r0, [sp, #104]; LDR r0, [pc, #8]; ADD r0, sp, #8; CMP r1, #2; ADDS r3, #1; LDR r4, [r0]; MOVW r3; VADD.F32 s4, s4, s4; VLDR s5, [r2];
-    // LDRB r12, [sp, #719]; LDR r3, [r0, #514].
+    // LDRB r12, [sp, #719]; LDR r3, [r0, #514]; ADD r0, r8, #260; MLA r0, r12,
+    // r2, r0.
     let others = [
         (0x901A, 0),
         (0x4802, 0),
@@ -236,6 +242,8 @@ fn what_may_write_a_register_is_found() {
         (0xEDD2, 0x2A00),
         (0xF89D, 0xC2CF),
         (0xF8D0, 0x3202),
+        (0xF508, 0x7082),
+        (0xFB0C, 0x0002),
     ];
     assert!(!others.iter().any(|&(first, second)| may_write(2, first, second)), "{others:x?}");
 }

@@ -35,8 +35,8 @@ pub const ANOMALIES: &[Anomaly] = &[
     ),
     anomaly(
         "K-03",
-        "The proven bound covers plain queries, and a tracker's tick without a side. A tick with side, contacts and a firmware's \
-         tick are measured, not proven: the longest was {ticks.longest} instructions.",
+        "The proven bound covers plain queries, and a tracker's tick with side and depth. Contacts and a firmware's tick are \
+         measured, not proven: the longest was {ticks.longest} instructions.",
         "Leave room in the tick.",
         "tests/prove/src/bound/mod.rs",
     ),

@@ -8,4 +8,4 @@ mod board;
 use probe::rows::Vertices;
 use probe::track::tick;
 
-probe::follow!(Vertices, tick::INTERPOLATED | tick::APART);
+probe::follow!(Vertices, tick::INTERPOLATED | tick::SIGNED | tick::APART);

@@ -38,14 +38,8 @@ impl Script {
         for Subject { name, mesh, leaf } in subjects {
             let built = build(mesh, *leaf);
             let tree = built.tree::<u16>()?;
-            let triangles = surfaces::triangles(&tree);
-            ensure!(is_closed(&triangles), "{name} is not closed");
-            ensure!(
-                most_around(&triangles) <= ring,
-                "{name} has more than {ring} triangles around a vertex"
-            );
+            let triangles = bounded(name, &built, ring)?;
             script.tree(&built);
-            ensure!(script.roots == 0, "{name} has several roots");
             let end = script.queries() + of_each;
             for deformation in Deformation::ALL.into_iter().cycle() {
                 let left = end.saturating_sub(script.queries()).min(of_frame);
@@ -54,7 +48,7 @@ impl Script {
                 }
                 let moved = deformation.apply(mesh, tree.paths(), tree.stretch(), &mut rng);
                 let rows = built.to_rows(&moved);
-                if triangles.iter().all(|corners| is_clear(corners.map(|row| rows[row as usize]))) {
+                if are_clear(&triangles, &rows) {
                     script.rows(&rows, tree.triangle_count());
                     script.asked_outside(&built, &rows, &triangles, left, draw, &mut rng)?;
                 }
@@ -115,6 +109,25 @@ fn is_outside(
 ) -> Result<bool> {
     let capsule = Capsule::new(tool.start, tool.end, tool.radius)?;
     Ok(query.closest(rows, &capsule, options)?.side == Side::Outside)
+}
+
+/// The triangles of a surface whose queries with side have a bound: closed, of one root, with at most `ring` triangles around a
+/// vertex.
+pub fn bounded(name: &str, built: &BuiltTree, ring: u32) -> Result<Vec<[u32; 3]>> {
+    let tree = built.tree::<u16>()?;
+    let triangles = surfaces::triangles(&tree);
+    ensure!(is_closed(&triangles), "{name} is not closed");
+    ensure!(
+        most_around(&triangles) <= ring,
+        "{name} has more than {ring} triangles around a vertex"
+    );
+    ensure!(tree.roots() == 1, "{name} has several roots");
+    Ok(triangles)
+}
+
+/// Whether no triangle of a frame is flat.
+pub fn are_clear(triangles: &[[u32; 3]], rows: &[Vec3]) -> bool {
+    triangles.iter().all(|corners| is_clear(corners.map(|row| rows[row as usize])))
 }
 
 /// Whether every edge has a triangle on each side.

@@ -1,0 +1,421 @@
+//! The flow facts of a tracker's tick with side and depth, within a budget, on a surface that moves and a tree of one root:
+//! besides those of the front and of a point's side, those of the search for the deepest point of the axis.
+
+// Requirement: A-06
+
+use super::facts::{
+    CHILD_LINE, COPIES, Count, Fact, Facts, KEPT, Most, PUSH, TEST, TRIANGLE_LINE, WARM,
+    WITHOUT_EDGE,
+};
+use super::lines::Within::{self, Function, Line, Of};
+use super::sided::{
+    ACROSS_F32, ACROSS_F64, ADDED_F32, ADDED_F64, CLOSED, FINE, IN_F32, IN_F64, NORMALS, ONE_ROOT,
+    ONE_SOLID, OUTWARD, POPS, RING, ROUGH, SEARCH_POPS, SEARCHES, SIDE_OF_POINT, TIE_POPS,
+    TIE_TEST, TURNED_F32, TURNED_F64,
+};
+use super::tracked::{
+    CLOSED_SLOT, DUE_CHILD, DUE_PLANE, DUE_TEST, DUE_TRIANGLE, DUE_TURN, SEEN, TICK, WHOLE_CHILD,
+    WHOLE_LEAF_PLANE, WHOLE_TRIANGLE, WHOLE_VISIT, node_tests,
+};
+
+const GROUPS: &[&[Fact]] =
+    &[COUNTED, TICK, SEARCHES, SIDE_OF_POINT, IN_F32, IN_F64, DEPTH, COPIES, CLEARS, KEPT];
+
+/// For a closed surface.
+pub const TRACKED_DEPTH: Facts = Facts { groups: GROUPS, never: &[ONE_SOLID, ONE_ROOT, CLOSED] };
+
+/// The same with a wrong fact, which a trace must refute.
+pub const TRACKED_DEPTH_WITHOUT_EDGES: Facts =
+    Facts { groups: GROUPS, never: &[ONE_SOLID, ONE_ROOT, CLOSED, WITHOUT_EDGE] };
+
+/// Entries of a search's stack, and of the subtrees that wait from tick to tick.
+const STACK: i64 = probe::track::STACK as i64;
+/// Most points of an axis, and of those that are remembered.
+const POINTS: i64 = 28;
+const REMEMBERED: i64 = 20;
+/// Most places where an axis meets the surface.
+const PLACES: i64 = 8;
+/// Most leaves around a point.
+const LEAVES: i64 = 48;
+
+const DIVISION: &str = "dibs-nostd/src/query/depth/mod.rs";
+const LOOK: &str = "dibs-nostd/src/query/depth/look.rs";
+const PART: &str = "dibs-nostd/src/query/depth/part.rs";
+const START: &str = "dibs-nostd/src/query/depth/start.rs";
+const TOUCHES: &str = "dibs-nostd/src/query/depth/touches.rs";
+const WALK: &str = "dibs-nostd/src/query/depth/walk.rs";
+const AROUND: &str = "dibs-nostd/src/query/search/leaves.rs";
+const KNOWN: &str = "dibs-nostd/src/query/memory/depth.rs";
+
+const CHILD: Count = Count::Passes(&[Of("expand", "AxisPoint"), CHILD_LINE]);
+const LEAF_PLANE: Count =
+    Count::Calls(&[Of("run", "AxisPoint"), Function("expand")], "Plane::beyond");
+const VISIT: Count = Count::Calls(&[Of("run", "AxisPoint"), Function("leaf")], "Plane::beyond");
+const TRIANGLE: Count = Count::Passes(&[Of("run", "AxisPoint"), TRIANGLE_LINE]);
+const BOUNDED_PLANE: Count = Count::Calls(&[Function("leaf_bound")], "Plane::excess");
+const BOUNDED_TRIANGLE: Count = Count::Passes(&[Line(
+    AROUND,
+    "let from_leaf = least(corners.map(|at| plane.normal.dot(at))) - plane.limit;",
+)]);
+const BOUNDED_TEST: Count = Count::Calls(&[Function("leaf_bound")], "closest_to_");
+const KEPT_TEST: Count = Count::Calls(&[Function("take_tied")], "closest_to_");
+const LAST_TEST: Count = Count::Calls(&[Function("take_pair")], "closest_to_");
+
+const SEARCH: &str = "Depth<I,V,T>>::search";
+const LOOKED: Count = Count::Calls(
+    &[Line(LOOK, "let Some(mut found) = self.search(&sample, &options, enough)?")],
+    SEARCH,
+);
+const SEARCHED: Count = Count::Calls(&[Function("look")], SEARCH);
+const FOUND: Count =
+    Count::Passes(&[Function("look"), Line(LOOK, "self.answer.add_tests(found.tests());")]);
+const FOUND_AGAIN: Count = Count::Passes(&[Line(LOOK, "found.add_tests(first);")]);
+const TIE: Count = Count::Passes(&[Function("clearly_above"), Function("is_above_plane")]);
+const TURN: Count = Count::Heads(&[Line(DIVISION, "let row = parts.highest();")]);
+const BOUND_DISTANCE: Count = Count::Calls(
+    &[Line(
+        PART,
+        "let squares = |along: f32| [from.square(point(along)), to.square(point(along))];",
+    )],
+    "closest_to_point",
+);
+const PASS_DISTANCE: Count = Count::Calls(&[Function("passes")], "closest_to_point");
+const TOUCH_DISTANCE: Count = Count::Calls(&[Function("find_touches")], "closest_to_segment");
+const HALVING_DISTANCE: Count = Count::Calls(
+    &[Line(TOUCHES, "let pair = point.closest_on_triangle(corners, f32::INFINITY);")],
+    "closest_to_point",
+);
+const WALK_DISTANCE: Count = Count::Calls(&[Function("descend")], "closest_to_point");
+
+const GATHER_POPS: &[Within] = &[Line(AROUND, POPS)];
+const RESUMED: &[Within] = &[Line(AROUND, "self.push(self.waiting, Waiting { lower, link })")];
+const LEFT: &[Within] = &[Function("leave")];
+const STEPS: &[Within] = &[Line(WALK, "for _ in 0..walk.steps {")];
+const NEIGHBOURS: &[Within] = &[Line(WALK, "for row in neighbours.filter(")];
+const ROOM: Count = Count::Calls(&[], "Leaves::keep_within");
+
+/// Loops of which each has at most so many turns.
+macro_rules! turns {
+    ($name:literal, $within:expr, $most:expr, $because:literal) => {
+        Fact {
+            name: $name,
+            terms: &[(1, Count::Heads($within)), (-($most), Count::Entries($within))],
+            most: Most::base(0),
+            because: $because,
+        }
+    };
+}
+
+const COUNTED: &[Fact] = &[
+    Fact {
+        name: "node tests",
+        terms: node_tests!(
+            (2, CHILD),
+            (2, LEAF_PLANE),
+            (2, VISIT),
+            (2, TRIANGLE),
+            (2, TIE_TEST),
+            (8, ADDED_F32),
+            (192, ADDED_F64),
+            (6, TURNED_F32),
+            (96, TURNED_F64),
+            (6, ACROSS_F32),
+            (96, ACROSS_F64),
+            (8, BOUNDED_PLANE),
+            (2, BOUNDED_TRIANGLE),
+            (32, LOOKED),
+            (4, TIE),
+            (8, TURN),
+            (6, BOUND_DISTANCE),
+            (6, PASS_DISTANCE),
+            (6, TOUCH_DISTANCE),
+            (6, HALVING_DISTANCE),
+            (8, WALK_DISTANCE),
+        ),
+        most: Most { base: 242, roots: 0, nodes: 2, triangles: 0 },
+        because: "twice what the meter counts: of the closest pair as without a side, of a side as in a query, of a point's search \
+                  as in a plain query; a leaf around a point as 4, a point of the axis as 16, a turn of its division as 4, a \
+                  distance as 3, in a walk as 4, a triangle whose plane decides a side as 2. Beyond the budget may be the last \
+                  slot, the last turn, and 50 for the last triangle that the axis touches; the closest pair's 32 planes are not \
+                  counted",
+    },
+    Fact {
+        name: "triangle tests",
+        terms: &[
+            (1, TEST),
+            (1, WARM),
+            (1, DUE_TEST),
+            (1, TIE_TEST),
+            (1, BOUNDED_TEST),
+            (1, KEPT_TEST),
+            (1, LAST_TEST),
+            (1, FOUND),
+            (1, FOUND_AGAIN),
+            (-1, SEARCHED),
+        ],
+        most: Most { base: 0, roots: 0, nodes: 0, triangles: 1 },
+        because: "the meter counts each exact test before its call, the warm ones too; a point's search that must wait for another \
+                  one has only tested its warm triangle, which counts as a part of the point",
+    },
+    Fact {
+        name: "waiting entries",
+        terms: &[
+            (1, Count::Heads(&[Function("least_waiting")])),
+            (1, Count::Heads(SEARCH_POPS)),
+            (1, Count::Heads(TIE_POPS)),
+            (1, Count::Heads(GATHER_POPS)),
+            (-1, PUSH),
+            (-1, Count::Heads(RESUMED)),
+            (-3, Count::Entries(SEARCH_POPS)),
+            (-3, Count::Entries(TIE_POPS)),
+            (-3, Count::Entries(GATHER_POPS)),
+        ],
+        most: Most::base(0),
+        because: "what waits was pushed, in this tick or an earlier one, and not popped; each search pushes the root before; each \
+                  loop has a turn more where it ends",
+    },
+];
+
+/// Of the search for the deepest point, and of what the tracker remembers of it.
+const DEPTH: &[Fact] = &[
+    Fact {
+        name: "points of the axis",
+        terms: &[(1, LOOKED)],
+        most: Most::base(27),
+        because: "after 27 the division ends",
+    },
+    Fact {
+        name: "ties that are compared",
+        terms: &[
+            (1, Count::Calls(&[Function("decided")], "Exact<I,V,P>::add")),
+            (-1, ADDED_F32),
+            (-1, ADDED_F64),
+            (-1, Count::Entries(ROUGH)),
+            (-1, Count::Entries(FINE)),
+        ],
+        most: Most::base(0),
+        because: "one that the budget does not cover ends the comparison",
+    },
+    Fact {
+        name: "normals of a walked vertex, in a tick",
+        terms: &[
+            (1, Count::Heads(NORMALS)),
+            (-1, TURNED_F32),
+            (-1, TURNED_F64),
+            (-(RING as i64), OUTWARD),
+            (-(RING as i64), ADDED_F64),
+        ],
+        most: Most::base(RING as i64),
+        because: "those of a direction, and those that confirm a vertex after the walk along its edges, which ends early only \
+                  where the budget does: in f32 once, in f64 after a triangle",
+    },
+    turns!(
+        "resumed subtrees",
+        RESUMED,
+        STACK + 1,
+        "as many wait as a stack has entries; one turn where they end"
+    ),
+    Fact {
+        name: "resumed searches",
+        terms: &[(1, Count::Calls(&[], "Search<I,V,T>>::resume"))],
+        most: Most::base(2),
+        because: "only a search that the budget ended leaves subtrees to another: the last tick's, and one of this tick's",
+    },
+    turns!(
+        "subtrees left",
+        LEFT,
+        STACK + 2,
+        "those on the stack and the unfinished one; one turn where they end"
+    ),
+    Fact {
+        name: "searches left",
+        terms: &[(1, Count::Calls(&[], "Search<I,V,T>>::leave"))],
+        most: Most::base(2),
+        because: "the budget ends a search once, and once more where the same point is searched again",
+    },
+    Fact {
+        name: "lists of ties that make room",
+        terms: &[
+            (1, Count::Calls(&[], "Ties::drop_farther")),
+            (-1, TEST),
+            (-1, WARM),
+            (-1, DUE_TEST),
+            (-1, BOUNDED_TEST),
+            (-2, SEARCHED),
+        ],
+        most: Most::base(4),
+        because: "a full list that has made room is full of ties within the limit, until a triangle test lowers that; without room \
+                  the list is lost: in each search twice, and once for each test",
+    },
+    turns!(
+        "leaves around a point",
+        &[Function("among")],
+        LEAVES + 1,
+        "a list has at most 48; one turn where they end"
+    ),
+    Fact {
+        name: "triangles of a leaf around a point",
+        terms: &[
+            (1, Count::Heads(&[Function("leaf_bound")])),
+            (-1, BOUNDED_TRIANGLE),
+            (-3, Count::Entries(&[Function("leaf_bound")])),
+        ],
+        most: Most::base(0),
+        because: "only the best triangle has no count; out of budget the leaf ends; one turn where they end",
+    },
+    Fact {
+        name: "lists of leaves that make room",
+        terms: &[(1, ROOM), (-1, BOUNDED_PLANE)],
+        most: Most::base(0),
+        because: "once for a leaf, which has a bound then",
+    },
+    Fact {
+        name: "leaves that make room",
+        terms: &[(1, Count::Heads(&[Function("keep_within")])), (-(LEAVES + 2), ROOM)],
+        most: Most::base(0),
+        because: "a list has at most 48 leaves, which two loops share; each loop has a turn more where it ends",
+    },
+    turns!(
+        "parts of a list of leaves",
+        &[Function("swap_nonoverlapping_chunks")],
+        13,
+        "a list has 412 bytes, of which each turn swaps 32"
+    ),
+    turns!(
+        "remembered points",
+        &[Line(START, "let Point { parameter, depth, bound, triangle } = *point;")],
+        REMEMBERED + 1,
+        "at most 20; one turn where they end"
+    ),
+    turns!(
+        "points that have moved",
+        &[Line(KNOWN, "point.depth = raised(point.depth, moved);")],
+        REMEMBERED + 1,
+        "at most 20 are remembered; one turn where they end"
+    ),
+    turns!(
+        "points to be remembered",
+        &[Line(KNOWN, "for point in points.take(KEPT) {")],
+        REMEMBERED + 1,
+        "at most 20; one turn where they end"
+    ),
+    turns!(
+        "points too many",
+        &[Line(DIVISION, "while parts.count() > Points::MOST")],
+        POINTS - REMEMBERED + 1,
+        "at most 28, of which 20 are kept; one turn where they end"
+    ),
+    turns!(
+        "points by their parameter",
+        &[Function("row_of")],
+        POINTS + 1,
+        "at most 28; one turn where they end"
+    ),
+    turns!(
+        "parts that may be joined",
+        &[Function("join")],
+        POINTS + 1,
+        "at most 28; one turn where they end"
+    ),
+    turns!(
+        "ends of a part",
+        &[Line(DIVISION, "for row in ends {")],
+        3,
+        "two; one turn where they end"
+    ),
+    turns!(
+        "rounds of a bound",
+        &[Line(PART, "let is_between = equal > low.0 && equal < high.0;")],
+        3,
+        "at most two; one turn where they end"
+    ),
+    Fact {
+        name: "steps of a walk",
+        terms: &[(1, Count::Heads(STEPS)), (-1, WALK_DISTANCE)],
+        most: Most::base(0),
+        because: "the first follows a distance, and each further one the distance of a closer neighbour",
+    },
+    Fact {
+        name: "neighbours of a step",
+        terms: &[(1, Count::Heads(NEIGHBOURS)), (-4, Count::Heads(STEPS))],
+        most: Most::base(0),
+        because: "a triangle has three; one turn where they end",
+    },
+    turns!(
+        "touched triangles",
+        &[Function("touched_from")],
+        34,
+        "a list has at most 32 ties, each passed over or taken; one turn for the closest triangle, and one where they end"
+    ),
+    turns!(
+        "halvings",
+        &[Line(TOUCHES, "let half = (inside + outside) * 0.5;")],
+        9,
+        "eight; one turn where they end"
+    ),
+    Fact {
+        name: "places that are joined",
+        terms: &[
+            (1, Count::Heads(&[Function("insert"), Function("retain")])),
+            (-(PLACES + 2), Count::Calls(&[], "Touches::insert")),
+        ],
+        most: Most::base(0),
+        because: "a list has at most eight places, which two loops share; each loop has a turn more where it ends",
+    },
+    turns!(
+        "places after a new one",
+        &[Line(TOUCHES, "if other.first > place.first {")],
+        PLACES + 1,
+        "at most eight; one turn where they end"
+    ),
+    turns!(
+        "places that begin a search",
+        &[Line(START, "for place in self.touches.places() {")],
+        PLACES + 1,
+        "at most eight; one turn where they end"
+    ),
+    turns!(
+        "places beside a point outside",
+        &[Function("add_outside")],
+        PLACES + 1,
+        "at most eight; one turn where they end"
+    ),
+    turns!(
+        "places ahead",
+        &[Function("ahead")],
+        PLACES + 1,
+        "at most eight; one turn where they end"
+    ),
+    turns!(
+        "places behind",
+        &[Function("behind")],
+        PLACES + 1,
+        "at most eight; one turn where they end"
+    ),
+    turns!(
+        "roots of a triangle",
+        &[Function("root_of")],
+        1,
+        "the tree has one root; one turn where they end"
+    ),
+];
+
+/// Of memory that is cleared.
+const CLEARS: &[Fact] = &[
+    Fact {
+        name: "cleared words",
+        terms: &[
+            (16, Count::Heads(&[Function("__aeabi_memset4")])),
+            (4, Count::Heads(&[Function("set_bytes_words")])),
+            (-1, Count::Bytes("__aeabi_memclr", 1)),
+        ],
+        most: Most::base(0),
+        because: "each turn clears four words, or one or more; the lengths are constants at the calls",
+    },
+    Fact {
+        name: "no bytes left to clear",
+        terms: &[(1, Count::Heads(&[Function("set_bytes_bytes")]))],
+        most: Most::base(0),
+        because: "at most three bytes are no word; a turn clears four",
+    },
+];
