@@ -16,7 +16,9 @@ use crate::MAX_COORDINATE;
 use crate::stretch::{
     Admission, Gate, IncomingSurface, StretchError, StretchMonitor, SurfaceLimits,
 };
-use crate::surface::{FrameLabel, FrameView, FrameWriter, LastStep, Millis, PredictionCheck};
+use crate::surface::{
+    FrameLabel, FrameView, FrameWriter, LastStep, Millis, PredictionCheck, PublishError,
+};
 use crate::tree::{Index, SurfaceFacts, Tree};
 use crate::wire::{
     Body, Content, Counters, Event, FrameId, Mac, NoMac, Packet, Status, StreamError,
@@ -455,8 +457,8 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
                 self.gate.published();
                 Advance::Published { epoch }
             }
-            // A read is in progress: `publish_complete` has no other error.
-            Err(_) => Advance::Held { epoch },
+            Err(PublishError::Busy) => Advance::Held { epoch },
+            Err(_) => Advance::Idle,
         }
     }
 }

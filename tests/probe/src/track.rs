@@ -110,8 +110,7 @@ impl Default for Trackers {
     }
 }
 
-/// The board's program that follows a script of frames with these rows and of ticks of these kinds, by
-/// [`run`](crate::track::run).
+/// The board's program that follows a script of frames with these rows and of ticks of these kinds, by [`run`].
 #[macro_export]
 macro_rules! follow {
     ($rows:ty, $kinds:expr) => {
