@@ -125,6 +125,9 @@ impl AddAssign for Tally {
 /// Poses that are checked together on one shape of a surface.
 pub const POSES_OF_A_FRAME: usize = 100;
 
+/// Axes nearer to the surface than this cross it, up to the rounding of f64.
+const RESOLVED: f64 = 1e-12;
+
 /// Intervals of an axis at whose ends the depth is sampled.
 const POINTS: u32 = 16;
 
@@ -187,7 +190,9 @@ impl Tally {
         found: &Proximity,
     ) -> Option<f64> {
         self.poses += 1;
-        if pair.axis_distance == 0.0 {
+        let is_crossing = pair.axis_distance < RESOLVED;
+        // Depths of an axis that crosses are the subject of another test; a kept answer's interval is judged here.
+        if is_crossing && found.side != Side::Either {
             assert!(
                 matches!(found.side, Side::Crossing | Side::Undefined(NoSide::BelowAccuracy)),
                 "{name}: {tool:?} {found:?}"
@@ -200,7 +205,6 @@ impl Tally {
             Side::Outside => Some(false),
             Side::Inside => Some(true),
             Side::Either => None,
-            // Depths of an axis that crosses are the subject of another test.
             Side::Crossing if pair.axis_distance <= accuracy => return None,
             // The answer's own distance is within its accuracy, so the true one may be a little above: then the whole
             // axis is inside, as deep as the answer says.
@@ -219,10 +223,10 @@ impl Tally {
             other => panic!("{other:?}"),
         };
         let winds_around = sides::is_inside(rows, triangles, pair.on_axis);
-        let mut inside = winds_around.unwrap_or_default();
+        let mut inside = is_crossing || winds_around.unwrap_or_default();
         let agrees = |inside: bool| says.is_none_or(|says| says == inside);
         let is_doubtful = winds_around.is_none_or(|inside| !agrees(inside));
-        if is_doubtful && sides::is_cut(rows, triangles, pair) {
+        if !is_crossing && is_doubtful && sides::is_cut(rows, triangles, pair) {
             inside = sides::is_below(rows, triangles, pair);
             self.self_cut += 1;
         }
