@@ -7,15 +7,15 @@ use dibs_nostd::constraint::{ForbiddenRegion, SpringDamper};
 use dibs_nostd::filter::Filter;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, GuardLimits};
-use dibs_nostd::{Capsule, Error, Millis, Options, Proximity, Ticks, Tool};
+use dibs_nostd::{Capsule, Contacts, Error, Millis, Options, Proximity, Ticks, Tool};
 
 use crate::surface;
 use crate::telemetry::{Push, Tick, cause_code, fallback_code};
 use crate::{BusStatus, Receiver, Robot, TICK_RATE, Trust, time_of};
 
-/// Instructions for a tick's closest pair, side and depth. On frames chosen to be expensive the whole tick stays below
-/// 120,000 (docs/evidence/guarantees.md). Where nodes carry the surface, the same tests take more. If the budget ends a
-/// search, the last tick's bounds stay valid.
+/// Instructions for a tick's closest pair, side, depth and contacts. On frames chosen to be expensive the whole tick
+/// stays below 120,000 (docs/evidence/guarantees.md). Where nodes carry the surface, the same tests take more. If the
+/// budget ends a search, the last tick's bounds stay valid.
 #[must_use]
 pub const fn instructions(has_nodes: bool) -> u32 {
     if has_nodes { 200_000 } else { 80_000 }
@@ -44,8 +44,14 @@ pub const MAX_FORCE: f32 = 5.0;
 pub const SPRING: SpringDamper =
     SpringDamper::stiffness(STIFFNESS).damping(DAMPING).max_force(MAX_FORCE);
 
-/// Distance from the surface at which the constraint begins, in mm.
+/// Distance from the surface at which the constraint begins and contacts are listed, in mm.
 pub const MARGIN: f32 = 5.0;
+
+/// The contacts of a tick.
+pub type ContactList = Contacts<16>;
+
+/// Room for nodes that the search for contacts opened; none without contacts.
+const RANGE: usize = if cfg!(feature = "contacts") { 256 } else { 0 };
 
 /// Distance that a filter keeps a commanded instrument from the surface, in mm.
 pub const STAND_OFF: f32 = 0.5;
@@ -61,7 +67,8 @@ const APPROACH: f32 = 0.02;
 /// of a second. Over the emulated serial line it beats in slow motion, over Ethernet in real time.
 pub const SPEED: f32 = 100.0;
 
-/// The controller's two ends of a surface, on a bus with these limits of trust.
+/// The controller's two ends of a surface, on a bus with these limits of trust. The list is the caller's, so that it is
+/// never moved over a stack.
 ///
 /// # Errors
 /// [`Error`] if the tree is damaged, a constant above is out of range, or the surface was started before.
@@ -71,22 +78,24 @@ pub fn start<R: Robot>(
     bus: &'static BusStatus,
     trust: &Trust,
     robot: R,
+    contacts: &'static mut ContactList,
 ) -> Result<(Receiver, Control<R>), Error> {
     let limits = GuardLimits::new(SPEED, Millis(trust.age.1))
         .instructions(instructions(cfg!(nodes)))
         .options(Options::new().depth_tolerance(DEPTH_TOLERANCE))
         .ticks_a_second(TICK_RATE)
         .trust(trust.limits()?);
-    let (receiver, guard) = surface::start(surface, limits)?;
+    let (receiver, guard) = surface::start_with_contacts(surface, limits)?;
     let wall = ForbiddenRegion::new(SPRING, MARGIN)?;
     let filter = Filter::new(STAND_OFF, ROBOT_SPEED)?.approach(APPROACH)?;
-    let control = Control { guard, wall, filter, robot, bus, tick: Ticks(0) };
+    let control = Control { guard, contacts, wall, filter, robot, bus, tick: Ticks(0) };
     Ok((Receiver::new(receiver, bus), control))
 }
 
 /// The state of the control tick.
 pub struct Control<R> {
-    guard: surface::Guard,
+    guard: surface::Guard<RANGE>,
+    contacts: &'static mut ContactList,
     wall: ForbiddenRegion,
     filter: Filter,
     robot: R,
@@ -125,14 +134,21 @@ impl<R: Robot> Control<R> {
         let tool = self.robot.instrument(tick);
         let command = self.robot.command();
         let start = clock();
+        let Self { guard, contacts, filter, .. } = self;
+        let mut listed = None;
         let (answer, admitted) = match (&tool, &command) {
             (Ok(tool), Some(command)) => {
-                let (answer, admitted) = self.guard.admit(&self.filter, tool, command, now);
+                let (answer, admitted) = guard.admit(filter, tool, command, now);
                 (answer, Some(admitted))
             }
-            (Ok(tool), None) => (self.guard.closest(tool, now), None),
+            (Ok(tool), None) if RANGE > 0 => {
+                let answer = guard.contacts(tool, MARGIN, now, contacts);
+                listed = Some(contacts);
+                (answer, None)
+            }
+            (Ok(tool), None) => (guard.closest(tool, now), None),
             // The pose is not finite, so no query is possible.
-            (Err(_), _) => (self.guard.without_pose(now), None),
+            (Err(_), _) => (guard.without_pose(now), None),
         };
         let took = clock().wrapping_sub(start);
         let force = match &admitted {
@@ -147,6 +163,8 @@ impl<R: Robot> Control<R> {
             tick,
             query_counts: took,
             force: force.to_array(),
+            contacts: listed.as_ref().map_or(0, |contacts| contacts.len() as u32),
+            contacts_bound: listed.map_or(f32::NEG_INFINITY, |contacts| contacts.bound()),
             ..record(&answer, tool.ok().as_ref(), self.bus)
         }
     }

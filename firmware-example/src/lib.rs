@@ -3,7 +3,7 @@
 //! It compiles for board and host: `no_std`, no allocation, no panic, and no access to hardware. Three contexts:
 //!
 //! - the control tick, 1 kHz, highest priority: [`Control::tick`] reads the instrument's pose, asks the guard, and
-//!   gives the robot a force, or the part of a commanded motion that a filter admits; it lists no contacts;
+//!   gives the robot a force and records the contacts, or gives it the part of a commanded motion that a filter admits;
 //! - bus reception, any lower priority: [`Receiver::bytes`] receives bytes from a serial line,
 //!   [`Receiver::packet`] packets that [`network`] finds in Ethernet frames;
 //! - the background: [`Receiver::work`] checks complete frames and the tree in flash in slices, and
@@ -32,8 +32,8 @@ use core::num::NonZeroU32;
 use dibs_nostd::{Millis, Ticks};
 
 pub use control::{
-    Control, DAMPING, MARGIN, MAX_FORCE, SPEED, SPRING, STAND_OFF, STIFFNESS, TICK_INSTRUCTIONS,
-    instructions, start,
+    ContactList, Control, DAMPING, MARGIN, MAX_FORCE, SPEED, SPRING, STAND_OFF, STIFFNESS,
+    TICK_INSTRUCTIONS, instructions, start,
 };
 pub use fingerprint::fingerprint;
 pub use hand::Hand;

@@ -95,6 +95,10 @@ pub struct Tick {
     pub residual: f32,
     /// The surface's velocity at the pair, in mm/s.
     pub surface_velocity: [f32; 3],
+    /// Number of contacts listed; 0 in a tick with a command, which lists none.
+    pub contacts: u32,
+    /// All contacts with a separation below this, in mm, are listed: `dibs_nostd::Contacts::bound`.
+    pub contacts_bound: f32,
 }
 
 /// A fallback as a number.

@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 
 use controller::surface::{self, Surface};
 use controller::telemetry::{Tick, cause_code};
-use controller::{BusStatus, Control, DWELL, MTU, Receiver, Script, Trust, start};
+use controller::{BusStatus, ContactList, Control, DWELL, MTU, Receiver, Script, Trust, start};
 use dibs_build::{Builder, generate};
 use dibs_nostd::failsafe::State;
 use dibs_nostd::glam::Vec3;
@@ -33,7 +33,8 @@ fn firmware_tree() -> &'static surface::Tree {
 fn controller() -> (Receiver, Control<Script>, &'static BusStatus) {
     let surface: &'static Surface = Box::leak(Box::new(Surface::new()));
     let bus: &'static BusStatus = Box::leak(Box::new(BusStatus::new()));
-    let (receiver, control) = start(surface, bus, &Trust::SERIAL, Script).unwrap();
+    let contacts = Box::leak(Box::new(ContactList::new()));
+    let (receiver, control) = start(surface, bus, &Trust::SERIAL, Script, contacts).unwrap();
     (receiver, control, bus)
 }
 

@@ -382,7 +382,7 @@ class Guards(unittest.TestCase):
             free.bind(("127.0.0.1", 0))
             port = str(free.getsockname()[1])
             free.close()
-            command = [sys.executable, str(example), tree, port]
+            command = [sys.executable, str(example), tree, port, "0,0,90,0,0,150,2.5"]
             with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as loop:
                 sender, is_over = dibs.Sender(TREE, f"udp:127.0.0.1:{port}"), threading.Event()
 
@@ -400,9 +400,10 @@ class Guards(unittest.TestCase):
                 finally:
                     is_over.set()
                     loop.kill()
-        lower, upper = map(float, said.strip("[]\n").split())
+        lower, upper, separation = map(float, re.findall(r"-?\d+\.\d+", said))
         truth = TREE.query([0, 0, 90, 0, 0, 150, 2.5], surface=BEAT.frames[0])["separation"]
         self.assertTrue(lower < truth < upper < lower + 150, said)
+        self.assertAlmostEqual(separation, truth, delta=0.01)
 
     def test_the_readme_has_the_loop(self):
         readme = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")

@@ -24,7 +24,7 @@ mod tick;
 use core::panic::PanicInfo;
 
 use bus::Bus;
-use controller::{BusStatus, Receiver, Script, surface};
+use controller::{BusStatus, ContactList, Receiver, Script, surface};
 use cortex_m::Peripherals;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::entry;
@@ -34,7 +34,8 @@ static BUS: BusStatus = BusStatus::new();
 
 #[entry]
 fn main() -> ! {
-    match start() {
+    static mut CONTACTS: ContactList = ContactList::new();
+    match start(CONTACTS) {
         Some((receiver, bus)) => idle(receiver, bus),
         // Any error here occurs before the robot moves.
         None => loop {
@@ -44,12 +45,13 @@ fn main() -> ! {
 }
 
 /// Starts the control tick and the bus; `None` if the tree is damaged or a constant out of range.
-fn start() -> Option<(Receiver, Bus)> {
+fn start(contacts: &'static mut ContactList) -> Option<(Receiver, Bus)> {
     let mut core = Peripherals::take()?;
     memory::protect(&mut core);
     let parts = clocks::start();
     memory::start_sram3();
-    let (receiver, control) = controller::start(&SURFACE, &BUS, &bus::TRUST, Script).ok()?;
+    let (receiver, control) =
+        controller::start(&SURFACE, &BUS, &bus::TRUST, Script, contacts).ok()?;
     let bus = Bus::start(parts)?;
     tick::start(&mut core, control);
     Some((receiver, bus))

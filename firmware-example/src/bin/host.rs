@@ -13,7 +13,7 @@ use std::{env, thread};
 
 use anyhow::{Context, Result};
 use controller::telemetry::{MAX_FRAMED, Summary, frame};
-use controller::{BusStatus, Either, STATUS_FRAMED, TICK_RATE, Trust, start, surface};
+use controller::{BusStatus, ContactList, Either, STATUS_FRAMED, TICK_RATE, Trust, start, surface};
 use dibs_nostd::Millis;
 use dibs_nostd::wire::{Counters, Event};
 
@@ -33,7 +33,8 @@ fn main() -> Result<()> {
     let ticks: u32 = argument("TICKS")?.to_str().and_then(|t| t.parse().ok()).context("TICKS")?;
     let robot = Either::new(arguments.next().is_some_and(|word| word == "hand"));
 
-    let (mut receiver, mut control) = start(&SURFACE, &BUS, &Trust::HOST, robot)?;
+    let contacts = Box::leak(Box::new(ContactList::new()));
+    let (mut receiver, mut control) = start(&SURFACE, &BUS, &Trust::HOST, robot, contacts)?;
     bus.set_read_timeout(Some(Duration::from_millis(1)))?;
     thread::spawn(move || {
         let (mut buffer, mut line) = ([0; 1024], [0; STATUS_FRAMED]);

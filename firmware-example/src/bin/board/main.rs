@@ -21,7 +21,9 @@ mod uart;
 mod vectors;
 
 use controller::telemetry::{MAX_FRAMED, Push, Tick, frame};
-use controller::{BusStatus, Either, STATUS_FRAMED, STATUS_MTU, Trust, start, surface};
+use controller::{
+    BusStatus, ContactList, Either, STATUS_FRAMED, STATUS_MTU, Trust, start, surface,
+};
 use cortex_m_rt::entry;
 use dibs_nostd::wire::enframe;
 use heapless::spsc::{Consumer, Queue};
@@ -40,6 +42,7 @@ static BUS: BusStatus = BusStatus::new();
 fn main() -> ! {
     static mut RECORDS: Queue<Records, QUEUE> = Queue::new();
     static mut NETWORK: Option<Network> = None;
+    static mut CONTACTS: ContactList = ContactList::new();
     let (producer, consumer) = RECORDS.split();
 
     let arguments = Arguments::read();
@@ -52,7 +55,7 @@ fn main() -> ! {
     }
     let trust = if arguments.is_ethernet { &Trust::ETHERNET } else { &Trust::SERIAL };
     let robot = Either::new(arguments.is_pushed);
-    let (receiver, control) = match start(&SURFACE, &BUS, trust, robot) {
+    let (receiver, control) = match start(&SURFACE, &BUS, trust, robot, CONTACTS) {
         Ok(ends) => ends,
         Err(_) => {
             defmt::error!("the tree in flash is damaged, or a constant out of range");

@@ -47,8 +47,8 @@ pub const CHECK: Check = Check {
             unit: "instructions, of 480,000 in 1 ms at 480 MHz; {ticks.mean} in the mean of {ticks.ticks} ticks on \
                    {ticks.frames} frames, {ticks.cut-short} of them cut short by their budget",
             limits: "The dearest that a search found, not a proof. By the cost model, the dearest of these queries would \
-                     take {ticks.unlimited} instructions without the budget. The wall acts on the closest pair; a list of contacts \
-                     shares the budget (lists of contacts within a budget). Instructions, not cycles.",
+                     take {ticks.unlimited} instructions without the budget and without contacts. With the wall's force and a list \
+                     of the contacts within its margin, in one budget; without the filter. Instructions, not cycles.",
         },
     ],
 };

@@ -1,5 +1,5 @@
 //! All contacts of every tick, and the force of a proxy that they keep outside: computed on the host after the run,
-//! because the controller's wall acts on the closest pair.
+//! beside the controller's own list, which a budget may cut, and its wall, which acts on the closest pair.
 
 use anyhow::Result;
 use controller::telemetry::Tick;
@@ -7,7 +7,7 @@ use controller::{DAMPING, MARGIN, MAX_FORCE, SPRING, STIFFNESS, TICK_RATE};
 use dibs_nostd::constraint::Proxy;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Contacts, Index, Options, Query, Tree, Unavailable};
+use dibs_nostd::{Contact, Contacts, Index, Options, Query, Tree, Unavailable};
 use glam::Vec3;
 use serde::Serialize;
 
@@ -38,6 +38,11 @@ pub struct Touches {
     contacts_max: usize,
     /// Ticks with more contacts than the buffer holds.
     contacts_cut: usize,
+    /// Contacts in the controller's list, and ticks whose list was complete within the margin.
+    controller_contacts_mean: f64,
+    controller_contacts_complete: usize,
+    /// Ticks in which the controller's list has fewer contacts than there are below the list's bound.
+    pub ticks_contacts_missing: usize,
     proxy_force_max_n: f32,
     /// Largest change in a force's magnitude between two ticks on the same frame: the controller's, and the proxy's.
     force_step_max_n: f32,
@@ -96,6 +101,7 @@ impl Touches {
         }
         let count = touches.all.len().max(1) as f64;
         touches.contacts_mean /= count;
+        touches.controller_contacts_mean /= count;
         Ok(touches)
     }
 
@@ -111,6 +117,13 @@ impl Touches {
         self.contacts_mean += list.len() as f64;
         self.contacts_max = self.contacts_max.max(list.len());
         self.contacts_cut += usize::from(list.is_full());
+        self.controller_contacts_mean += f64::from(tick.contacts);
+        self.controller_contacts_complete += usize::from(tick.contacts_bound >= MARGIN);
+        // A tool that crosses has a list of other points wherever a budget ended the search for its depth.
+        let is_certain = |contact: &&Contact| contact.separation < tick.contacts_bound;
+        let certain = list.iter().filter(is_certain).count();
+        let is_missing = tick.lower > 0.0 && (tick.contacts as usize) < certain;
+        self.ticks_contacts_missing += usize::from(is_missing);
         self.proxy_force_max_n = self.proxy_force_max_n.max(touch.force);
         if let Some(last) = self.all.last()
             && last.tick + 1 == tick.tick
@@ -140,8 +153,14 @@ impl Touches {
     /// Lines for the user.
     pub fn rows(&self) -> [(&'static str, String); 2] {
         let contacts = format!(
-            "{:.1} within the margin in the mean, {} at most; a proxy that they hold: {:.2} N at most",
-            self.contacts_mean, self.contacts_max, self.proxy_force_max_n
+            "{:.1} within the margin in the mean, {} at most, {:.1} in the controller's list, which is complete at {} of {} ticks; a \
+             proxy that all hold: {:.2} N at most",
+            self.contacts_mean,
+            self.contacts_max,
+            self.controller_contacts_mean,
+            self.controller_contacts_complete,
+            self.all.len(),
+            self.proxy_force_max_n
         );
         let inside = format!(
             "{} ticks; too weak at {}, the proxy at {}; steps of one frame {:.2} N at most, the proxy's {:.2}",

@@ -321,9 +321,9 @@ impl Way {
         let instructions = || moments.clone().map(Moment::instructions);
         let used = moments.clone().map(|moment| {
             let Tick { node_tests, triangle_tests, .. } = moment.tick;
-            // The root's test is not counted in the budget.
-            let tests = node_tests.saturating_sub(1) + triangle_tests * Budget::TRIANGLE;
-            f64::from(tests) / f64::from(budget.tests())
+            // No budget counts the root's test and the triangle with which a warm query starts.
+            let tests = node_tests + triangle_tests * Budget::TRIANGLE;
+            f64::from(tests.saturating_sub(1 + Budget::TRIANGLE)) / f64::from(budget.tests())
         });
         Self {
             ticks,

@@ -14,7 +14,7 @@ mod exit;
 mod files;
 
 use controller::surface::Surface;
-use controller::{BusStatus, Control, Script, Trust};
+use controller::{BusStatus, ContactList, Control, Script, Trust};
 use cortex_m_rt::entry;
 use dibs_nostd::Ticks;
 use exit::exit;
@@ -25,13 +25,14 @@ static BUS: BusStatus = BusStatus::new();
 
 #[entry]
 fn main() -> ! {
+    static mut CONTACTS: ContactList = ContactList::new();
     clock::start();
-    exit(run().is_some());
+    exit(run(CONTACTS).is_some());
 }
 
-fn run() -> Option<()> {
+fn run(contacts: &'static mut ContactList) -> Option<()> {
     let (mut receiver, mut control) =
-        controller::start(&SURFACE, &BUS, &Trust::SERIAL, Script).ok()?;
+        controller::start(&SURFACE, &BUS, &Trust::SERIAL, Script, contacts).ok()?;
     let mut script = files::Input::open()?;
     let mut answers = files::Output::create()?;
     loop {
