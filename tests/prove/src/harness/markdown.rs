@@ -8,7 +8,7 @@ use anyhow::Result;
 use serde_json::Value;
 
 use super::faults;
-use super::record::{Record, promises};
+use super::record::{Record, Search, promises};
 use super::run::Run;
 
 /// The document.
@@ -22,7 +22,7 @@ pub fn render(records: &[Record]) -> Result<String> {
     for record in records.iter().filter(|record| !record.promise.is_empty()) {
         writeln!(
             out,
-            "| {} | {} {}{} | {} | {} | {} | {} |",
+            "| {} | {} {}{} | {} | {} | {} | {}{} |",
             record.promise,
             shown(&record.figure),
             with_figures(&record.unit, records),
@@ -30,7 +30,8 @@ pub fn render(records: &[Record]) -> Result<String> {
             record.bound,
             record.check,
             record.criterion,
-            with_figures(&record.limits, records)
+            with_figures(&record.limits, records),
+            larger(record)
         )?;
     }
     out.push_str("\n## Instructions of the hot functions\n\n");
@@ -51,6 +52,12 @@ pub fn render(records: &[Record]) -> Result<String> {
     out.push_str(&faults::render()?);
     out.push_str(include_str!("texts/tail.md"));
     Ok(out)
+}
+
+/// A sentence about the larger search that a record keeps.
+fn larger(record: &Record) -> String {
+    let Some(Search { figure, unit, run }) = &record.larger else { return String::new() };
+    format!(" In a larger search {} {unit} (`{}`, {}).", shown(figure), run.commit, run.day())
 }
 
 /// The last run that measured anything.
@@ -119,7 +126,7 @@ impl Record {
 }
 
 /// Replaces `{id}` in a text by the figure of that record.
-fn with_figures(text: &str, records: &[Record]) -> String {
+pub fn with_figures(text: &str, records: &[Record]) -> String {
     let mut text = text.to_owned();
     for record in records {
         let place = format!("{{{}}}", record.id);

@@ -35,6 +35,18 @@ pub struct Record {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub raised: String,
     pub run: Run,
+    /// Of a search for what must not be found, an earlier one that was larger.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub larger: Option<Search>,
+}
+
+/// A search at full size, which takes longer than the run of a release has.
+#[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
+pub struct Search {
+    pub figure: Value,
+    /// With the figures of its run.
+    pub unit: String,
+    pub run: Run,
 }
 
 /// Prefixes of the names of golden figures that may be recorded above their floor, and the reason.
@@ -130,8 +142,9 @@ pub fn merge(
         };
         broken.extend(promise.broken(&measured.figures));
         let figure = figure.clone();
+        let larger = old.and_then(|old| old.search(promise, before, &measured.run));
         match Record::new(check, promise, figure, &measured.run).above(old, raise) {
-            Ok(record) => records.push(record),
+            Ok(record) => records.push(Record { larger, ..record }),
             Err(crept) => {
                 broken.push(crept);
                 records.extend(old.cloned());
@@ -207,7 +220,20 @@ impl Record {
             limits: promise.limits.to_owned(),
             raised: String::new(),
             run: run.clone(),
+            larger: None,
         }
+    }
+
+    /// The search at full size that a run of another size keeps: this one, or what this one kept.
+    fn search(&self, promise: &Promise, records: &[Self], next: &Run) -> Option<Search> {
+        if !matches!(promise.bound, Bound::Is(0.0)) || next.size == "full" {
+            return None;
+        }
+        if !self.run.is_full() {
+            return self.larger.clone();
+        }
+        let unit = markdown::with_figures(&self.unit, records);
+        Some(Search { figure: self.figure.clone(), unit, run: self.run.clone() })
     }
 
     /// The record with the floor of the previous one; an error states by how much it is exceeded.

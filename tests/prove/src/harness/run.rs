@@ -46,6 +46,11 @@ impl Run {
         self.size != "test" && !self.commit.ends_with("-dirty") && self.commit != UNKNOWN
     }
 
+    /// Whether it is of all cases, and from a clean commit.
+    pub fn is_full(&self) -> bool {
+        self.size == "full" && self.is_whole()
+    }
+
     pub fn day(&self) -> &str {
         self.date.split('T').next().unwrap_or_default()
     }

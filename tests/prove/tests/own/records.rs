@@ -140,3 +140,34 @@ fn the_committed_head_says_what_the_rows_say() {
     assert!(!says_whole || is_whole, "the head says more than the rows: {commits:?}");
     assert!(commits.iter().all(|commit| text.contains(&format!("`{commit}`"))), "{commits:?}");
 }
+
+/// A search at full size stays beside the smaller one of a release, and of a second release, until it is made again.
+#[test]
+fn a_larger_search_is_kept_beside_a_smaller_one() {
+    let id = "filter.violations";
+    let of = |commit: &str, size: &str, ticks: f64| {
+        let mut measured =
+            measured(commit, &[(id, 0.0), ("filter.ticks", ticks), ("m7.warm.mean", 5.0)]);
+        measured.run.size = size.into();
+        measured
+    };
+    let mut records = Vec::new();
+    for (commit, size, ticks, kept) in [
+        ("aaaa", "full", 9_000.0, None),
+        ("bbbb", "1/50", 180.0, Some("aaaa")),
+        ("cccc", "1/50", 180.0, Some("aaaa")),
+        ("dddd-dirty", "full", 8_000.0, None),
+        ("eeee", "1/50", 180.0, None),
+        ("ffff", "full", 7_000.0, None),
+        ("gggg", "1/50", 180.0, Some("ffff")),
+    ] {
+        let (after, broken) = merge(&records, &of(commit, size, ticks), Raise::default());
+        assert!(broken.is_empty(), "{broken:?}");
+        records = after;
+        let larger = |id| records.iter().find(|record| record.id == id).unwrap().larger.as_ref();
+        assert_eq!(larger(id).map(|search| search.run.commit.as_str()), kept, "{commit}");
+        assert_eq!(larger("m7.warm.mean"), None);
+    }
+    let text = markdown::render(&records).expect("text");
+    assert!(text.contains("In a larger search 0 of 7,000 ticks"), "{text}");
+}
