@@ -130,6 +130,31 @@ impl Goal {
     #[must_use]
     pub fn script(&self, tape: &Tape) -> String {
         let (parts, room) = self.parts(&Signs::of(tape));
+        let roots = (1..=tape.roots.len()).map(|at| format!("root{at} <> 0"));
+        let roots = roots.collect::<Vec<_>>().join(", ");
+        let only = if roots.is_empty() { roots } else { format!(" {{ {roots} }}") };
+        let equation = format!("claim -> {}{only};\n", parts.join("\n  + "));
+        self.with_goal(tape, &room, "claim >= 0", &equation)
+    }
+
+    /// A script that asks for the coefficients of the shares' parts, in their order; and of each the share's number, and
+    /// whether it may have either sign.
+    #[must_use]
+    pub fn question(&self, tape: &Tape) -> (String, Vec<(usize, bool)>) {
+        let signs = Signs::of(tape);
+        let [_, rest] = self.rest();
+        let coefficients = rest.coefficients();
+        let parts = (0..).zip(&self.shares);
+        let parts = parts.flat_map(|(at, share)| share.of.iter().map(move |part| (at, part)));
+        let (mut asked, mut of) = (Vec::new(), Vec::new());
+        for (at, part) in parts.filter(|(_, part)| coefficients.contains_key(*part)) {
+            asked.push(format!("{} in ?", coefficients[part]));
+            of.push((at, signs.has(part)));
+        }
+        (self.with_goal(tape, &[], &asked.join(" /\\\n  "), ""), of)
+    }
+
+    fn with_goal(&self, tape: &Tape, room: &[String], goal: &str, equation: &str) -> String {
         let names = |names: &[String], bound: &str| {
             names.iter().map(|name| format!("|{name}| <= {bound}")).collect::<Vec<_>>()
         };
@@ -139,7 +164,7 @@ impl Goal {
         let known = self.known.iter().map(|known| format!("{} in [0, {MOST}]", known.name));
         let mut given = names(&tape.deltas, DELTA);
         given.extend(names(&tape.etas, ETA));
-        given.extend(inputs.chain(roots).chain(known).chain(room));
+        given.extend(inputs.chain(roots).chain(known).chain(room.iter().cloned()));
         let says = self.says.lines().map(|line| format!("# {}", line.trim()));
         let shares = (1..).zip(&self.shares).map(|(at, share)| {
             format!("share{at} = {} * 1b-24; # {}: {}", share.times, share.constant, share.what)
@@ -147,24 +172,26 @@ impl Goal {
         let mut lines: Vec<String> = says.chain(shares).collect();
         lines.extend(tape.definitions.iter().cloned());
         lines.push(format!("claim = {};", self.claim.name));
-        lines.push(format!("{{\n  {}\n  -> claim >= 0\n}}", given.join(" /\\\n  ")));
-        let roots = (1..=tape.roots.len()).map(|at| format!("root{at} <> 0"));
-        let roots = roots.collect::<Vec<_>>().join(", ");
-        let only = if roots.is_empty() { roots } else { format!(" {{ {roots} }}") };
-        lines.push(format!("claim -> {}{only};", parts.join("\n  + ")));
+        lines.push(format!("{{\n  {}\n  -> {goal}\n}}", given.join(" /\\\n  ")));
+        lines.push(equation.to_owned());
         lines.extend((1..).zip(&tape.roots).flat_map(|(at, root)| hints(at, root)));
         lines.join("\n") + "\n"
+    }
+
+    /// The claim without what is known not to be negative: what stems from underflow, and the rest.
+    fn rest(&self) -> [Sum; 2] {
+        let less =
+            |rest: Sum, known: &Known| rest.plus(&known.sum.times(&Sum::number(-known.times)));
+        self.known.iter().fold(self.claim.sum.clone(), less).split()
     }
 
     /// The parts that add up to the claim, none of them negative; and the preconditions by which they are not.
     fn parts(&self, signs: &Signs) -> (Vec<String>, Vec<String>) {
         let (mut parts, mut room) = (Vec::new(), Vec::new());
-        let mut rest = self.claim.sum.clone();
-        for Known { name, sum, times } in &self.known {
-            rest = rest.plus(&sum.times(&Sum::number(-times)));
-            parts.push(format!("{} * {name}", number(*times)));
-        }
-        let [tiny, rest] = rest.split();
+        let known =
+            self.known.iter().map(|known| format!("{} * {}", number(known.times), known.name));
+        parts.extend(known);
+        let [tiny, rest] = self.rest();
         let mut coefficients = rest.coefficients();
         // What is taken from the coefficient of a size.
         let mut taken: BTreeMap<&Monomial, String> = BTreeMap::new();
