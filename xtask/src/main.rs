@@ -45,6 +45,9 @@ enum Task {
     /// Proves the most instructions of a query from the linked program, and writes docs/evidence/bound.md.
     #[command(disable_help_flag = true)]
     Bound(Passed),
+    /// Proves the rounding of the smallest kernels by Gappa, and checks the proofs by Coq.
+    #[command(disable_help_flag = true)]
+    Rounding(Passed),
     Viewer(viewer::Options),
     Fuzz(nightly::FuzzOptions),
     /// Changes operators of the core one by one, and lists the changes that no test notices.
@@ -72,6 +75,7 @@ fn main() -> ExitCode {
         Task::Evidence(passed) => prove::evidence(&passed),
         Task::Profile(passed) => prove::run("profile", &passed),
         Task::Bound(passed) => prove::run("bound", &passed),
+        Task::Rounding(passed) => prove::run("rounding", &passed),
         Task::Viewer(options) => viewer::viewer(&options),
         Task::Fuzz(options) => or_say(nightly::missing(), || nightly::fuzz_by_hand(&options)),
         Task::Mutants(passed) => prove::run("mutants", &passed),

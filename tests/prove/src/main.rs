@@ -1,4 +1,4 @@
-//! Measures and proves: `cargo xtask demo | evidence | guarantees | profile | bound | mutants | coverage | processors` run this, and `test` its checks.
+//! Measures and proves: `cargo xtask demo | evidence | guarantees | profile | bound | rounding | mutants | coverage | processors` run this, and `test` its checks.
 //! docs/proofs.md lists the file for each promise.
 
 use std::path::PathBuf;
@@ -25,6 +25,8 @@ enum Task {
     /// Writes docs/evidence/performance.md: where a query's instructions go on the emulated board.
     Profile,
     Bound(bound::report::Options),
+    /// Proves the rounding of the smallest kernels by Gappa, and checks the proofs by Coq.
+    Rounding,
     Mutants(mutants::Options),
     Coverage(coverage::Options),
     /// Checks the core crate for every row of docs/processors.md.
@@ -57,6 +59,7 @@ fn main() -> ExitCode {
         Task::Evidence(options) => evidence::run(&options),
         Task::Profile => profile::run(),
         Task::Bound(options) => bound::report::run(&options),
+        Task::Rounding => dibs_rounding::report(),
         Task::Mutants(options) => mutants::mutants(&options),
         Task::Coverage(options) => coverage::run(&options),
         Task::Processors => processors::check().map(|outcome| {

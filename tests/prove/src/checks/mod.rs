@@ -38,6 +38,7 @@ mod python;
 mod radii;
 mod receive;
 mod rot;
+mod rounding;
 mod sanitizers;
 mod sides;
 mod signed;
@@ -95,6 +96,7 @@ pub const CHECKS: &[Check] = &[
     nodes::CHECK,
     carried::CHECK,
     radii::CHECK,
+    rounding::CHECK,
     sanitizers::ADDRESS,
     sanitizers::THREAD,
     miri::CHECK,
@@ -125,7 +127,7 @@ pub const ON_REQUEST: [&str; 14] = [
 
 /// Checks that run in parallel on the other core: most need no emulator; also bound and cost model, the demo in C, the
 /// other processors, and the boards, so that both take as long.
-pub const BESIDE: [&str; 15] = [
+pub const BESIDE: [&str; 16] = [
     cost::BOARD.name,
     bound::CHECK.name,
     sanitizers::ADDRESS.name,
@@ -135,6 +137,7 @@ pub const BESIDE: [&str; 15] = [
     other_processors::CHECK.name,
     boards::CHECK.name,
     miri::CHECK.name,
+    rounding::CHECK.name,
     fuzz::CHECK.name,
     cost::HOST.name,
     instructions::CHECK.name,
