@@ -2,7 +2,7 @@
 
 use crate::mesh_file::Lengths;
 use crate::query::ALLOW;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Error, Result, anyhow, bail};
 use dibs_build::glam::Vec3;
 use dibs_build::{BuiltTree, FrameCheck, Mesh, SurfaceRows, Volume};
 use dibs_nostd::nodes::Nodes;
@@ -73,25 +73,29 @@ impl VolumeSpec {
 
 /// An error unless the tree's stretch limit covers a recorded motion of its nodes.
 pub fn check_covered(tree: &BuiltTree, path: &Path, lengths: &Lengths) -> Result<()> {
-    let motion = lengths.motion_of_nodes(path, tree.origin())?;
     match tree.index_bits() {
-        16 => check_frames(&tree.tree::<u16>()?, path, &motion.frames),
-        _ => check_frames(&tree.tree::<u32>()?, path, &motion.frames),
+        16 => check_motion(&tree.tree::<u16>()?, path, lengths),
+        _ => check_motion(&tree.tree::<u32>()?, path, lengths),
     }
 }
 
-/// An error for the first of a motion's frames that a receiver of nodes refuses; none for a tree without nodes.
-pub fn check_frames<I: Index>(tree: &Tree<'_, I>, path: &Path, frames: &[Vec<Vec3>]) -> Result<()> {
+fn check_motion<I: Index>(tree: &Tree<'_, I>, path: &Path, lengths: &Lengths) -> Result<()> {
+    let check = FrameCheck::of(tree);
+    for (number, frame) in lengths.motion_of(tree, path)?.frames.iter().enumerate() {
+        let rows = check.to_rows(frame).map_err(Error::from);
+        rows.and_then(|rows| check_rows(tree, &rows))
+            .map_err(|error| anyhow!("{}, frame {number}: {error}", path.display()))?;
+    }
+    Ok(())
+}
+
+/// An error for a frame, in the tree's rows, that a receiver of nodes refuses; none for a tree without nodes.
+pub fn check_rows<I: Index>(tree: &Tree<'_, I>, rows: &[Vec3]) -> Result<()> {
     if tree.paths() != PathKind::Volume {
         return Ok(());
     }
-    let check = FrameCheck::of(tree);
-    for (number, frame) in frames.iter().enumerate() {
-        let at = || format!("{}, frame {number}", path.display());
-        let rows = check.to_rows(frame).map_err(|error| anyhow!("{}: {error}", at()))?;
-        if let Err(error) = Nodes::of(tree)?.measure(rows.as_slice()) {
-            bail!("{}: {}", at(), SurfaceRows::refusal(tree, error, ALLOW));
-        }
+    match Nodes::of(tree)?.measure(rows) {
+        Ok(_) => Ok(()),
+        Err(error) => bail!(SurfaceRows::refusal(tree, error, ALLOW)),
     }
-    Ok(())
 }

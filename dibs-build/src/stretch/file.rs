@@ -35,13 +35,13 @@ pub enum LimitsErrorKind {
         "is no file of stretch limits: `dibs stretch MESH --motion MOTION --limits FILE` writes one"
     )]
     NotLimits,
-    /// It has limits of triangles and those of tetrahedra are needed, or it has those of tetrahedra and needs those of
-    /// triangles.
+    /// The limits are for the other kind of element. Where a volume moves the surface, limits are of its tetrahedra;
+    /// otherwise they are of the surface's triangles.
     #[error("has limits of {found}, and those of {expected} are needed: {}", remedy(found))]
     OtherKind {
         /// `triangles`, or `tetrahedra` if a volume moves the surface.
         expected: &'static str,
-        /// The other.
+        /// The kind in the file.
         found: &'static str,
     },
     /// The limits are of another mesh.

@@ -284,16 +284,18 @@ fn recorded(args: &Args, path: &Path, order: &SurfaceOrder, tree: &[u8]) -> Resu
         AnyTree::Wide(tree) => args.lengths.motion_of(tree, path),
     }?;
     let rate = args.motion_rate.of(&motion, path)?;
-    let name = path.display();
+    let (name, mut refused) = (path.display(), None);
     for (number, frame) in motion.frames.iter().enumerate() {
-        order.to_rows(frame).map_err(|error| anyhow!("{name}, frame {number}: {error}"))?;
+        let at = || format!("{name}, frame {number}");
+        let rows = order.to_rows(frame).map_err(|error| anyhow!("{}: {error}", at()))?;
+        let refusal = || match &tree {
+            AnyTree::Narrow(tree) => nodes::check_rows(tree, &rows).err(),
+            AnyTree::Wide(tree) => nodes::check_rows(tree, &rows).err(),
+        };
+        refused = refused.or_else(|| Some(format!("{}: {}", at(), refusal()?)));
     }
     // The receiver refuses such a frame, and takes the others.
-    let admitted = match &tree {
-        AnyTree::Narrow(tree) => nodes::check_frames(tree, path, &motion.frames),
-        AnyTree::Wide(tree) => nodes::check_frames(tree, path, &motion.frames),
-    };
-    if let Err(refused) = admitted {
+    if let Some(refused) = refused {
         eprintln!("warning: {refused}");
     }
     let weights =

@@ -59,7 +59,8 @@ fn a_series_of_volumes_is_a_motion_for_every_command() {
     }
 }
 
-/// A series of curved cells is refused with the remedy for what its files hold: nodes of a volume, or a surface.
+/// Curved cells are refused. The remedy in the error is linear tetrahedra where the files are read as volumes, and flat
+/// cells where they are read as surfaces.
 #[test]
 fn a_series_of_curved_cells_has_its_own_remedy() {
     let folder = tempfile::tempdir().unwrap();

@@ -169,7 +169,8 @@ fn answered(server: &mut Command) {
     assert!(found > FRAMES / 2, "{found}: {said}");
 }
 
-/// What the receiver gets of a server's messages by a bridge with `line`, and what the bridge and the server say.
+/// Runs a bridge with the options `line`, connected to an OpenIGTLink server that sends messages of this kind. Returns what
+/// the bridge's receiver saw, the bridge's output, and what the server printed.
 fn served(folder: &Path, line: &str, server: &mut Command, kind: &str) -> (Seen, Output, String) {
     let (frames, triangles) = organ(folder);
     let mut data: Vec<u8> = triangles.iter().flatten().flat_map(|x| x.to_be_bytes()).collect();

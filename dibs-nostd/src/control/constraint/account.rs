@@ -89,9 +89,9 @@ impl EnergyAccount {
         Ok(Self { tank, step, stiffness, fall, speed, balance: tank, force: Vec3::ZERO })
     }
 
-    /// The most energy (mJ) that a wall gives, less the energy that it received and that by which its account recovered over
-    /// time, at this period (s) and speeds up to the stated one: the tank, and what the largest force `F` gives while it
-    /// falls to zero, at most `speed period (F + step / 2)^2 / (2 step)`.
+    /// A bound (mJ) on what a wall gives in ticks of this period (s), at speeds up to the stated one: on the energy given,
+    /// less the energy received, and less the energy by which the account recovered over time. It is the tank, plus what
+    /// the largest force `F` gives while it falls to zero, which is at most `speed period (F + step / 2)^2 / (2 step)`.
     #[must_use]
     pub const fn most(&self, period: f32) -> f32 {
         self.tank + self.fall * (self.speed * period)

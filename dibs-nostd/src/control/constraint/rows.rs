@@ -20,8 +20,9 @@ use crate::query::Contact;
 /// ([`Options::depth_tolerance`](crate::Options::depth_tolerance)); of triangles that tie within it, the row has two.
 /// Between opposite walls its factors are small, and 0 between parallel ones: no small motion reduces the depth, so a
 /// row below its stand-off has no solution unless the solver may relax it. If the budget ended before the second
-/// triangle was found, the row is that of the closest triangle. If the second triangle is parallel to the axis, rounding
-/// decides whether the row is that triangle's or the closest one's, so it may change from one to the other between ticks.
+/// triangle was found, the row is that of the closest triangle. If the second triangle is parallel to the axis, the row is
+/// of one triangle alone. Rounding decides which one, so it may be the second triangle at one tick and the closest one at
+/// the next.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};

@@ -1,17 +1,18 @@
-//! The flow facts of a tracker's tick with side and depth, within a budget, on a surface that moves and a tree of one root:
-//! besides those of the front and of a point's side, those of the search for the deepest point of the axis.
+//! The flow facts of a tracker's tick with side and depth, within a budget, on a surface that moves and a tree of one root.
+//! Facts of the closest pair are in [`tracked`](super::tracked), facts of a point's side in [`sided`](super::sided).
+//! Here are those of the depth, which is searched among points of the tool's axis.
 
 // Requirement: A-06
 
 use super::facts::{
-    CHILD_LINE, COPIES, Count, Fact, Facts, KEPT, Most, PUSH, TEST, TRIANGLE_LINE, WARM,
+    CHILD_LINE, CLEARS, COPIES, Count, Fact, Facts, KEPT, Most, PUSH, TEST, TRIANGLE_LINE, WARM,
     WITHOUT_EDGE,
 };
 use super::lines::Within::{self, Function, Line, Of};
 use super::sided::{
     ACROSS_F32, ACROSS_F64, ADDED_F32, ADDED_F64, CLOSED, FINE, IN_F32, IN_F64, NORMALS, ONE_ROOT,
     ONE_SOLID, OUTWARD, POPS, RING, ROUGH, SEARCH_POPS, SEARCHES, SIDE_OF_POINT, TIE_POPS,
-    TIE_TEST, TURNED_F32, TURNED_F64,
+    TIE_TEST, TURNED_F32, TURNED_F64, waiting_entries,
 };
 use super::tracked::{
     CLOSED_SLOT, DUE_CHILD, DUE_PLANE, DUE_TEST, DUE_TRIANGLE, DUE_TURN, SEEN, TICK, WHOLE_CHILD,
@@ -92,16 +93,18 @@ const RESUMED: &[Within] = &[Line(AROUND, "self.push(self.waiting, Waiting { low
 const LEFT: &[Within] = &[Function("leave")];
 const STEPS: &[Within] = &[Line(WALK, "for _ in 0..walk.steps {")];
 const NEIGHBOURS: &[Within] = &[Line(WALK, "for row in neighbours.filter(")];
+const SWAPPED: &[Within] = &[Function("swap_nonoverlapping_chunks")];
+const TOUCHED: &[Within] = &[Function("touched_from")];
 const ROOM: Count = Count::Calls(&[], "Leaves::keep_within");
 
-/// Loops of which each has at most so many turns.
+/// A fact about loops of which each has at most so many turns, and one more where they end.
 macro_rules! turns {
     ($name:literal, $within:expr, $most:expr, $because:literal) => {
         Fact {
             name: $name,
-            terms: &[(1, Count::Heads($within)), (-($most), Count::Entries($within))],
+            terms: &[(1, Count::Heads($within)), (-($most + 1), Count::Entries($within))],
             most: Most::base(0),
-            because: $because,
+            because: concat!($because, "; one turn where they end"),
         }
     };
 }
@@ -159,24 +162,18 @@ const COUNTED: &[Fact] = &[
     },
     Fact {
         name: "waiting entries",
-        terms: &[
-            (1, Count::Heads(&[Function("least_waiting")])),
-            (1, Count::Heads(SEARCH_POPS)),
-            (1, Count::Heads(TIE_POPS)),
+        terms: waiting_entries!(
             (1, Count::Heads(GATHER_POPS)),
-            (-1, PUSH),
             (-1, Count::Heads(RESUMED)),
-            (-3, Count::Entries(SEARCH_POPS)),
-            (-3, Count::Entries(TIE_POPS)),
             (-3, Count::Entries(GATHER_POPS)),
-        ],
+        ),
         most: Most::base(0),
         because: "what waits was pushed, in this tick or an earlier one, and not popped; each search pushes the root before; each \
                   loop has a turn more where it ends",
     },
 ];
 
-/// Of the search for the deepest point, and of what the tracker remembers of it.
+/// Of a depth: what the search for the deepest point of the axis does, and what the tracker keeps of it for the next tick.
 const DEPTH: &[Fact] = &[
     Fact {
         name: "points of the axis",
@@ -209,24 +206,14 @@ const DEPTH: &[Fact] = &[
         because: "those of a direction, and those that confirm a vertex after the walk along its edges, which ends early only \
                   where the budget does: in f32 once, in f64 after a triangle",
     },
-    turns!(
-        "resumed subtrees",
-        RESUMED,
-        STACK + 1,
-        "as many wait as a stack has entries; one turn where they end"
-    ),
+    turns!("resumed subtrees", RESUMED, STACK, "as many wait as a stack has entries"),
     Fact {
         name: "resumed searches",
         terms: &[(1, Count::Calls(&[], "Search<I,V,T>>::resume"))],
         most: Most::base(2),
         because: "only a search that the budget ended leaves subtrees to another: the last tick's, and one of this tick's",
     },
-    turns!(
-        "subtrees left",
-        LEFT,
-        STACK + 2,
-        "those on the stack and the unfinished one; one turn where they end"
-    ),
+    turns!("subtrees left", LEFT, STACK + 1, "those on the stack and the unfinished one"),
     Fact {
         name: "searches left",
         terms: &[(1, Count::Calls(&[], "Search<I,V,T>>::leave"))],
@@ -247,12 +234,7 @@ const DEPTH: &[Fact] = &[
         because: "a full list that has made room is full of ties within the limit, until a triangle test lowers that; without room \
                   the list is lost: in each search twice, and once for each test",
     },
-    turns!(
-        "leaves around a point",
-        &[Function("among")],
-        LEAVES + 1,
-        "a list has at most 48; one turn where they end"
-    ),
+    turns!("leaves around a point", &[Function("among")], LEAVES, "a list has at most 48"),
     Fact {
         name: "triangles of a leaf around a point",
         terms: &[
@@ -275,59 +257,44 @@ const DEPTH: &[Fact] = &[
         most: Most::base(0),
         because: "a list has at most 48 leaves, which two loops share; each loop has a turn more where it ends",
     },
-    turns!(
-        "parts of a list of leaves",
-        &[Function("swap_nonoverlapping_chunks")],
-        13,
-        "a list has 412 bytes, of which each turn swaps 32"
-    ),
+    Fact {
+        name: "parts of a list of leaves",
+        terms: &[(1, Count::Heads(SWAPPED)), (-13, Count::Entries(SWAPPED))],
+        most: Most::base(0),
+        because: "a list has 412 bytes, of which each turn swaps 32",
+    },
     turns!(
         "remembered points",
         &[Line(START, "let Point { parameter, depth, bound, triangle } = *point;")],
-        REMEMBERED + 1,
-        "at most 20; one turn where they end"
+        REMEMBERED,
+        "at most 20"
     ),
     turns!(
         "points that have moved",
         &[Line(KNOWN, "point.depth = raised(point.depth, moved);")],
-        REMEMBERED + 1,
-        "at most 20 are remembered; one turn where they end"
+        REMEMBERED,
+        "at most 20 are remembered"
     ),
     turns!(
         "points to be remembered",
         &[Line(KNOWN, "for point in points.take(KEPT) {")],
-        REMEMBERED + 1,
-        "at most 20; one turn where they end"
+        REMEMBERED,
+        "at most 20"
     ),
     turns!(
         "points too many",
         &[Line(DIVISION, "while parts.count() > Points::MOST")],
-        POINTS - REMEMBERED + 1,
-        "at most 28, of which 20 are kept; one turn where they end"
+        POINTS - REMEMBERED,
+        "at most 28, of which 20 are kept"
     ),
-    turns!(
-        "points by their parameter",
-        &[Function("row_of")],
-        POINTS + 1,
-        "at most 28; one turn where they end"
-    ),
-    turns!(
-        "parts that may be joined",
-        &[Function("join")],
-        POINTS + 1,
-        "at most 28; one turn where they end"
-    ),
-    turns!(
-        "ends of a part",
-        &[Line(DIVISION, "for row in ends {")],
-        3,
-        "two; one turn where they end"
-    ),
+    turns!("points by their parameter", &[Function("row_of")], POINTS, "at most 28"),
+    turns!("parts that may be joined", &[Function("join")], POINTS, "at most 28"),
+    turns!("ends of a part", &[Line(DIVISION, "for row in ends {")], 2, "two"),
     turns!(
         "rounds of a bound",
         &[Line(PART, "let is_between = equal > low.0 && equal < high.0;")],
-        3,
-        "at most two; one turn where they end"
+        2,
+        "at most two"
     ),
     Fact {
         name: "steps of a walk",
@@ -341,18 +308,13 @@ const DEPTH: &[Fact] = &[
         most: Most::base(0),
         because: "a triangle has three; one turn where they end",
     },
-    turns!(
-        "touched triangles",
-        &[Function("touched_from")],
-        34,
-        "a list has at most 32 ties, each passed over or taken; one turn for the closest triangle, and one where they end"
-    ),
-    turns!(
-        "halvings",
-        &[Line(TOUCHES, "let half = (inside + outside) * 0.5;")],
-        9,
-        "eight; one turn where they end"
-    ),
+    Fact {
+        name: "touched triangles",
+        terms: &[(1, Count::Heads(TOUCHED)), (-34, Count::Entries(TOUCHED))],
+        most: Most::base(0),
+        because: "a list has at most 32 ties, each passed over or taken; one turn for the closest triangle, and one where they end",
+    },
+    turns!("halvings", &[Line(TOUCHES, "let half = (inside + outside) * 0.5;")], 8, "eight"),
     Fact {
         name: "places that are joined",
         terms: &[
@@ -365,57 +327,17 @@ const DEPTH: &[Fact] = &[
     turns!(
         "places after a new one",
         &[Line(TOUCHES, "if other.first > place.first {")],
-        PLACES + 1,
-        "at most eight; one turn where they end"
+        PLACES,
+        "at most eight"
     ),
     turns!(
         "places that begin a search",
         &[Line(START, "for place in self.touches.places() {")],
-        PLACES + 1,
-        "at most eight; one turn where they end"
+        PLACES,
+        "at most eight"
     ),
-    turns!(
-        "places beside a point outside",
-        &[Function("add_outside")],
-        PLACES + 1,
-        "at most eight; one turn where they end"
-    ),
-    turns!(
-        "places ahead",
-        &[Function("ahead")],
-        PLACES + 1,
-        "at most eight; one turn where they end"
-    ),
-    turns!(
-        "places behind",
-        &[Function("behind")],
-        PLACES + 1,
-        "at most eight; one turn where they end"
-    ),
-    turns!(
-        "roots of a triangle",
-        &[Function("root_of")],
-        1,
-        "the tree has one root; one turn where they end"
-    ),
-];
-
-/// Of memory that is cleared.
-const CLEARS: &[Fact] = &[
-    Fact {
-        name: "cleared words",
-        terms: &[
-            (16, Count::Heads(&[Function("__aeabi_memset4")])),
-            (4, Count::Heads(&[Function("set_bytes_words")])),
-            (-1, Count::Bytes("__aeabi_memclr", 1)),
-        ],
-        most: Most::base(0),
-        because: "each turn clears four words, or one or more; the lengths are constants at the calls",
-    },
-    Fact {
-        name: "no bytes left to clear",
-        terms: &[(1, Count::Heads(&[Function("set_bytes_bytes")]))],
-        most: Most::base(0),
-        because: "at most three bytes are no word; a turn clears four",
-    },
+    turns!("places beside a point outside", &[Function("add_outside")], PLACES, "at most eight"),
+    turns!("places ahead", &[Function("ahead")], PLACES, "at most eight"),
+    turns!("places behind", &[Function("behind")], PLACES, "at most eight"),
+    turns!("roots of a triangle", &[Function("root_of")], 0, "the tree has one root"),
 ];

@@ -258,6 +258,26 @@ pub(super) const COPIES: &[Fact] = &[
     },
 ];
 
+/// Of memory that is cleared.
+pub(super) const CLEARS: &[Fact] = &[
+    Fact {
+        name: "cleared words",
+        terms: &[
+            (16, Count::Heads(&[Function("__aeabi_memset4")])),
+            (4, Count::Heads(&[Function("set_bytes_words")])),
+            (-1, Count::Bytes("__aeabi_memclr", 1)),
+        ],
+        most: Most::base(0),
+        because: "each turn clears four words, or one or more; the lengths are constants at the calls",
+    },
+    Fact {
+        name: "no bytes left to clear",
+        terms: &[(1, Count::Heads(&[Function("set_bytes_bytes")]))],
+        most: Most::base(0),
+        because: "at most three bytes are no word; a turn clears four",
+    },
+];
+
 /// Modes of a surface that they move.
 pub const MODES: usize = 8;
 

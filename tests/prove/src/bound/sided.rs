@@ -86,6 +86,23 @@ pub(super) const ROUGH: &[Within] = &[Line(SIDE, "let above = rough.of(rows)?;")
 pub(super) const FINE: &[Within] = &[Line(SIDE, "let above = fine.of(again)?;")];
 const DROP: &[Within] = &[Line(TIES, "self.rows.retain(|tie| tie.square <= self.limit);")];
 
+/// What waits in searches with a side, the query's own and those for ties, and more terms for other searches: each entry
+/// that was pushed is taken once.
+macro_rules! waiting_entries {
+    ($($more:expr),* $(,)?) => {
+        &[
+            (1, Count::Heads(&[Function("least_waiting")])),
+            (1, Count::Heads(SEARCH_POPS)),
+            (1, Count::Heads(TIE_POPS)),
+            (-1, PUSH),
+            (-3, Count::Entries(SEARCH_POPS)),
+            (-3, Count::Entries(TIE_POPS)),
+            $($more),*
+        ]
+    };
+}
+pub(super) use waiting_entries;
+
 /// What a query counts, and what waits in its searches: its own, and those for ties.
 const COUNTED: &[Fact] = &[
     Fact {
@@ -115,14 +132,7 @@ const COUNTED: &[Fact] = &[
     },
     Fact {
         name: "waiting entries",
-        terms: &[
-            (1, Count::Heads(&[Function("least_waiting")])),
-            (1, Count::Heads(SEARCH_POPS)),
-            (1, Count::Heads(TIE_POPS)),
-            (-1, PUSH),
-            (-3, SEARCHED),
-            (-3, Count::Entries(TIE_POPS)),
-        ],
+        terms: waiting_entries!(),
         most: Most::base(0),
         because: "what waits was pushed and not popped; each search pushes the root before; each loop has a turn more where it ends",
     },

@@ -165,8 +165,8 @@ pub const OF_HUMAN: Check = Check {
 
 /// What a dearer tick was meant to reach.
 const GOAL: &str = "The goal at 60,000 was 0.35 mm at 95 %: not reached. The motion of a tick, or the triangles near the axis, need more tests \
-     than the budget has. Tried, and in: prices for all work, by which 60,000 instructions buy some 480 tests in place of \
-     200, and the whole budget for the closest pair until a depth is known.";
+     than the budget has. Tried, and in: prices for all work, by which the same instructions buy more tests, and the whole budget \
+     for the closest pair until a depth is known.";
 
 const fn wrong(id: &'static str, unit: &'static str) -> Promise {
     Promise {

@@ -92,8 +92,8 @@ const fn without(id: &'static str, says: &'static str, bound: Bound) -> Promise 
     let (unit, limits) = (
         "of {listed.near} ticks within 5 mm",
         "Budgets by `Cost::M7_TICK`. After 100 ticks, and after 100 from each leap. Without a list the budget ended before \
-         the deepest contact was known. The goal was 0 from 40,000 instructions on: reached from 60,000 on. With tests alone counted, instead of all \
-         work, 1,521 ticks had none.",
+         the deepest contact was known. The goal was 0 from 40,000 instructions on: reached from 60,000 on. With tests alone \
+         counted, instead of all work, 1,521 ticks within 40,000 had none (measured once, 2026-11-28, before commit c0aae0a9).",
     );
     Promise { id, says, criterion: TIMING, bound, unit, limits }
 }
