@@ -60,7 +60,8 @@ pub const REQUIREMENTS: &[Requirement] = &[
     ),
     requirement(
         "A-06",
-        "The instructions of a plain query have a bound that is proven from the linked program.",
+        "The instructions of a plain query, and of a tracker's tick with side and depth, have a bound that is proven from the \
+         linked program.",
         &[
             "bound.above",
             "bound.broken",
