@@ -1,5 +1,7 @@
 //! One error type for all errors of this crate, for `?`.
 
+// Requirement: A-07
+
 use core::fmt;
 
 /// Defines [`Error`] with a variant for each error type, and for each variant its `From` and its message, which is the

@@ -1,5 +1,7 @@
 //! The bus's end: bytes in, published frames and statuses out.
 
+// Requirements: B-01, B-11, M-02
+
 use glam::{Quat, Vec3};
 
 use super::surface::Notes;

@@ -31,6 +31,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+// Requirement: C-07
+
 mod answer;
 mod bus;
 mod limits;

@@ -1,5 +1,7 @@
 //! The check of a frame with a pose: the rows by their own gate, and both together by the limit on speed.
 
+// Requirement: F-08
+
 use core::ops::Range;
 
 use glam::Vec3;

@@ -3,6 +3,8 @@
 //! The state word that publishes a frame publishes its pose as well: the writer stores a pose before it publishes, and
 //! only for the buffer that nobody reads. (`tests/soundness` tries every order.)
 
+// Requirements: F-01, F-08
+
 use glam::{Quat, Vec3};
 
 use super::rows::Shared;

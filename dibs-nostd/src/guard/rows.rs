@@ -1,5 +1,7 @@
 //! The content of a guard's frames: vertices or nodes, with or without a pose.
 
+// Requirements: F-07, F-08
+
 use glam::Vec3;
 
 use super::posed::Placed;

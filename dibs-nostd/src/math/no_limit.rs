@@ -1,5 +1,7 @@
 //! An infinite limit in formats without infinity, such as JSON: `null`.
 
+// Requirement: F-03
+
 use serde::de::{Deserialize, Deserializer};
 use serde::ser::{Error, Serialize, Serializer};
 

@@ -1,5 +1,7 @@
 //! Sums rounded up or down.
 
+// Requirement: A-03
+
 /// `a + b`, rounded down; NaN if the sum is.
 pub(crate) fn sum_down(a: f32, b: f32) -> f32 {
     let (sum, error) = two_sum(a, b);

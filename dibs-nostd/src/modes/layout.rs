@@ -1,5 +1,7 @@
 //! The modes' bytes: section 7 of `docs/format.md`, and its validation.
 
+// Requirements: F-06, M-01
+
 use super::{MAX_GAIN, MAX_MODES, ModesError};
 use crate::tree::format::{range, u32_at};
 

@@ -1,5 +1,7 @@
 //! The nodes' bytes: section 11 of `docs/format.md`, and its validation.
 
+// Requirements: F-07, M-01
+
 use glam::{Mat4, Vec3, Vec4};
 
 use super::{MAX_ELEMENTS, MAX_NODES, NodesError};

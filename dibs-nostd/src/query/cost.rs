@@ -23,6 +23,10 @@ use crate::{Index, Tree};
 /// a guard's own work. The contacts were those of a tracker [`with_range`](crate::Tracker::with_range), in a list of eight.
 /// A tick whose front is full ([`Fallback::Full`](crate::Fallback::Full)) pays as a query; its instructions were not
 /// measured. No cost is fitted for the ticks on a surface of [modes](crate::modes).
+///
+/// Other constants may take the place of these: measured on another processor, or proven. The repository's
+/// `docs/evidence/bound.md` has those proven of one linked program; `base` then includes the price of a root, for each
+/// besides the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -1,5 +1,7 @@
 //! The traversal: the closest pair between a tool and the current surface.
 
+// Requirements
+
 mod chain;
 mod contacts;
 mod corners;

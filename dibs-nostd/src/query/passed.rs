@@ -3,6 +3,8 @@
 //! No surface is within a tool's clearance, so every point within the clearance of the axis of a tool outside is
 //! outside, too. An axis with such a point that touches no surface is outside of a closed surface.
 
+// Requirements: A-09, S-01
+
 use crate::Tool;
 
 /// Most tools that may be skipped: one for each bit of a set.

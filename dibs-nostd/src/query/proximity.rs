@@ -1,5 +1,7 @@
 //! A query's answer: the closest pair and how certain it is.
 
+// Requirements
+
 use glam::Vec3;
 
 use super::{NoSide, Side};

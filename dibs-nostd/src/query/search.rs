@@ -1,5 +1,7 @@
 //! One search: its start, its loop, and the best pair so far.
 
+// Requirements
+
 mod finish;
 mod heights;
 mod leaf;

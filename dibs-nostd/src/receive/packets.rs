@@ -1,5 +1,7 @@
 //! The effect of each packet on the current frame.
 
+// Requirement: B-01
+
 use core::ops::Range;
 
 use glam::Vec3;

@@ -3,6 +3,8 @@
 //! The assembler measures it itself, because it alone knows that both frames are unchanged until the later one is
 //! published: so no gate and no user can understate the motion.
 
+// Requirement: T-04
+
 use crate::math::sqrt::sqrt;
 use crate::stretch::{Compared, Gate, largest_change, largest_step};
 use crate::surface::{MotionReading, MotionUnit, PredictionCheck, VertexTable};

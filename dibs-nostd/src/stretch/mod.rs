@@ -1,5 +1,7 @@
 //! Measured stretch: the deformation of the current surface from its rest shape.
 
+// Requirements: F-02, F-03
+
 mod gate;
 mod kernel;
 mod limits;

@@ -6,6 +6,8 @@
 //!
 //! One file, because the compiler inlines the loop as a whole.
 
+// Requirement: F-02
+
 mod wide;
 
 use core::ops::Range;

@@ -1,6 +1,8 @@
 //! Atomics: the processor's, or with `--cfg loom` those of a model checker that tries every order in which two threads
 //! may see them (`tests/soundness`).
 
+// Requirement: F-01
+
 #[cfg(loom)]
 pub(crate) use loom::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 #[cfg(not(loom))]

@@ -1,5 +1,7 @@
 //! Errors of splitting, filling and publishing buffers.
 
+// Requirement: F-01
+
 use core::fmt;
 
 /// The buffers are split already.

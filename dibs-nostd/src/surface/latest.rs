@@ -1,5 +1,7 @@
 //! The newest surface with its age, for a control tick.
 
+// Requirement: B-05
+
 use super::Millis;
 use crate::unavailable::Unavailable;
 

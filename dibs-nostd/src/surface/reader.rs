@@ -1,6 +1,8 @@
 //! The control tick's end of the buffers: the published frame, locked during the read, and the surface between it and
 //! the previous one.
 
+// Requirements: F-01, F-05
+
 use glam::Vec3;
 
 use super::atomic::{AtomicU32, Ordering};

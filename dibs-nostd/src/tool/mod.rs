@@ -11,6 +11,8 @@
 //! The `triangle` module derives the figure; `tests/tests/query/kernels.rs` in the repository searches for
 //! a counterexample.
 
+// Requirement: A-01
+
 mod axis_point;
 mod capsule;
 mod edge;

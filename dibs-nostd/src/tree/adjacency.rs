@@ -4,6 +4,8 @@
 //! the few rows with those bits the neighbour is the one with the reversed edge. A border edge has the largest code,
 //! and no such row.
 
+// Requirements: M-01, S-01
+
 use super::{FormatError, Tree, TriangleRow, format};
 use crate::Index;
 

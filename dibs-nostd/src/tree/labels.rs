@@ -1,5 +1,7 @@
 //! The labels that a tree's triangles have.
 
+// Requirement: A-12
+
 /// A set of labels: one bit each. A tracker has it, so that a control tick can tell a label that no triangle has without a
 /// look at every triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,6 +2,8 @@
 //!
 //! One file, because it is the view's whole interface.
 
+// Requirement: M-01
+
 /// The operator `?`, for `const` functions.
 macro_rules! tri {
     ($result:expr) => {

@@ -1,5 +1,7 @@
 //! Positions in the order of the mesh's file, read in the order of the rows.
 
+// Requirements: B-08, M-06
+
 use core::marker::PhantomData;
 
 use glam::Vec3;

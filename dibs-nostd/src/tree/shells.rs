@@ -3,6 +3,8 @@
 //! A closed shell that faces outwards bounds a solid; shells that face inwards and lie in it at rest are its cavities.
 //! Open surfaces bound no solid.
 
+// Requirements: A-08, S-02
+
 use super::format::{self, SOLID_BYTES, section};
 use super::{FormatError, Tree};
 use crate::Index;

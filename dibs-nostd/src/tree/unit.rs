@@ -1,5 +1,7 @@
 //! Units of length of mesh files.
 
+// Requirement: M-06
+
 use core::fmt;
 
 /// The unit of the lengths in a mesh's file. The tree's own lengths are in millimetres.

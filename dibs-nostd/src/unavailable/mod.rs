@@ -1,5 +1,7 @@
 //! Causes of a missing answer, shared by surface, query and fail-safe machine.
 
+// Requirement: A-07
+
 mod query;
 
 use core::fmt;

@@ -12,6 +12,8 @@
 //! assert_eq!(dlc_of(packet.len()), Some(12));
 //! ```
 
+// Requirement: B-09
+
 #[cfg(feature = "embedded-can")]
 use embedded_can::{Frame, Id, StandardId};
 

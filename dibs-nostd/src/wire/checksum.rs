@@ -4,6 +4,8 @@
 //! its large table (16 KiB) a panic branch remains. So this module computes the same remainder with four tables of 1
 //! KiB, made from the crate's; a test compares the two.
 
+// Requirement: B-06
+
 /// `TABLES[k][byte]`: the remainder of a byte followed by `k` zero bytes.
 static TABLES: [[u32; 256]; 4] = tables();
 

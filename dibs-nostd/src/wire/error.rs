@@ -1,5 +1,7 @@
 //! Why bytes are not a packet.
 
+// Requirement: B-02
+
 use core::fmt;
 
 /// Why bytes are not a packet of this protocol. Names the first check that failed; the checksum is compared before

@@ -1,5 +1,7 @@
 //! A frame's name: mesh, session and epoch, and their order.
 
+// Requirement: B-01
+
 /// The name of a frame: its mesh, the run of its sender, and its number within that run.
 ///
 /// Frames are ordered by (session, epoch): a sender that restarts takes a later session, and may number its frames from

@@ -11,7 +11,7 @@
 //!
 //! Work is bounded by the packet's length, and only positions are copied.
 
-// Requirement: B-06
+// Requirements: B-06, B-07
 
 mod body;
 pub mod canfd;

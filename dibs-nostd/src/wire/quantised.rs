@@ -1,5 +1,7 @@
 //! Positions as three 16-bit numbers in a box.
 
+// Requirement: B-09
+
 use core::fmt;
 
 use glam::Vec3;

@@ -5,6 +5,8 @@
 //! instructions a byte on a Cortex-M7, more than the rest of a packet's cost; this one takes a third of that, and less
 //! if bytes come in slices.
 
+// Requirement: B-09
+
 use core::fmt;
 
 /// Largest size on the stream of a packet of `bytes` bytes, with the zero that ends it.

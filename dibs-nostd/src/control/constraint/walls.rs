@@ -10,6 +10,8 @@
 //! current quadratic, up to the first point at which a wall starts or stops acting. One wall does not reverse the next
 //! step (Sherman & Morrison), so every step lowers the function, and a step without such a point ends at its minimum.
 
+// Requirement: C-03
+
 use glam::Vec3;
 
 pub(super) const MOST: usize = 8;

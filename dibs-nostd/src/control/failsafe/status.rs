@@ -1,5 +1,7 @@
 //! The health of the bus, passed to the control tick.
 
+// Requirements: B-05, C-01
+
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::Link;

@@ -10,6 +10,8 @@
 //! where both would be equally far, until the depth there is at least the expected one. All these points are nearer to
 //! the deepest point than the surface is, so they are inside, too.
 
+// Requirement: S-06
+
 use glam::Vec3;
 
 use super::Contact;

@@ -9,6 +9,8 @@
 //! 2007). So an activation changes by at most `256 / distance` of the motion. Between flat walls it is at most
 //! `45 / distance`, since a ridge there grows by the sine of the 10 degrees.
 
+// Requirement: C-04
+
 use super::add::Pair;
 use super::basins::{Basins, Near};
 use crate::math::sqrt::sqrt;

@@ -3,6 +3,8 @@
 //! The clock counts their motion, rounded up, in units of a tree's odometer. A bound found at reading `now` has the
 //! deadline `now + bound`. Until then the deadline minus the reading is a bound.
 
+// Requirement: T-04
+
 use crate::surface::motion::{FAR, Unit};
 
 /// Counts the motion of tool and surface, in units.

@@ -3,6 +3,8 @@
 //! A depth changes by at most the motion of tool and surface. So every bound of the last tick plus that motion still
 //! holds: only parts of the axis whose bounds now exceed the deepest point are searched again.
 
+// Requirements: S-03, T-01
+
 use heapless::{Vec, VecView};
 
 use super::clock::{MotionClock, Reading};

@@ -2,6 +2,8 @@
 //!
 //! Until tool and surface have moved too far, one of them contains the closest triangle to the point.
 
+// Requirements: S-03, T-01
+
 use heapless::{Vec, VecView};
 
 use super::waiting::Waiting;

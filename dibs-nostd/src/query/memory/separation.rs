@@ -3,6 +3,8 @@
 //! The signed distance of an axis changes by no more than tool and surface move. So the last interval, widened by the
 //! motion since, holds whatever the current search or side gives.
 
+// Requirement: T-02
+
 use glam::Vec3;
 
 use super::clock::{MotionClock, Reading};

@@ -3,6 +3,8 @@
 //! A vertex is a corner of several triangles, in one leaf and in the leaves around it. A small direct-mapped cache
 //! keeps recently seen vertices until another vertex evicts them.
 
+// Requirement: S-04
+
 use glam::Vec3;
 use heapless::Vec;
 

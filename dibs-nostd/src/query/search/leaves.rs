@@ -6,6 +6,8 @@
 //! Rounding. A bound is stored minus the slack of its own search, and compared with a cutoff that includes the slack of
 //! the current search.
 
+// Requirements: S-03, T-01
+
 use heapless::VecView;
 
 use super::node::AROUND;

@@ -10,6 +10,8 @@
 //! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, at most
 //! `ridge / 2` above the first one.
 
+// Requirement: S-04
+
 use glam::Vec3;
 
 use super::Search;

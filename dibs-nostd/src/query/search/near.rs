@@ -1,5 +1,7 @@
 //! All locally lowest triangles within a distance, instead of the closest.
 
+// Requirements: C-05, S-04
+
 use super::heights::{CacheSlot, Heights};
 use super::low::MAX_RING;
 use super::meter::Meter;

@@ -1,5 +1,7 @@
 //! The range search that continues from the front of the last one; for rounding see [`tick`](super::tick).
 
+// Requirements: S-04, T-01
+
 #[cfg(test)]
 mod tests;
 

@@ -7,6 +7,8 @@
 //! the current one: so both errors are covered at any scale. Both slacks include 16 * 2^-24 of the coordinates, since
 //! each frame may round positions anew.
 
+// Requirement: T-01
+
 mod facing;
 
 use glam::Vec3;

@@ -5,6 +5,8 @@
 //! collects every triangle that it tests within that tolerance, and a tracker also those that it skips. They decide the
 //! side.
 
+// Requirement: S-01
+
 use heapless::Vec;
 
 use super::node::RANGE;

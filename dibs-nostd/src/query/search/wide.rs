@@ -8,6 +8,8 @@
 //! Batching wastes few tests: most queued subtrees would be visited anyway. It often saves some, because the
 //! pins of seven subtrees lower the cutoff before a child is compared with it.
 
+// Requirement: A-01
+
 mod leaf;
 mod order;
 

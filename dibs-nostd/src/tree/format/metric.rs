@@ -1,5 +1,7 @@
 //! Rows of the metric section.
 
+// Requirement: F-02
+
 use super::{METRIC_BYTES, rows_from};
 
 /// The rest shape of a triangle, to which its stretch refers.

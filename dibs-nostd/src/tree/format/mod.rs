@@ -5,6 +5,8 @@
 //!
 //! One file, because no other file reads the bytes.
 
+// Requirement: M-01
+
 mod metric;
 #[cfg(feature = "wide")]
 pub(crate) mod several;

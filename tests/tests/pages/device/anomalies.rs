@@ -35,20 +35,22 @@ pub const ANOMALIES: &[Anomaly] = &[
     ),
     anomaly(
         "K-03",
-        "The proven bound covers plain queries, and a tracker's tick with side and depth. Contacts and a firmware's tick are \
-         measured, not proven: the longest was {ticks.longest} instructions.",
-        "Leave room in the tick.",
+        "The proven bound covers plain queries, and a tracker's tick with side and depth. Contacts, forces, filter, `Guard`, `Bus` and the firmware in C have no proof: their flow facts are \
+         not written. The longest tick measured was {ticks.longest} instructions.",
+        "Leave room in the tick; measure your own.",
         "tests/prove/src/bound/mod.rs",
     ),
     anomaly(
         "K-04",
-        "A proven node test of a sphere costs {bound.sphere.ratio} times the typical one.",
+        "A proven node test of a sphere costs {bound.sphere.ratio} times the typical one, where a capsule's constants keep the goal of \
+         1.6: {bound.sphere.node-test} instructions where two planes scan a leaf in vain. No other scan was tried.",
         "Budgets of spheres by proven constants do less.",
         "dibs-nostd/src/query/plane.rs",
     ),
     anomaly(
         "K-05",
-        "Facts of the proof that no trace executes are not tried: roots on surfaces that nodes carry.",
+        "Flow facts of the proof that limit code that no trace executes are not tried: among them those of ties, vertices and f64 in \
+         ticks with side and depth, and of further roots where nodes carry the surface.",
         "docs/evidence/bound.md names them.",
         "tests/prove/src/bound/facts.rs",
     ),

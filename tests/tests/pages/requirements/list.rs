@@ -60,7 +60,8 @@ pub const REQUIREMENTS: &[Requirement] = &[
     ),
     requirement(
         "A-06",
-        "The instructions of a plain query have a bound that is proven from the linked program.",
+        "The instructions of a plain query, and of a tracker's tick with side and depth, have a bound that is proven from the \
+         linked program.",
         &[
             "bound.above",
             "bound.broken",
@@ -373,8 +374,8 @@ pub const REQUIREMENTS: &[Requirement] = &[
     ),
     requirement(
         "E-03",
-        "Every check and every file of tests has a row in the page of proofs, and a requirement; each public call of a guard has \
-         its failures listed, each assumption of use its check, each known anomaly its place.",
+        "Every check and every file of tests has a row in the page of proofs, and a requirement, which every file of the core has, too; \
+         each public call of a guard has its failures listed, each assumption of use its check, each known anomaly its place.",
         &[],
     ),
     requirement(

@@ -28,6 +28,13 @@ impl Mark {
         format!("[{name}](../../{})", self.file)
     }
 
+    /// Whether its requirements are those of another file that states none: it is the head of that file's folder.
+    pub fn speaks_for(&self, file: &str) -> bool {
+        let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let is_head = [format!("{folder}/mod.rs"), format!("{folder}.rs")].contains(&self.file);
+        is_head && !self.ids.is_empty()
+    }
+
     /// Enough of its path to be unique.
     fn short(&self) -> &str {
         let parts =
@@ -49,10 +56,12 @@ const FOLDERS: [&str; 9] = [
     "tests",
     "xtask/src",
 ];
+/// All of its files serve requirements.
+const CORE: &str = "dibs-nostd/src/";
 /// The viewer's folders, except those that its tools fill.
 const VIEWER: [&str; 2] = ["viewer/src", "viewer/test"];
 
-/// Every file that states requirements, and every file of tests that states none.
+/// Every file that states requirements, and every file of tests or of the core that states none.
 pub fn marks() -> Vec<Mark> {
     let proofs = proofs();
     let mut marks = Vec::new();
@@ -62,7 +71,7 @@ pub fn marks() -> Vec<Mark> {
             let ids = ids(text);
             let is_test =
                 checks.is_some() || file.ends_with("tests.rs") || file.contains("/tests/");
-            let must = checks.is_some() || file.ends_with("tests.rs");
+            let must = checks.is_some() || file.ends_with("tests.rs") || file.starts_with(CORE);
             if must || !ids.is_empty() {
                 marks.push(Mark {
                     file,

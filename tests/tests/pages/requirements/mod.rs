@@ -2,7 +2,8 @@
 //! again.
 //!
 //! Sources state what they implement and what they test, in a line after the file's documentation, as in this file.
-//! These fail: an id without implementation or test, a file of tests without id, an unknown id, a figure not recorded.
+//! These fail: an id without implementation or test, a file of tests without id, a file of the core without id in a
+//! folder whose head has none, an unknown id, a figure not recorded.
 
 // Requirement: E-03
 
@@ -23,7 +24,8 @@ const HEAD: &str = "\
 
 Written by `DIBS_WRITE=1 cargo test -p dibs-tests --test pages`: do not edit. The list is
 [list.rs](../../tests/tests/pages/requirements/list.rs); sources name the ids that they implement and test, and that test fails
-on an id without implementation or test, and on a file of tests without an id. A bound is that of the figure in
+on an id without implementation or test, on a file of tests without an id, and on a file of the core without one: its own, or
+that of the head of its folder (`mod.rs`, or the file with the folder's name). A bound is that of the figure in
 [guarantees.md](guarantees.md), in whose column *check* the names in quotes are found.
 
 **Nothing here is certified, and no certification is claimed.**
@@ -62,8 +64,14 @@ fn faults(list: &[Requirement], marks: &[Mark], records: &[Value]) -> Vec<String
         }
     }
     for Mark { file, ids: named, is_test, .. } in marks {
-        if *is_test && named.is_empty() {
-            faults.push(format!("{file}: tests of no requirement"));
+        if named.is_empty() {
+            if *is_test {
+                faults.push(format!("{file}: tests of no requirement"));
+            } else if !marks.iter().any(|head| head.speaks_for(file)) {
+                faults.push(format!(
+                    "{file}: neither it nor the head of its folder names a requirement"
+                ));
+            }
         }
         for id in named.iter().filter(|id| !ids.contains(id.as_str())) {
             faults.push(format!("{file}: {id} is not listed"));
@@ -114,4 +122,14 @@ fn orphans_are_found() {
     let marks = [mark("a.rs", &["A-01"], true), mark("b.rs", &[], true)];
     let found = faults(&list[..1], &marks, &[]);
     assert_eq!(found, ["A-01: no source implements it", "b.rs: tests of no requirement"]);
+    let core = [
+        mark("a/mod.rs", &["A-01"], false),
+        mark("a/b.rs", &[], false),
+        mark("a/b/c.rs", &[], false),
+        mark("a/tests.rs", &["A-01"], true),
+    ];
+    let found = faults(&list[..1], &core, &[]);
+    assert_eq!(found, ["a/b/c.rs: neither it nor the head of its folder names a requirement"]);
+    let is_by_head = |mark: &Mark| !mark.is_test && mark.ids.is_empty();
+    assert!(self::marks().iter().any(is_by_head), "files of the core without ids are read");
 }

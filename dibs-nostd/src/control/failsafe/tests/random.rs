@@ -1,5 +1,7 @@
 //! Random runs of the machine: each step's state is compared with the one computed from all steps before it.
 
+// Requirement: C-01
+
 use super::*;
 
 /// One step of a random run.
