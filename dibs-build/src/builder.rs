@@ -1,4 +1,6 @@
 //! The builder, for a `build.rs` and the `dibs` program.
+//!
+//! One file, because it is the builder's whole interface.
 
 use dibs_nostd::Index;
 use std::sync::Arc;

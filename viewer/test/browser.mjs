@@ -1,4 +1,5 @@
 // Opens pages of `dibs view` in Chromium and uses them as a hand would: `node browser.mjs HEART-FOLDER [--record]`.
+// One file, because all checks share a browser and its helpers.
 
 // Requirement: P-09
 

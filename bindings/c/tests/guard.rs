@@ -1,4 +1,6 @@
 //! The loop of bus and guard in C: the same bits as in Rust, and its misuses.
+//!
+//! One file, because each step has its line for the program in C and its answer in Rust.
 
 // Requirement: P-06
 

@@ -1,4 +1,7 @@
-"""The loop of a controller: packets in, answers and forces out."""
+"""The loop of a controller: packets in, answers and forces out.
+
+One file, because all tests need the same loop.
+"""
 
 import contextlib
 import itertools

@@ -175,19 +175,18 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<Option<Closest>, QueryError> {
         contacts.begin(margin, surfaces.iter().all(|(query, _)| query.tree.has_adjacency()))?;
-        let found = Self::add_scene_contacts(surfaces, tools, margin, options, contacts);
+        let scene = Scene { margin, ..Scene::new(options) };
+        let found = Self::add_scene_contacts(scene, surfaces, tools, contacts);
         contacts.unless_failed(found)
     }
 
     fn add_scene_contacts<V: VertexTable + ?Sized, T: Tool, const N: usize, const NEAR: usize>(
+        mut scene: Scene,
         surfaces: &mut [(&mut Self, &V)],
         tools: &[T],
-        margin: f32,
-        options: &Options,
         contacts: &mut Contacts<N, NEAR>,
     ) -> Result<Option<Closest>, QueryError> {
-        let mut scene = Scene { margin, ..Scene::new(options) };
-        for surface in Self::nearest_surface_first(surfaces, tools, options) {
+        for surface in Self::nearest_surface_first(surfaces, tools, &scene.options) {
             let Some((query, vertices)) = surfaces.get_mut(surface) else { continue };
             query.add_to(
                 &mut scene,

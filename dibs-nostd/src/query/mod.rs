@@ -107,8 +107,8 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         tool: &T,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
-        let first = options.first(self.triangle);
-        let found = self.search(vertices, tool, options, first)?.run::<WHOLE>(f32::INFINITY)?;
+        let search = self.search(vertices, tool, options, options.first(self.triangle))?;
+        let found = search.run::<WHOLE>(f32::INFINITY)?;
         self.sided(vertices, tool, options, found)
     }
 

@@ -65,6 +65,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             (0..).zip(weights).try_for_each(|(row, &weight)| this.check_weight(row, weight))
         };
         let store = |slots: &[Position]| {
+            // As a row, so that vertices, nodes and weights have the same buffers: 8 bytes more for each of a few weights.
             for (slot, &weight) in slots.iter().zip(weights) {
                 slot.set(Vec3::new(weight, 0.0, 0.0));
             }

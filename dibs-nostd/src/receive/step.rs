@@ -1,7 +1,8 @@
 //! The motion from the published frame to the current one, measured in slices while its rows arrive.
 //!
 //! The assembler measures it itself, because it alone knows that both frames are unchanged until the later one is
-//! published: so no gate and no user can understate the motion.
+//! published: so no gate and no user can understate the motion. The limit on speed is the gate's, because with nodes,
+//! weights or a pose a vertex moves by another length than its row.
 
 // Requirement: T-04
 

@@ -2,6 +2,8 @@
 //!
 //! A script is a stream of little-endian 32-bit words, written by `cargo xtask guarantees`; the answers are such a
 //! stream too. Board and host run this same code, so that a difference comes from the compiler or the processor.
+//!
+//! One file, because the words of a script and of its answers belong together.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 

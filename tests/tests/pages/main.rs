@@ -1,4 +1,5 @@
-//! Checks the documents: figures, public items, packages, dependencies, the guide, the evidence for a device's file.
+//! Checks the documents: figures, public items, packages, dependencies, sizes, the guide, the evidence for a device's
+//! file.
 
 mod device;
 mod failures;
@@ -10,3 +11,4 @@ mod public_api;
 mod readme;
 mod requirements;
 mod sbom;
+mod sizes;

@@ -1,5 +1,7 @@
 //! A filter of commands: no tick of adversarial walks comes closer than the stand-off unless its reason says so, and no
 //! tick brakes along a wall.
+//!
+//! One file, because nearly all tests ask the same filter.
 
 // Requirements: C-05, C-06
 

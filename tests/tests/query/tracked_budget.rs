@@ -188,3 +188,46 @@ fn an_interval_that_is_narrower_than_the_accuracy_stays_in_order() {
     let whole = query.closest(&surface, &tool(500.0), &Options::cold()).expect("an answer");
     assert!(meet(thick.closest.interval(), whole.interval()), "{thick:?} {whole:?}");
 }
+
+/// A tick that needs more tests than its budget has makes as many as the budget has.
+#[test]
+fn a_tick_takes_all_of_its_budget_and_no_more() {
+    let mesh = generate::heart(320).expect("a valid size").mesh;
+    let built = Builder::new().stretch(1.5).build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let surface = Odometer::new(&tree).start(rows.as_slice());
+    let mut most = 0;
+    for row in (0..rows.len()).step_by(7) {
+        let sphere = Sphere::new(rows[row] * 1.2, 1.0).expect("valid");
+        let first = |budget| {
+            let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("enough");
+            let options = Options::cold().unsigned().budget(budget);
+            tracker.closest(&surface, &sphere, &options).expect("an answer").closest
+        };
+        // Within a budget a tick also counts its work between tests.
+        let [unlimited, whole] = [Budget::UNLIMITED, Budget::new(1_000_000)].map(first);
+        assert!(whole.node_tests > unlimited.node_tests, "{whole:?} {unlimited:?}");
+        let mut counted = whole;
+        counted.node_tests = unlimited.node_tests;
+        assert_eq!(counted, unlimited);
+        // A plane's test requires that an exact test would still fit.
+        let enough = whole.work() + Budget::TRIANGLE;
+        assert_eq!(first(Budget::new(enough)), whole);
+        most = most.max(whole.triangle_tests);
+        for too_few in 0..whole.work() - 1 {
+            let found = first(Budget::new(too_few));
+            // A triangle is only tested if the visit to its leaf, its plane and an exact test fit in the budget.
+            let spare = 5 + Budget::TRIANGLE;
+            assert!(
+                found.work() <= too_few + 1 && found.work() + spare > too_few,
+                "{too_few} {found:?}"
+            );
+            assert!(found.separation >= whole.separation, "{found:?} {whole:?}");
+            assert!(found.lower <= whole.separation + whole.accuracy, "{found:?} {whole:?}");
+        }
+        // Without a test there is no closest triangle.
+        assert_eq!(first(Budget::new(0)).triangle, None);
+    }
+    assert!(most >= 3, "{most} tests at most");
+}

@@ -1,4 +1,6 @@
 //! One tick of a filter: rows propose motions, queries verify them.
+//!
+//! One file, because rows, states and budget of a tick change together.
 
 use glam::Vec3;
 use heapless::Vec;

@@ -26,6 +26,7 @@ pub(in crate::query) struct Opened {
 /// The opened nodes, at most `M`.
 #[derive(Clone, Debug)]
 pub(in crate::query) struct RangeFront<const M: usize> {
+    /// No vector: `Tracker::opened_in_range` is a constant function, and a vector's length is not constant.
     nodes: [Opened; M],
     state: State,
 }

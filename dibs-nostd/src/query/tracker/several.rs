@@ -1,4 +1,7 @@
 //! Several trackers: the closest of all pairs. A pair that is certainly farther is not searched.
+//!
+//! Apart from `chain.rs`, which searches every pair in every call, up to the closest so far: here a pair's own last tick
+//! tells whether it is searched at all.
 
 // Requirement: T-01
 

@@ -380,7 +380,7 @@ pub const REQUIREMENTS: &[Requirement] = &[
     ),
     requirement(
         "E-04",
-        "Folders depend one way; public items and files of packages are those listed.",
+        "Folders depend one way; public items, sizes and files of packages are those listed.",
         &[],
     ),
     requirement(
