@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::DVec3;
-use dibs_nostd::filter::{Admitted, Filter, Motion, Reason, Uncertainty};
+use dibs_nostd::filter::{AdmittedMotion, Filter, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::{Capsule, Index, MovingSurface, Odometer, Options, Tracker, Tree};
 
 use crate::query::STACK;
@@ -109,7 +109,7 @@ impl Axis {
     }
 
     /// The motion to another pose: the smallest rotation of the axis, about its start.
-    fn motion_to(&self, to: &Self) -> Motion {
+    fn motion_to(&self, to: &Self) -> RigidMotion {
         let (from, onto) = (self.end - self.start, to.end - to.start);
         let across = from.cross(onto);
         let angle = across.length().atan2(from.dot(onto));
@@ -118,11 +118,11 @@ impl Axis {
             from.try_normalize().map_or(DVec3::ZERO, DVec3::any_orthonormal_vector)
         });
         let translation = (to.start - self.start).as_vec3();
-        Motion::new(self.start.as_vec3(), translation, (axis * angle).as_vec3())
+        RigidMotion::new(self.start.as_vec3(), translation, (axis * angle).as_vec3())
     }
 
     /// The pose after a motion; its length is kept.
-    fn after(&self, motion: &Motion) -> Self {
+    fn after(&self, motion: &RigidMotion) -> Self {
         let moved = |point: DVec3| motion.apply(point.as_vec3()).as_dvec3();
         let (start, end) = (moved(self.start), moved(self.end));
         let direction = (end - start).normalize_or_zero();
@@ -315,7 +315,7 @@ impl<I: Index> Session<'_, I> {
         command: &Axis,
         commands: &Commands,
         options: Options,
-    ) -> Result<Admitted> {
+    ) -> Result<AdmittedMotion> {
         let Axis { start, end } = self.at;
         let tool = Capsule::new(start.as_vec3(), end.as_vec3(), commands.radius)?;
         let motion = self.at.motion_to(command);

@@ -7,9 +7,9 @@ use glam::Vec3;
 use super::posed::Placed;
 use super::rows::Blend;
 use super::surface::{Common, Notes};
-use super::{Answer, GuardLimits, Rows, Searched, Vertices};
+use super::{Answer, GuardLimits, Rows, SearchedSurface, Vertices};
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation, State, Verdict};
-use crate::filter::{Admitted, Filter, FilterError, Motion, Uncertainty};
+use crate::filter::{AdmittedMotion, Filter, FilterError, RigidMotion, Uncertainty};
 use crate::math::round::sum_up;
 use crate::{
     Contacts, Error, FrameAge, FrameReader, Index, Millis, Options, QueryError, Tool, Tracker,
@@ -174,9 +174,9 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         &mut self,
         filter: &Filter<LABELS>,
         tool: &T,
-        command: &Motion,
+        command: &RigidMotion,
         now: Millis,
-    ) -> (Answer, Result<Admitted, FilterError>) {
+    ) -> (Answer, Result<AdmittedMotion, FilterError>) {
         let (period, speed) = (1.0 / self.rate, self.speed * 1_000.0);
         let (answer, admitted) = self.on_latest(
             tool,
@@ -257,7 +257,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
                 let notes = &notes.of_all;
                 let flow = SurfaceFlow { rows, blend, placed, frame, failsafe, notes, now };
                 let tracked = search(tracker, surface, own, &flow, options);
-                let searched = Searched {
+                let searched = SearchedSurface {
                     frame,
                     before: blend.before().epoch().unwrap_or(frame.epoch),
                     t: blend.t(),
@@ -349,7 +349,7 @@ impl<R: Rows> SurfaceFlow<'_, '_, '_, R> {
 }
 
 /// The frame, the searched surface, and the pair on it.
-type Found = (Option<FrameAge>, Option<Searched>, Result<TrackerAnswer, Unavailable>);
+type Found = (Option<FrameAge>, Option<SearchedSurface>, Result<TrackerAnswer, Unavailable>);
 
 /// The tick's answer, by the trust in the searched surface.
 fn judge(

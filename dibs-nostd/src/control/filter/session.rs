@@ -11,8 +11,8 @@ use super::part::Part;
 use super::proposal::{Extent, Proposal};
 use super::row::Rows;
 use super::{
-    Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty,
-    path,
+    AdmittedMotion, EPSILON, Filter, FilterError, MOST_PAIRS, MotionRow, Reason, RigidMotion,
+    Uncertainty, path,
 };
 use crate::math::sqrt::sqrt;
 use crate::{Budget, Cost};
@@ -37,7 +37,7 @@ const NEAR: f32 = 4.0;
 /// A motion, and its distances from the tissue.
 #[derive(Clone, Copy)]
 struct Candidate {
-    motion: Motion,
+    motion: RigidMotion,
     /// Least separation from the whole surface during the motion.
     separation: f32,
     /// The same, or that from a label's part less what its stand-off is larger, during the motion and at its end.
@@ -77,13 +77,13 @@ pub(super) struct Session<'f, const LABELS: usize> {
 impl<'f, const LABELS: usize> Session<'f, LABELS> {
     pub fn new(
         filter: &'f Filter<LABELS>,
-        command: &Motion,
+        command: &RigidMotion,
         period: f32,
         uncertainty: &Uncertainty,
         (rows, lever, cost): (&[MotionRow], f32, Cost),
     ) -> Result<Self, FilterError> {
         let most = filter.speed * period;
-        let within = Motion {
+        let within = RigidMotion {
             translation: shortened(command.translation, most),
             rotation: shortened(command.rotation, most_turn(most, lever)),
             ..*command
@@ -107,8 +107,8 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         })
     }
 
-    pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<Admitted, FilterError> {
-        let rest = Motion { about: self.about, ..Motion::translation(Vec3::ZERO) };
+    pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<AdmittedMotion, FilterError> {
+        let rest = RigidMotion { about: self.about, ..RigidMotion::translation(Vec3::ZERO) };
         for part in self.filter.layers() {
             let mut to_come = pairs.len() as u32;
             for (number, pair) in pairs.iter_mut().enumerate() {
@@ -131,7 +131,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
                 break;
             }
             let point = proposal.at(extent);
-            let motion = Motion::from_vector(self.about, &point, self.lever);
+            let motion = RigidMotion::from_vector(self.about, &point, self.lever);
             if !motion.is_finite() || !self.rows.allow(&point) {
                 continue;
             }
@@ -163,10 +163,10 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         Ok(self.admitted(&best, reason))
     }
 
-    fn admitted(&self, found: &Candidate, reason: Reason) -> Admitted {
+    fn admitted(&self, found: &Candidate, reason: Reason) -> AdmittedMotion {
         // A tool that starts nearer than the stand-off may leave, but has not kept it.
         let is_kept = found.least >= self.filter.stand_off - EPSILON;
-        Admitted {
+        AdmittedMotion {
             motion: found.motion,
             least_separation: found.separation,
             reason: if is_kept { reason } else { Reason::NoSafeMotion },
@@ -182,7 +182,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         pair: &mut P,
         (number, part): (usize, Option<Part>),
         to_come: u32,
-        rest: &Motion,
+        rest: &RigidMotion,
     ) -> Result<(), FilterError> {
         let (ends, radius) = (pair.ends(), pair.radius());
         let mut size = radius;
@@ -241,7 +241,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         number: usize,
         found: &Found,
         ([start, end], distance): ([Vec3; 2], f32),
-        at: &Motion,
+        at: &RigidMotion,
     ) {
         let on_axis = start + (end - start) * found.axis_parameter;
         self.rows.add_wall(number, on_axis, found.direction, distance, at);
@@ -283,9 +283,9 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     /// The motion, limited to the robot's speed.
     fn within_speed(&self, point: &Vector) -> Vector {
-        let motion = Motion::from_vector(self.about, point, self.lever);
+        let motion = RigidMotion::from_vector(self.about, point, self.lever);
         let (translation, rotation) = (motion.translation, motion.rotation);
-        let within = Motion {
+        let within = RigidMotion {
             translation: shortened(translation, self.most),
             rotation: shortened(rotation, most_turn(self.most, self.lever)),
             ..motion
@@ -298,7 +298,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     fn verify<P: Pair>(
         &mut self,
         pairs: &mut [P],
-        motion: &Motion,
+        motion: &RigidMotion,
     ) -> Result<Candidate, FilterError> {
         let mut found = Candidate {
             motion: *motion,
@@ -375,7 +375,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     /// Whether the budget left probably covers the searches at a motion's end.
     fn covers<P: Pair>(&self, pairs: &[P], point: &Vector) -> bool {
-        let motion = Motion::from_vector(self.about, point, self.lever);
+        let motion = RigidMotion::from_vector(self.about, point, self.lever);
         let mut needed = u64::from(self.instructions);
         for (pair, state) in pairs.iter().zip(&self.states) {
             let (ends, moved, arc) = self.path(&state.start, &motion);
@@ -393,7 +393,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     }
 
     /// An axis' ends after a motion, an upper bound (mm) on the motion of its points, and the height of their arcs.
-    fn path(&self, start: &Known, motion: &Motion) -> ([Vec3; 2], f32, f32) {
+    fn path(&self, start: &Known, motion: &RigidMotion) -> ([Vec3; 2], f32, f32) {
         let ends = start.ends.map(|end| motion.apply(end));
         let mut arc = 0.0;
         for end in start.ends {

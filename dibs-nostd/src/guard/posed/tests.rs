@@ -11,7 +11,7 @@ use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat, Vec3};
 
 use super::Placed;
-use crate::filter::{Filter, Motion};
+use crate::filter::{Filter, RigidMotion};
 use crate::surface::PoseStep;
 use crate::{Capsule, RigidPose, Tool};
 
@@ -148,9 +148,9 @@ fn a_motion_on_the_mesh_is_that_in_the_world() {
         let placed = Placed { step: None, ..Case { part: 0.0, ..*case }.placed() };
         let tool = case.tool(&placed)?;
         let filter = filter.lever(case.lever).expect("in range");
-        let within = Motion::new(placed.pose.apply(case.about), Vec3::ZERO, Vec3::ZERO);
+        let within = RigidMotion::new(placed.pose.apply(case.about), Vec3::ZERO, Vec3::ZERO);
         let (shift, turn) = filter.most(&tool, &within, 1e-3);
-        let command = Motion {
+        let command = RigidMotion {
             translation: case.translation.clamp_length_max(shift),
             rotation: case.rotation.clamp_length_max(turn),
             ..within
@@ -158,8 +158,8 @@ fn a_motion_on_the_mesh_is_that_in_the_world() {
         let on_mesh = placed.motion(&command);
         let moved = placed.tool(&tool);
         let error = placed.error(&tool) + placed.error_of_motion(&moved, &on_mesh, (&filter, 1e-3));
-        // As `Motion::apply`, exactly.
-        let apply = |motion: &Motion, point: DVec3| {
+        // As `RigidMotion::apply`, exactly.
+        let apply = |motion: &RigidMotion, point: DVec3| {
             let about = motion.about.as_dvec3();
             let turn = DQuat::from_scaled_axis(motion.rotation.as_dvec3());
             about + turn * (point - about) + motion.translation.as_dvec3()
