@@ -80,7 +80,7 @@ impl<'s, G> PoseGate<'s, G> {
 
     /// The largest distance (mm) of a vertex from the extrapolation of the two previous poses. It uses the fraction of
     /// a step that the rows' extrapolation added, and grows like it; NaN if the rows were not extrapolated.
-    fn shown(&self, compared: &Compared) -> f32 {
+    fn residual(&self, compared: &Compared) -> f32 {
         let (Some(before), Some(last)) = (&self.before, &self.last) else { return f32::NAN };
         PoseStep::between(before, last, self.centre).map_or(f32::NAN, |step| {
             let off = step.beyond(compared.t).step(&self.pose, self.centre, self.lever());
@@ -143,12 +143,12 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
             return Ok(Admission::Pending);
         }
         // A registration is not compared with an earlier frame.
-        let mut shown = f32::NAN;
+        let mut residual = f32::NAN;
         if let (Some((_, elapsed)), Some(compared)) = (before, &compared) {
             self.check_speed(compared, elapsed)?;
-            shown = self.shown(compared);
+            residual = self.residual(compared);
         }
-        self.poses.set(self.buffer, &self.pose, shown);
+        self.poses.set(self.buffer, &self.pose, residual);
         Ok(admission)
     }
 

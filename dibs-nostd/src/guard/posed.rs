@@ -140,7 +140,7 @@ impl<R: Rows<Poses = ()>> Rows for PosedRows<R> {
             return None;
         }
         Some(match poses.step(published, of.centre) {
-            Some((step, shown)) => Placed::moving(step, shown, rows),
+            Some((step, residual)) => Placed::moving(step, residual, rows),
             None => Placed::at(poses.last(published)),
         })
     }
@@ -155,21 +155,21 @@ pub struct Placed {
     step: Option<(PoseStep, f32, f32)>,
     /// The error of the extrapolation (mm), and the residual from which it grows.
     error: f32,
-    shown: f32,
+    residual: f32,
 }
 
 impl Placed {
     const fn at(pose: RigidPose) -> Self {
-        Self { pose, step: None, error: 0.0, shown: 0.0 }
+        Self { pose, step: None, error: 0.0, residual: 0.0 }
     }
 
-    fn moving(step: PoseStep, shown: f32, rows: &Blend<'_>) -> Self {
+    fn moving(step: PoseStep, residual: f32, rows: &Blend<'_>) -> Self {
         let part = rows.t() - 1.0;
         Self {
             pose: step.beyond(part),
             step: Some((step, part, rows.rate())),
-            error: grown(shown, part),
-            shown,
+            error: grown(residual, part),
+            residual,
         }
     }
 
@@ -245,7 +245,7 @@ impl Placed {
     ) -> (Option<SearchedSurface>, Result<TrackerAnswer, Unavailable>) {
         let error = self.error(tool);
         searched.position_error += error;
-        searched.residual = searched.residual.map(|shown| shown + self.shown);
+        searched.residual = searched.residual.map(|residual| residual + self.residual);
         searched.velocity = self.pose.rotate(searched.velocity);
         let tracked = tracked.map(|answer| {
             let closest = answer.closest;

@@ -31,10 +31,10 @@ impl Shared for Poses {
 
 impl Poses {
     /// Stores the pose of the buffer with this number.
-    pub fn set(&self, buffer: u32, pose: &RigidPose, shown: f32) {
+    pub fn set(&self, buffer: u32, pose: &RigidPose, residual: f32) {
         let ([x, y, z, w], [a, b, c]) = (pose.rotation().to_array(), pose.shift().to_array());
         let Some(words) = self.0.get(buffer as usize) else { return };
-        for (word, value) in words.iter().zip([x, y, z, w, a, b, c, shown]) {
+        for (word, value) in words.iter().zip([x, y, z, w, a, b, c, residual]) {
             word.store(value.to_bits(), Ordering::Relaxed);
         }
     }
@@ -53,11 +53,11 @@ impl Poses {
 
     /// The step to extrapolate, and the larger residual of the last two frames; `None` if there is no extrapolation.
     pub(super) fn step(&self, published: &FrameGuard<'_>, centre: Vec3) -> Option<(PoseStep, f32)> {
-        let [(before, earlier), (last, shown)] = self.of_frames(published);
+        let [(before, earlier), (last, residual)] = self.of_frames(published);
         let step = PoseStep::between(&before, &last, centre)?;
         // A single small residual may be by chance. False for NaN.
-        let shown = if earlier > shown { earlier } else { shown };
-        (shown >= 0.0).then_some((step, shown))
+        let residual = if earlier > residual { earlier } else { residual };
+        (residual >= 0.0).then_some((step, residual))
     }
 
     /// The poses of the previous frame and of the published one.
@@ -68,9 +68,9 @@ impl Poses {
             let Some(words) = self.0.get(buffer as usize) else {
                 return (RigidPose::IDENTITY, f32::NAN);
             };
-            let [x, y, z, w, a, b, c, shown] =
+            let [x, y, z, w, a, b, c, residual] =
                 words.each_ref().map(|word| f32::from_bits(word.load(Ordering::Relaxed)));
-            (RigidPose::kept(Quat::from_xyzw(x, y, z, w), Vec3::new(a, b, c)), shown)
+            (RigidPose::kept(Quat::from_xyzw(x, y, z, w), Vec3::new(a, b, c)), residual)
         })
     }
 }

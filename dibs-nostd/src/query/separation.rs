@@ -77,7 +77,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
         }
         if !(is_open || is_touching && has_length) {
             let on_axis = tool.axis_point(found.axis_parameter);
-            let is_many = ties.are_lost() && !is_touching;
+            let is_many = ties.are_missing() && !is_touching;
             let many = is_many
                 .then(|| side::of_many(roots, tree, stack, vertices, found, on_axis, options))
                 .transpose()?;

@@ -86,8 +86,8 @@ impl StepMeter {
             _ => None,
         };
         let (passed, off) = known.unwrap_or((0, PredictionCheck::UNKNOWN.off));
-        let shown = sqrt(self.off) * self.compared().growth();
-        PredictionCheck { shown, passed, off, ..PredictionCheck::UNKNOWN }
+        let residual = sqrt(self.off) * self.compared().growth();
+        PredictionCheck { residual, passed, off, ..PredictionCheck::UNKNOWN }
     }
 
     /// The odometer's reading after the step from a frame with the reading `before`; a new start if that is unknown or

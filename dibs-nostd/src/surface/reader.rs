@@ -125,12 +125,12 @@ impl<'f> FrameGuard<'f> {
     pub fn extrapolated(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
         let (ahead, before) = (self.view.buffer.head.ahead(), self.before.buffer.head.ahead());
         match self.last_step() {
-            Some(step) if ahead.sigma >= 0.0 && ahead.shown >= 0.0 => {
+            Some(step) if ahead.sigma >= 0.0 && ahead.residual >= 0.0 => {
                 // A single small residual may be by chance. False for NaN.
-                let is_worse = before.shown > ahead.shown;
-                let shown = if is_worse { before.shown } else { ahead.shown };
+                let is_worse = before.residual > ahead.residual;
+                let residual = if is_worse { before.residual } else { ahead.residual };
                 let lag = Millis(self.age.0.saturating_sub(step.end().0));
-                let ahead = PredictionCheck { shown, ..ahead };
+                let ahead = PredictionCheck { residual, ..ahead };
                 step.outside([&self.before, &self.view], self.age, ahead).lagging(lag)
             }
             _ => self.held(),

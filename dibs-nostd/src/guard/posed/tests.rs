@@ -78,7 +78,7 @@ impl Case {
         let before = RigidPose::new(rotation, self.shift - self.flow).expect("a rotation");
         let step = PoseStep::between(&before, &after, Vec3::ZERO).expect("a small step");
         let pose = step.beyond(self.part);
-        Placed { pose, step: Some((step, self.part, 30.0)), error: 0.0, shown: 0.0 }
+        Placed { pose, step: Some((step, self.part, 30.0)), error: 0.0, residual: 0.0 }
     }
 
     fn tool(&self, placed: &Placed) -> Option<Capsule> {

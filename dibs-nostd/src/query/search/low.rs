@@ -87,11 +87,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if is_low && !self.visit_triangle(triangle, visit)? {
                 return Ok(None);
             }
-            while let Some(&vertex) = heights.lost() {
+            while let Some(&vertex) = heights.evicted() {
                 if !self.visit_standing(&vertex, heights, visit)? {
                     return Ok(None);
                 }
-                heights.found();
+                heights.drop_evicted();
             }
         }
         Ok(Some(least))
