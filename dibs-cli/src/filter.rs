@@ -9,7 +9,7 @@ use dibs_nostd::filter::{AdmittedMotion, Filter, Reason, RigidMotion, Uncertaint
 use dibs_nostd::{Capsule, Index, MovingSurface, Odometer, Options, Tracker, Tree};
 
 use crate::query::STACK;
-use crate::recorded::{Moving, Recorded};
+use crate::recorded::{MovingArgs, RecordedFrames};
 use crate::stand_off::{self, StandOff};
 use crate::tool::{self, ToolSpec};
 use crate::tree_file::{self, AnyTree};
@@ -44,7 +44,7 @@ retreating, and 'no safe motion', after which the stand-off is not kept; least_s
 certain.")]
 pub struct Args {
     #[command(flatten)]
-    moving: Moving,
+    moving: MovingArgs,
     /// The tool's pose commanded for the end of each tick, a line each, as for `dibs query --tool`; `-` is standard
     /// input
     #[arg(long, value_name = "TOOLS")]
@@ -182,7 +182,7 @@ impl Commands {
 }
 
 /// The largest speed (mm/s) of a vertex from frame to frame, rounded up.
-fn fastest(recorded: &Recorded) -> f32 {
+fn fastest(recorded: &RecordedFrames) -> f32 {
     let next = recorded.frames.iter().cycle().skip(1);
     let pairs = recorded.frames.iter().zip(next).flat_map(|(a, b)| a.iter().zip(b));
     let farthest = pairs.map(|(a, b)| a.as_dvec3().distance(b.as_dvec3())).fold(0.0, f64::max);

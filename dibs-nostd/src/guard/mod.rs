@@ -51,7 +51,7 @@ pub use posed::PosedRows;
 #[doc(hidden)]
 pub use poses::Poses;
 #[doc(hidden)]
-pub use rows::Shared;
+pub use rows::SharedState;
 /// The kinds of rows, for [`Bus`], [`Guard`] and [`Surface`].
 #[doc(hidden)]
 pub use rows::{Rows, Vertices};

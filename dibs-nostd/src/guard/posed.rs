@@ -134,14 +134,14 @@ impl<R: Rows<Poses = ()>> Rows for PosedRows<R> {
         poses: &Poses,
         published: &FrameGuard<'_>,
         rows: &Blend<'_>,
-    ) -> Option<Placed> {
+    ) -> Option<TickPose> {
         // Frames that never had a pose are treated exactly as rows alone, to the bit.
         if poses.are_none(published) {
             return None;
         }
         Some(match poses.step(published, of.centre) {
-            Some((step, residual)) => Placed::moving(step, residual, rows),
-            None => Placed::at(poses.last(published)),
+            Some((step, residual)) => TickPose::moving(step, residual, rows),
+            None => TickPose::at(poses.last(published)),
         })
     }
 }
@@ -149,7 +149,7 @@ impl<R: Rows<Poses = ()>> Rows for PosedRows<R> {
 /// The pose of the surface at a tick.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
-pub struct Placed {
+pub struct TickPose {
     pose: RigidPose,
     /// The step that continues, the fraction of it beyond the last frame, and steps per second.
     step: Option<(PoseStep, f32, f32)>,
@@ -158,7 +158,7 @@ pub struct Placed {
     residual: f32,
 }
 
-impl Placed {
+impl TickPose {
     const fn at(pose: RigidPose) -> Self {
         Self { pose, step: None, error: 0.0, residual: 0.0 }
     }

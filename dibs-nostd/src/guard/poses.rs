@@ -5,7 +5,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::rows::Shared;
+use super::rows::SharedState;
 use crate::surface::PoseStep;
 use crate::surface::{AtomicU32, Ordering};
 use crate::{FrameGuard, RigidPose};
@@ -16,13 +16,13 @@ use crate::{FrameGuard, RigidPose};
 pub struct Poses([[AtomicU32; 8]; 3]);
 
 #[cfg(not(loom))]
-impl Shared for Poses {
+impl SharedState for Poses {
     const NEW: Self = Self([const { [const { AtomicU32::new(0) }; 8] }; 3]);
 }
 
 /// For a model checker, whose atomics are no constants.
 #[cfg(loom)]
-impl Shared for Poses {
+impl SharedState for Poses {
     fn new() -> Self {
         use core::array::from_fn;
         Self(from_fn(|_| from_fn(|_| AtomicU32::new(0))))

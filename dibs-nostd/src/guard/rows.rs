@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::posed::Placed;
+use super::posed::TickPose;
 use crate::surface::FrameView;
 use crate::tree::VertexOrder;
 use crate::{
@@ -25,7 +25,7 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     /// Memory for the surface, if the rows are not the surface.
     type Room<'f>: Default;
     /// Data of frames besides their rows that the two ends share.
-    type Poses: Shared;
+    type Poses: SharedState;
 
     /// Reads a tree.
     #[doc(hidden)]
@@ -73,7 +73,7 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
         _: &Self::Poses,
         _: &FrameGuard<'_>,
         _: &Blend<'_>,
-    ) -> Option<Placed> {
+    ) -> Option<TickPose> {
         None
     }
 
@@ -92,7 +92,7 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
 
 /// Data of frames besides their rows that the two ends share.
 #[doc(hidden)]
-pub trait Shared: core::fmt::Debug + 'static {
+pub trait SharedState: core::fmt::Debug + 'static {
     /// Before the first frame.
     #[cfg(not(loom))]
     const NEW: Self;
@@ -102,7 +102,7 @@ pub trait Shared: core::fmt::Debug + 'static {
     fn new() -> Self;
 }
 
-impl Shared for () {
+impl SharedState for () {
     #[cfg(not(loom))]
     const NEW: Self = ();
 

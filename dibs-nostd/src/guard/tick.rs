@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use super::posed::Placed;
+use super::posed::TickPose;
 use super::rows::Blend;
 use super::surface::{Common, Notes};
 use super::{Answer, GuardLimits, Rows, SearchedSurface, Vertices};
@@ -227,7 +227,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         then: impl FnOnce(
             &mut Tracker<'t, I, STACK, OPENED, RANGE>,
             &R::Surface<'_>,
-            Option<&Placed>,
+            Option<&TickPose>,
             &Verdict,
         ) -> A,
     ) -> (Answer, Option<A>) {
@@ -329,7 +329,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
 struct SurfaceFlow<'a, 'f, 't, R: Rows> {
     rows: &'f R::Of<'t>,
     blend: &'f Blend<'f>,
-    placed: Option<&'a Placed>,
+    placed: Option<&'a TickPose>,
     frame: FrameAge,
     failsafe: &'a FailSafe,
     notes: &'a Common,
@@ -349,14 +349,14 @@ impl<R: Rows> SurfaceFlow<'_, '_, '_, R> {
 }
 
 /// The frame, the searched surface, and the pair on it.
-type Found = (Option<FrameAge>, Option<SearchedSurface>, Result<TrackerAnswer, Unavailable>);
+type TickResult = (Option<FrameAge>, Option<SearchedSurface>, Result<TrackerAnswer, Unavailable>);
 
 /// The tick's answer, by the trust in the searched surface.
 fn judge(
     notes: &Common,
     failsafe: &mut FailSafe,
     is_tree_corrupt: bool,
-    (frame, searched, tracked): Found,
+    (frame, searched, tracked): TickResult,
     velocity: Vec3,
     now: Millis,
 ) -> Answer {

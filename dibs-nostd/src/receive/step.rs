@@ -4,7 +4,7 @@
 //! published: so no gate and no user can understate the motion.
 
 use crate::math::sqrt::sqrt;
-use crate::stretch::{Compared, Gate, largest_change, largest_step};
+use crate::stretch::{Comparison, Gate, largest_change, largest_step};
 use crate::surface::{MotionReading, MotionUnit, PredictionCheck, VertexTable};
 
 /// Most units of an extrapolated step: more than 32 times the root sphere's radius.
@@ -70,8 +70,8 @@ impl StepMeter {
         self.rows
     }
 
-    pub const fn compared(&self) -> Compared {
-        Compared { largest: self.largest, rows: self.fastest, t: self.t }
+    pub const fn compared(&self) -> Comparison {
+        Comparison { largest: self.largest, rows: self.fastest, t: self.t }
     }
 
     /// The distance of the frame from its extrapolation, if any; its stretch is not known here.

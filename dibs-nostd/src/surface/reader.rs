@@ -12,7 +12,7 @@ use super::motion::{MotionReading, MovingSurface};
 use super::moving::SurfaceBlend;
 use super::moving::{FARTHEST, clamped};
 use super::prediction::Prediction;
-use super::{Ageing, FrameAge, LatestSurface, MeasuredStretch, Millis, VertexTable};
+use super::{FrameAge, LatestSurface, MeasuredStretch, Millis, StampAge, VertexTable};
 #[cfg(feature = "bus")]
 use crate::time::elapsed;
 
@@ -21,12 +21,12 @@ use crate::time::elapsed;
 pub struct FrameReader<'f> {
     buffers: Buffers<'f>,
     /// Epoch and age of the last frame read.
-    ageing: (u32, Ageing),
+    ageing: (u32, StampAge),
 }
 
 impl<'f> FrameReader<'f> {
     pub(super) fn new(buffers: Buffers<'f>) -> Self {
-        Self { buffers, ageing: (0, Ageing::default()) }
+        Self { buffers, ageing: (0, StampAge::default()) }
     }
 
     /// Rows of a frame.
@@ -42,7 +42,7 @@ impl<'f> FrameReader<'f> {
         let (epoch_before, before) = self.ageing;
         let Some(mut guard) = read(&self.buffers) else { return LatestSurface::new(None) };
         let FrameLabel { epoch, received, .. } = guard.label();
-        let before = if epoch == epoch_before { before } else { Ageing::default() };
+        let before = if epoch == epoch_before { before } else { StampAge::default() };
         let ageing = before.at(now, received);
         self.ageing = (epoch, ageing);
         guard.age = ageing.oldest;

@@ -3,10 +3,10 @@
 use glam::Vec3;
 use heapless::Vec;
 
-use super::known::{Known, State, larger, smaller};
+use super::known::{PairState, PoseDistance, larger, smaller};
 use super::motion::{inside, most_turn, shortened};
 use super::nearest::{Vector, add};
-use super::pair::{Found, Pair};
+use super::pair::{ClosestPair, Pair};
 use super::part::Part;
 use super::proposal::{Extent, Proposal};
 use super::row::Rows;
@@ -58,7 +58,7 @@ pub(super) struct Session<'f, const LABELS: usize> {
     lever: f32,
     rows: Rows,
     /// Of each pair, then of each pair with one label's part after another.
-    states: Vec<State, MOST_PAIRS>,
+    states: Vec<PairState, MOST_PAIRS>,
     /// Of each of these, the distance at the end that its rows require.
     wanted: Vec<f32, MOST_PAIRS>,
     /// Limit (mm) on the motion of the reference point, and on that of the lever's end by rotation.
@@ -230,16 +230,16 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         }
         // `wanted` has as many slots as there are pairs.
         let _ = self.wanted.push(wanted);
-        let start = Known { ends, distance };
+        let start = PoseDistance { ends, distance };
         let axis_distance = found.map_or(f32::INFINITY, |found| found.axis_distance);
-        let _ = self.states.push(State { start, end: None, reach, least, axis_distance });
+        let _ = self.states.push(PairState { start, end: None, reach, least, axis_distance });
         Ok(())
     }
 
     fn add_wall(
         &mut self,
         number: usize,
-        found: &Found,
+        found: &ClosestPair,
         ([start, end], distance): ([Vec3; 2], f32),
         at: &RigidMotion,
     ) {
@@ -325,7 +325,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         found: &mut Candidate,
     ) -> Result<(), FilterError> {
         let Some(&state) = self.states.get(at) else { return Ok(()) };
-        let State { start, reach, least, .. } = state;
+        let PairState { start, reach, least, .. } = state;
         let motion = found.motion;
         let (ends, moved, arc) = self.path(&start, &motion);
         found.moved = larger(found.moved, moved);
@@ -349,7 +349,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             let searched = self.search(pair, ends, start.distance > 0.0, near, left)?;
             last = larger(last, searched.distance);
             nearest = on_path(last);
-            let known = Known { ends, distance: last };
+            let known = PoseDistance { ends, distance: last };
             if let Some(state) = self.states.get_mut(at) {
                 state.end = Some(known);
             }
@@ -393,7 +393,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     }
 
     /// An axis' ends after a motion, an upper bound (mm) on the motion of its points, and the height of their arcs.
-    fn path(&self, start: &Known, motion: &RigidMotion) -> ([Vec3; 2], f32, f32) {
+    fn path(&self, start: &PoseDistance, motion: &RigidMotion) -> ([Vec3; 2], f32, f32) {
         let ends = start.ends.map(|end| motion.apply(end));
         let mut arc = 0.0;
         for end in start.ends {
@@ -427,16 +427,16 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         is_outside: bool,
         near: Option<(u8, f32)>,
         left: Budget,
-    ) -> Result<Found, FilterError> {
+    ) -> Result<ClosestPair, FilterError> {
         let options = self.filter.options.signed().budget(left);
         let found = match near {
             // Without labels that is not compiled.
             Some(near) if LABELS > 0 => {
-                Found::of_label(&pair.closest_of_label(ends, near, &options)?)
+                ClosestPair::of_label(&pair.closest_of_label(ends, near, &options)?)
             }
-            _ => Found::of(&pair.closest(ends, &options)?, pair.radius(), is_outside),
+            _ => ClosestPair::of(&pair.closest(ends, &options)?, pair.radius(), is_outside),
         };
-        let Found { node_tests, triangle_tests, .. } = found;
+        let ClosestPair { node_tests, triangle_tests, .. } = found;
         // The root's test is included in the base cost.
         let spent = self.cost.instructions(node_tests.saturating_sub(1), triangle_tests);
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);

@@ -14,7 +14,7 @@ mod tests;
 use super::made::Tests;
 use super::memory::clock::Reading;
 use super::memory::separation::Certain;
-use super::memory::{Lost, Memory};
+use super::memory::{Loss, Memory};
 use super::prices::QUERY;
 use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
 use super::{Budget, NoSide, Options, Proximity, Side, signed};
@@ -84,14 +84,14 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize, const RANGE: 
     labels: LabelSet,
     stack: [Waiting; STACK],
     memory: Memory<STACK, OPENED, RANGE>,
-    last: Option<Last>,
+    last: Option<LastTick>,
     ties: Ties,
     triangle: Option<TriangleRow>,
 }
 
 /// The last tick, for queries with several trackers.
 #[derive(Clone, Copy, Debug)]
-struct Last {
+struct LastTick {
     /// A lower bound on the distance from the axis to the surface; negative infinity if the tool may be inside.
     clear: f32,
     /// Whether the side was asked for.
@@ -318,7 +318,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let memory = &mut self.memory;
         memory.keep(tool, motion, is_complete);
         let (is_closed, now) = (self.tree.is_closed(), memory.clock.now());
-        self.last = motion.map(|_| Last::new(tool, &closest, is_closed, now));
+        self.last = motion.map(|_| LastTick::new(tool, &closest, is_closed, now));
         let opened = memory.front.borrow().used() as u32;
         let moved = moved_by;
         let (pair, searched) = (0, 1);
@@ -370,17 +370,17 @@ fn share_of_pair(budget: Budget, past: &Certain, is_depth_known: bool) -> Budget
     }
 }
 
-impl From<Lost> for Fallback {
-    fn from(lost: Lost) -> Self {
+impl From<Loss> for Fallback {
+    fn from(lost: Loss) -> Self {
         match lost {
-            Lost::Start => Self::Start,
-            Lost::Surface => Self::Surface,
-            Lost::Jump => Self::Jump,
+            Loss::Start => Self::Start,
+            Loss::Surface => Self::Surface,
+            Loss::Jump => Self::Jump,
         }
     }
 }
 
-impl Last {
+impl LastTick {
     fn new(tool: &impl Tool, closest: &Proximity, is_closed: bool, searched: Reading) -> Self {
         let clear = closest.lower + tool.radius() - closest.accuracy;
         let (clear, is_signed) = match closest.side {
