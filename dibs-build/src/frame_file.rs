@@ -6,7 +6,7 @@ use dibs_nostd::format::Unit;
 use glam::{DVec3, Vec3};
 
 use crate::frames::{FrameCheck, FrameError};
-use crate::read::{self, ReadError, ReadErrorKind, Wanted};
+use crate::read::{self, ReadError, ReadErrorKind, ReadTarget};
 
 impl FrameCheck {
     /// Reads a mesh file that is a frame: positions in the order of the tree's rows.
@@ -22,7 +22,7 @@ impl FrameCheck {
     ) -> Result<Vec<Vec3>, ReadError> {
         let path = path.as_ref();
         let frame = || {
-            let wanted = if self.is_of_nodes() { Wanted::Volume } else { Wanted::Surface };
+            let wanted = if self.is_of_nodes() { ReadTarget::Volume } else { ReadTarget::Surface };
             let (positions, faces) = read::frame(path, wanted, 0, unit, origin)?;
             let rows = self.to_rows(&positions);
             // The faces tell a frame of another mesh from one in another unit.

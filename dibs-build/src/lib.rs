@@ -60,8 +60,8 @@ pub use read::{
 pub use rest::Paths;
 pub use script::{MeshSource, TreeScript, tree};
 pub use stretch::{
-    Beyond, LimitsError, LimitsErrorKind, MotionStretch, Needed, largest_stretch, read_limits,
-    write_limits,
+    LimitExcess, LimitsError, LimitsErrorKind, MotionStretch, PeakStretch, largest_stretch,
+    read_limits, write_limits,
 };
 pub use surface_rows::SurfaceRows;
 pub use write::{WriteError, WriteErrorKind, write_atomically};

@@ -7,8 +7,8 @@ use crate::{modes, overwrite, stretch, tree_file};
 use anyhow::{Result, anyhow, bail};
 use clap::ValueEnum;
 use dibs_build::{
-    Beyond, BuildError, Builder, BuiltTree, Group, Import, IndexWidth, Mesh, Needed, Volume,
-    orient, read_labels, read_limits,
+    BuildError, Builder, BuiltTree, Group, Import, IndexWidth, LimitExcess, Mesh, PeakStretch,
+    Volume, orient, read_labels, read_limits,
 };
 use std::path::{Path, PathBuf};
 
@@ -192,8 +192,10 @@ pub fn run(args: &Args) -> Result<()> {
 fn check_covered(args: &Args, mesh: &Mesh, path: &Path, limits: &[f32]) -> Result<()> {
     let motion = args.reading.lengths.motion(path, mesh.origin)?;
     let needed = stretch::measure(mesh, &motion, path, args.construction.paths())?;
-    let Some(Beyond { needed: worst, limit, .. }) = needed.beyond(limits) else { return Ok(()) };
-    let is_beyond = |(n, limit): &(&Needed, &f32)| n.stretch > f64::from(**limit);
+    let Some(LimitExcess { needed: worst, limit, .. }) = needed.beyond(limits) else {
+        return Ok(());
+    };
+    let is_beyond = |(n, limit): &(&PeakStretch, &f32)| n.stretch > f64::from(**limit);
     let beyond = needed.triangles().iter().zip(limits).filter(is_beyond);
     bail!(
         "{}: the motion stretches {} triangles beyond their limits, most of all triangle {} in frame {}, \

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::DVec3;
-use dibs_nostd::filter::{Admitted, Filter, Motion, Reason, Uncertainty};
+use dibs_nostd::filter::{AdmittedMotion, Filter, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::{Capsule, Index, MovingSurface, Odometer, Options, Tracker, Tree};
 
 use crate::query::STACK;
-use crate::recorded::{Moving, Recorded};
+use crate::recorded::{MovingArgs, RecordedFrames};
 use crate::stand_off::{self, StandOff};
 use crate::tool::{self, ToolSpec};
 use crate::tree_file::{self, AnyTree};
@@ -44,7 +44,7 @@ retreating, and 'no safe motion', after which the stand-off is not kept; least_s
 certain.")]
 pub struct Args {
     #[command(flatten)]
-    moving: Moving,
+    moving: MovingArgs,
     /// The tool's pose commanded for the end of each tick, a line each, as for `dibs query --tool`; `-` is standard
     /// input
     #[arg(long, value_name = "TOOLS")]
@@ -109,7 +109,7 @@ impl Axis {
     }
 
     /// The motion to another pose: the smallest rotation of the axis, about its start.
-    fn motion_to(&self, to: &Self) -> Motion {
+    fn motion_to(&self, to: &Self) -> RigidMotion {
         let (from, onto) = (self.end - self.start, to.end - to.start);
         let across = from.cross(onto);
         let angle = across.length().atan2(from.dot(onto));
@@ -118,11 +118,11 @@ impl Axis {
             from.try_normalize().map_or(DVec3::ZERO, DVec3::any_orthonormal_vector)
         });
         let translation = (to.start - self.start).as_vec3();
-        Motion::new(self.start.as_vec3(), translation, (axis * angle).as_vec3())
+        RigidMotion::new(self.start.as_vec3(), translation, (axis * angle).as_vec3())
     }
 
     /// The pose after a motion; its length is kept.
-    fn after(&self, motion: &Motion) -> Self {
+    fn after(&self, motion: &RigidMotion) -> Self {
         let moved = |point: DVec3| motion.apply(point.as_vec3()).as_dvec3();
         let (start, end) = (moved(self.start), moved(self.end));
         let direction = (end - start).normalize_or_zero();
@@ -182,7 +182,7 @@ impl Commands {
 }
 
 /// The largest speed (mm/s) of a vertex from frame to frame, rounded up.
-fn fastest(recorded: &Recorded) -> f32 {
+fn fastest(recorded: &RecordedFrames) -> f32 {
     let next = recorded.frames.iter().cycle().skip(1);
     let pairs = recorded.frames.iter().zip(next).flat_map(|(a, b)| a.iter().zip(b));
     let farthest = pairs.map(|(a, b)| a.as_dvec3().distance(b.as_dvec3())).fold(0.0, f64::max);
@@ -315,7 +315,7 @@ impl<I: Index> Session<'_, I> {
         command: &Axis,
         commands: &Commands,
         options: Options,
-    ) -> Result<Admitted> {
+    ) -> Result<AdmittedMotion> {
         let Axis { start, end } = self.at;
         let tool = Capsule::new(start.as_vec3(), end.as_vec3(), commands.radius)?;
         let motion = self.at.motion_to(command);

@@ -14,7 +14,7 @@ use crate::query::{ALLOW, rows};
 /// The options for a moving surface, and for the ticks of a control loop.
 #[derive(clap::Args)]
 #[command(mut_arg("motion", |motion| motion.required(true)))]
-pub struct Moving {
+pub struct MovingArgs {
     /// A tree file that `dibs build` wrote
     pub tree: PathBuf,
     #[command(flatten)]
@@ -28,7 +28,7 @@ pub struct Moving {
     lengths: Lengths,
 }
 
-impl Moving {
+impl MovingArgs {
     /// Ticks a second: above 0 and finite.
     pub fn rate(&self) -> Result<f64> {
         let rate = self.rate;
@@ -44,16 +44,16 @@ impl Moving {
     }
 
     /// Reads the motion's file.
-    pub fn read<I: Index>(&self, tree: &Tree<'_, I>) -> Result<Recorded> {
+    pub fn read<I: Index>(&self, tree: &Tree<'_, I>) -> Result<RecordedFrames> {
         let path = self.motion()?;
         let motion = self.lengths.motion_of(tree, path)?;
         let rate = self.motion_rate.of(&motion, path)?;
-        Recorded::new(tree, path, &motion, rate)
+        RecordedFrames::new(tree, path, &motion, rate)
     }
 }
 
 /// The frames of a motion, at least one, within the tree's stretch limit.
-pub struct Recorded {
+pub struct RecordedFrames {
     /// Positions of the tree's vertices.
     pub frames: Vec<Vec<Vec3>>,
     /// Positions of the nodes, for a tree with nodes.
@@ -63,7 +63,7 @@ pub struct Recorded {
     pub rate: f64,
 }
 
-impl Recorded {
+impl RecordedFrames {
     fn new<I: Index>(tree: &Tree<'_, I>, path: &Path, motion: &Motion, rate: f64) -> Result<Self> {
         let name = path.display();
         let frames: Vec<Vec<Vec3>> = (0..)

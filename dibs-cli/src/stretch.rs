@@ -7,7 +7,7 @@ use crate::nodes::{self, VolumeSpec};
 use crate::overwrite;
 use anyhow::{Context, Result, anyhow, bail};
 use dibs_build::{
-    Mesh, Motion, MotionStretch, Needed, Paths, Volume, write_atomically, write_limits,
+    Mesh, Motion, MotionStretch, Paths, PeakStretch, Volume, write_atomically, write_limits,
 };
 use plotters::prelude::*;
 use std::path::{Path, PathBuf};
@@ -129,7 +129,7 @@ pub fn run(args: &Args) -> Result<()> {
     for (share, stretch) in percentiles {
         println!("stretch  {share:6} % of the {all} stretch by at most {stretch:.4}");
     }
-    for &Needed { triangle, stretch, frame } in worst {
+    for &PeakStretch { triangle, stretch, frame } in worst {
         let corners = elements.corners(triangle);
         let corners = corners.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
         let points = if volume.is_some() { "nodes" } else { "vertices" };
@@ -155,7 +155,7 @@ pub fn measure(mesh: &Mesh, motion: &Motion, path: &Path, paths: Paths) -> Resul
 }
 
 /// The stretch that this percentage of the triangles does not exceed.
-fn percentile(ranked: &[Needed], share: f64) -> f64 {
+fn percentile(ranked: &[PeakStretch], share: f64) -> f64 {
     let beyond = ((1.0 - share / 100.0) * ranked.len() as f64).floor() as usize;
     ranked[beyond.min(ranked.len() - 1)].stretch
 }
@@ -184,7 +184,7 @@ impl Elements<'_> {
         }
     }
 
-    fn named(&self, &Needed { triangle, stretch, frame }: &Needed) -> serde_json::Value {
+    fn named(&self, &PeakStretch { triangle, stretch, frame }: &PeakStretch) -> serde_json::Value {
         let corners = self.corners(triangle);
         match self {
             Self::Triangles(_) => serde_json::json!({
@@ -198,7 +198,7 @@ impl Elements<'_> {
 }
 
 /// Draws the fraction of the triangles that stretch beyond each value, as SVG.
-fn draw(ranked: &[Needed], all: &str) -> Result<String> {
+fn draw(ranked: &[PeakStretch], all: &str) -> Result<String> {
     let mut picture = String::new();
     {
         let root = SVGBackend::with_string(&mut picture, (900, 420)).into_drawing_area();

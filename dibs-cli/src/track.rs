@@ -1,7 +1,7 @@
 //! `dibs track`: a tool on its path near a moving surface, tick by tick.
 
 use crate::query::{ContactRecord, STACK, Touch, side_name, vector};
-use crate::recorded::{Moving, Recorded};
+use crate::recorded::{MovingArgs, RecordedFrames};
 use crate::tool::{self, LocalTool};
 use crate::tree_file::{self, AnyTree};
 use crate::{output, overwrite};
@@ -39,7 +39,7 @@ nothing is certain. A budget counts by the fit of a tracker's ticks, with contac
 have the vertices: one that nodes carry takes several times as much.")]
 pub struct Args {
     #[command(flatten)]
-    moving: Moving,
+    moving: MovingArgs,
     /// The tool at each tick, a line each, as for `dibs query --tool`; `-` is standard input
     #[arg(long, value_name = "TOOLS")]
     path: PathBuf,
@@ -87,7 +87,7 @@ fn track<I: Index>(args: &Args, tree: &Tree<'_, I>) -> Result<()> {
     let tools = tool::path(&args.path, |tool| tool.local(origin))?;
     let rate = args.moving.rate()?;
     let recorded = args.moving.read(tree)?;
-    let Recorded { frames, stretches, .. } = &recorded;
+    let RecordedFrames { frames, stretches, .. } = &recorded;
     let mut session = Session {
         tree,
         query: Query::new(tree)?,

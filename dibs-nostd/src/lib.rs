@@ -100,7 +100,7 @@ pub use query::{
 #[cfg(feature = "bus")]
 pub use receive::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, ReceiveError};
 #[doc(hidden)]
-pub use stretch::Compared;
+pub use stretch::Comparison;
 pub use stretch::{
     Admission, FrameExtent, Gate, IncomingSurface, NoGate, StretchError, StretchMonitor,
     SurfaceLimits, measure_stretch,

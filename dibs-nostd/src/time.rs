@@ -122,12 +122,12 @@ pub(crate) const fn elapsed(now: Millis, stamp: Millis) -> Millis {
 
 /// The greatest age found for a stamp.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Ageing {
+pub(crate) struct StampAge {
     pub stamp: Millis,
     pub oldest: Millis,
 }
 
-impl Ageing {
+impl StampAge {
     /// The state after a reading of `stamp` at the time `now`: `oldest` is the stamp's age.
     #[must_use]
     pub const fn at(self, now: Millis, stamp: Millis) -> Self {
@@ -205,7 +205,7 @@ mod tests {
             steps in prop::collection::vec(distance(), 1..40),
         ) {
             let stamp = Millis(stamp);
-            let (mut ageing, mut now, mut oldest) = (Ageing::default().at(stamp, stamp), stamp, Millis(0));
+            let (mut ageing, mut now, mut oldest) = (StampAge::default().at(stamp, stamp), stamp, Millis(0));
             for step in steps {
                 now = now.after(Millis(step));
                 ageing = ageing.at(now, stamp);
@@ -223,7 +223,7 @@ mod tests {
             steps in prop::collection::vec(1_u32..1 << 31, 1..12),
         ) {
             let stamp = Millis(stamp);
-            let (mut ageing, mut now, mut true_age) = (Ageing::default().at(stamp, stamp), stamp, 0_u64);
+            let (mut ageing, mut now, mut true_age) = (StampAge::default().at(stamp, stamp), stamp, 0_u64);
             for step in steps {
                 now = now.after(Millis(step));
                 true_age += u64::from(step);

@@ -27,4 +27,4 @@ mod sender;
 pub mod transport;
 
 pub use pace::Pace;
-pub use sender::{Prepared, SendError, Sender, Sent, Settings, SurfaceOrder, Totals};
+pub use sender::{PreparedFrame, SendError, Sender, SentFrame, Settings, SurfaceOrder, Totals};

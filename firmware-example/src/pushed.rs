@@ -5,7 +5,7 @@
 use bytemuck::Zeroable;
 use dibs_nostd::constraint::{ConstraintForce, EnergyAccount};
 use dibs_nostd::failsafe::State;
-use dibs_nostd::filter::{Admitted, FilterError, Motion};
+use dibs_nostd::filter::{AdmittedMotion, FilterError, RigidMotion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::Answer;
 use dibs_nostd::{Capsule, ToolError};
@@ -107,9 +107,9 @@ impl Robot for Pushed {
     }
 
     /// The commanded motion, in every other cycle.
-    fn command(&self) -> Option<Motion> {
+    fn command(&self) -> Option<RigidMotion> {
         let velocity = Hand::free(self.wanted());
-        let motion = Motion::new(self.hand.at, velocity * PERIOD, Vec3::ZERO);
+        let motion = RigidMotion::new(self.hand.at, velocity * PERIOD, Vec3::ZERO);
         (self.ticks / CYCLE % 2 == 1).then_some(motion)
     }
 
@@ -123,10 +123,10 @@ impl Robot for Pushed {
         force
     }
 
-    fn execute(&mut self, answer: &Answer, admitted: &Result<Admitted, FilterError>) {
+    fn execute(&mut self, answer: &Answer, admitted: &Result<AdmittedMotion, FilterError>) {
         let push = self.wanted();
         let at = self.hand.at;
-        if let Ok(Admitted { motion, .. }) = admitted {
+        if let Ok(AdmittedMotion { motion, .. }) = admitted {
             let end = motion.apply(at + self.shaft);
             self.hand.at = motion.apply(at);
             self.shaft = end - self.hand.at;

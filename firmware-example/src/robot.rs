@@ -2,7 +2,7 @@
 //! hand.
 
 use dibs_nostd::constraint::ConstraintForce;
-use dibs_nostd::filter::{Admitted, FilterError, Motion};
+use dibs_nostd::filter::{AdmittedMotion, FilterError, RigidMotion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::Answer;
 use dibs_nostd::{Capsule, ToolError};
@@ -20,13 +20,13 @@ pub trait Robot {
     fn instrument(&self, tick: u32) -> Result<Capsule, ToolError>;
 
     /// The motion commanded until the next tick; `None` for a robot that a hand moves against a force.
-    fn command(&self) -> Option<Motion>;
+    fn command(&self) -> Option<RigidMotion>;
 
     /// Applies the force of a wall, within the limits of the drives. Returns the applied force, in N.
     fn apply(&mut self, answer: &Answer, force: &ConstraintForce) -> Vec3;
 
     /// Executes the admitted motion. After an error the instrument must rest.
-    fn execute(&mut self, answer: &Answer, admitted: &Result<Admitted, FilterError>);
+    fn execute(&mut self, answer: &Answer, admitted: &Result<AdmittedMotion, FilterError>);
 
     /// The record of a simulated hand that pushes.
     fn push(&self) -> Option<Push>;
@@ -40,7 +40,7 @@ impl Robot for Script {
         instrument(tick)
     }
 
-    fn command(&self) -> Option<Motion> {
+    fn command(&self) -> Option<RigidMotion> {
         None
     }
 
@@ -48,7 +48,7 @@ impl Robot for Script {
         force.force
     }
 
-    fn execute(&mut self, _: &Answer, _: &Result<Admitted, FilterError>) {}
+    fn execute(&mut self, _: &Answer, _: &Result<AdmittedMotion, FilterError>) {}
 
     fn push(&self) -> Option<Push> {
         None
@@ -79,7 +79,7 @@ impl Robot for Either {
         }
     }
 
-    fn command(&self) -> Option<Motion> {
+    fn command(&self) -> Option<RigidMotion> {
         match self {
             Self::Script(robot) => robot.command(),
             Self::Pushed(robot) => robot.command(),
@@ -93,7 +93,7 @@ impl Robot for Either {
         }
     }
 
-    fn execute(&mut self, answer: &Answer, admitted: &Result<Admitted, FilterError>) {
+    fn execute(&mut self, answer: &Answer, admitted: &Result<AdmittedMotion, FilterError>) {
         match self {
             Self::Script(robot) => robot.execute(answer, admitted),
             Self::Pushed(robot) => robot.execute(answer, admitted),

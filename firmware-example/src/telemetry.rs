@@ -4,7 +4,7 @@
 //! a zero byte. The first field is the kind of record.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
-use dibs_nostd::filter::{Admitted, FilterError, Reason};
+use dibs_nostd::filter::{AdmittedMotion, FilterError, Reason};
 use dibs_nostd::wire::{Event, enframe, framed_bytes};
 use dibs_nostd::{Fallback, Unavailable};
 
@@ -248,7 +248,7 @@ impl Push {
     pub const KIND: u32 = 4;
 
     /// Records a filter's answer.
-    pub(crate) fn filtered(&mut self, admitted: &Result<Admitted, FilterError>) {
+    pub(crate) fn filtered(&mut self, admitted: &Result<AdmittedMotion, FilterError>) {
         self.outcome = reason_code(admitted.as_ref().ok().map(|admitted| admitted.reason));
         let (least, queries, instructions) = match admitted {
             Ok(admitted) => (admitted.least_separation, admitted.queries, admitted.instructions),

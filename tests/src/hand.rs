@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 
 use controller::{ACCOUNT, Hand, MARGIN, PERIOD as TICK, SPRING};
-use dibs_build::{Builder, Mesh, Motion as Recorded, generate};
+use dibs_build::{Builder, Mesh, Motion, generate};
 use dibs_nostd::constraint::{ForbiddenRegion, Proxy, VelocityRow};
-use dibs_nostd::filter::{Filter, Motion, Uncertainty};
+use dibs_nostd::filter::{Filter, RigidMotion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Contacts, Odometer, Options, Query, Sphere, Tracker, Unavailable};
 use glam::Vec3;
@@ -41,7 +41,7 @@ pub struct Scene {
     /// Its name.
     pub name: &'static str,
     mesh: Mesh,
-    motion: Option<Recorded>,
+    motion: Option<Motion>,
     from: Vec3,
     push: Vec3,
 }
@@ -178,7 +178,7 @@ impl Scene {
                 break;
             }
             at += if is_filtered {
-                let motion = Motion::new(at, command * TICK, Vec3::ZERO);
+                let motion = RigidMotion::new(at, command * TICK, Vec3::ZERO);
                 let mut pairs = [(&mut tracker, &surface, &tool)];
                 let admitted = filter.admit(&mut pairs, &motion, TICK, &uncertainty, &[]);
                 admitted.expect("an answer").motion.translation
@@ -196,7 +196,7 @@ impl Scene {
 
     /// The largest speed (mm/s) of a vertex.
     fn fastest(&self) -> f32 {
-        let Some(Recorded { frames, rate, .. }) = &self.motion else { return 0.0 };
+        let Some(Motion { frames, rate, .. }) = &self.motion else { return 0.0 };
         let pairs = frames.iter().zip(frames.iter().cycle().skip(1));
         let steps = pairs.flat_map(|(a, b)| a.iter().zip(b));
         steps.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max) * rate * 1.001
@@ -204,7 +204,7 @@ impl Scene {
 
     /// Positions and velocities of the vertices at a tick.
     fn surface(&self, tick: u32) -> (Vec<Vec3>, Vec<Vec3>) {
-        let Some(Recorded { frames, rate, .. }) = &self.motion else {
+        let Some(Motion { frames, rate, .. }) = &self.motion else {
             return (self.mesh.positions.clone(), vec![Vec3::ZERO; self.mesh.positions.len()]);
         };
         let time = tick as f32 * TICK * rate;

@@ -1673,7 +1673,7 @@ typedef struct {
    * The rotation vector: the axis, times the angle in radians. A filter admits half a radian at most.
    */
   dibs_vec3 rotation;
-} dibs_motion;
+} dibs_rigid_motion;
 
 /**
  * How far the tissue may be from the searched surface, in addition to that surface's own position error.
@@ -1716,7 +1716,7 @@ typedef struct {
   /**
    * The motion to execute.
    */
-  dibs_motion motion;
+  dibs_rigid_motion motion;
   /**
    * At no instant of the period the separation (mm) of any tool is less, as long as the tissue is within its
    * uncertainty.
@@ -1734,7 +1734,7 @@ typedef struct {
    * Instructions of the queries, by the filter's cost model.
    */
   uint32_t instructions;
-} dibs_admitted;
+} dibs_admitted_motion;
 
 /**
  * Properties of a frame.
@@ -1840,7 +1840,7 @@ typedef struct {
    * Its velocity (mm/s) at the pair: from one frame to the next, zero if the surface is held.
    */
   dibs_vec3 velocity;
-} dibs_searched;
+} dibs_searched_surface;
 
 /**
  * The answer of a tick: the pair that a wall may act on, and how it was found.
@@ -1885,7 +1885,7 @@ typedef struct {
   /**
    * The searched surface, and the pair on it, trusted or not: for records.
    */
-  dibs_searched searched;
+  dibs_searched_surface searched;
 } dibs_answer;
 
 /**
@@ -2004,7 +2004,7 @@ typedef struct {
    * Largest distance (mm) of a vertex from its position at the receiver.
    */
   float error;
-} dibs_sent;
+} dibs_sent_frame;
 
 /**
  * State of a sender.
@@ -2562,12 +2562,12 @@ dibs_code dibs_filter_admit(const dibs_filter *filter,
                             dibs_frame *frame,
                             const dibs_tool *tools,
                             uint32_t count,
-                            const dibs_motion *command,
+                            const dibs_rigid_motion *command,
                             float period,
                             const dibs_uncertainty *uncertainty,
                             const dibs_motion_row *rows,
                             uint32_t row_count,
-                            dibs_admitted *admitted);
+                            dibs_admitted_motion *admitted);
 
 /**
  * A tool after a motion of up to half a radian: each point of the axis is rotated and displaced.
@@ -2577,7 +2577,7 @@ dibs_code dibs_filter_admit(const dibs_filter *filter,
  * @param moved   Receives the tool after; may be the same.
  * @return `DIBS_CODE_OK`, or a misuse.
  */
-dibs_code dibs_motion_apply(const dibs_motion *motion, const dibs_tool *tool, dibs_tool *moved);
+dibs_code dibs_rigid_motion_apply(const dibs_rigid_motion *motion, const dibs_tool *tool, dibs_tool *moved);
 
 /**
  * The distance (mm) between tool and searched surface at which a period can begin without a risk of contact: the
@@ -2747,10 +2747,10 @@ dibs_code dibs_guard_contacts(dibs_guard *guard,
 dibs_code dibs_guard_admit(dibs_guard *guard,
                            const dibs_filter *filter,
                            const dibs_tool *tool,
-                           const dibs_motion *command,
+                           const dibs_rigid_motion *command,
                            uint32_t now,
                            dibs_answer *answer,
-                           dibs_admitted *admitted);
+                           dibs_admitted_motion *admitted);
 
 /**
  * An operator's acknowledgement, which ends the safe state once every input is good again.
@@ -3192,7 +3192,7 @@ dibs_code dibs_sender_send(dibs_sender *sender,
                            const float *positions,
                            uint32_t count,
                            uint32_t age,
-                           dibs_sent *sent);
+                           dibs_sent_frame *sent);
 
 /**
  * The same as `dibs_sender_send`, for a mesh at a rigid pose. For a `dibs_bus`; a `dibs_receiver` refuses such frames.
@@ -3212,7 +3212,7 @@ dibs_code dibs_sender_send_at(dibs_sender *sender,
                               uint32_t count,
                               const dibs_pose *pose,
                               uint32_t age,
-                              dibs_sent *sent);
+                              dibs_sent_frame *sent);
 
 /**
  * Sends a heartbeat if one is due, and receives the statuses that have arrived. Does not wait. Call it a few times

@@ -153,9 +153,9 @@ struct Filter : dibs_filter {
         }
     }
     /** On the trackers' own surfaces, or on a reader's `frame`. */
-    Code admit(Span<dibs_tracker *const> trackers, Tools tools, const dibs_motion &command, float period,
-               const dibs_uncertainty &uncertainty, dibs_admitted &admitted, Span<const dibs_motion_row> rows = {},
-               dibs_frame *frame = nullptr) const {
+    Code admit(Span<dibs_tracker *const> trackers, Tools tools, const dibs_rigid_motion &command, float period,
+               const dibs_uncertainty &uncertainty, dibs_admitted_motion &admitted,
+               Span<const dibs_motion_row> rows = {}, dibs_frame *frame = nullptr) const {
         return dibs_filter_admit(this, trackers.data(), frame, tools.data(), common(trackers, tools), &command, period,
                                  &uncertainty, rows.data(), uint32_t(rows.size()), &admitted);
     }
@@ -210,8 +210,8 @@ template <class Base> struct GuardOf : Base {
     Code contacts(const dibs_tool &tool, float margin, uint32_t now, dibs_contacts *list, dibs_answer &answer) {
         return dibs_guard_contacts(*this, &tool, margin, now, list, &answer);
     }
-    Code admit(const dibs_filter &filter, const dibs_tool &tool, const dibs_motion &command, uint32_t now,
-               dibs_admitted &admitted, dibs_answer *answer = nullptr) {
+    Code admit(const dibs_filter &filter, const dibs_tool &tool, const dibs_rigid_motion &command, uint32_t now,
+               dibs_admitted_motion &admitted, dibs_answer *answer = nullptr) {
         return dibs_guard_admit(*this, &filter, &tool, &command, now, answer, &admitted);
     }
     Code acknowledge() { return dibs_guard_acknowledge(*this); }
@@ -277,11 +277,11 @@ struct Sender : Object<dibs_sender, DIBS_SENDER_SIZE, dibs_sender_init> {
     /** The challenge that the receiver was given, for a line without a way back. */
     Code challenge(uint64_t challenge) { return dibs_sender_challenge(*this, challenge); }
     /** x, y and z of each vertex, in the mesh's order, so many milliseconds ago. */
-    Code send(Span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent *sent = nullptr) {
+    Code send(Span<const float> positions, uint32_t age = DIBS_AGE_UNKNOWN, dibs_sent_frame *sent = nullptr) {
         return dibs_sender_send(*this, positions.data(), uint32_t(positions.size() / 3), age, sent);
     }
     /** The same, for a mesh at a rigid pose. */
-    Code send_at(Span<const float> positions, const dibs_pose &pose, uint32_t age, dibs_sent *sent = nullptr) {
+    Code send_at(Span<const float> positions, const dibs_pose &pose, uint32_t age, dibs_sent_frame *sent = nullptr) {
         return dibs_sender_send_at(*this, positions.data(), uint32_t(positions.size() / 3), &pose, age, sent);
     }
     Code poll() { return dibs_sender_poll(*this); }

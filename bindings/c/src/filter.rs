@@ -1,7 +1,7 @@
 //! The filter of commands: the motion closest to a commanded one that keeps a chain of tools out of the tissue.
 
 use bytemuck::{AnyBitPattern, Pod, Zeroable};
-use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
+use dibs_nostd::filter::{AdmittedMotion, Filter, MotionRow, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, Cost, MovingSurface, Options};
 use heapless::Vec;
@@ -119,7 +119,7 @@ pub extern "C" fn dibs_filter_of(stand_off: f32, speed: f32) -> dibs_filter {
 /// rotates about it.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
-pub struct dibs_motion {
+pub struct dibs_rigid_motion {
     /// The reference point before the motion (mm).
     pub about: dibs_vec3,
     /// The reference point's displacement (mm).
@@ -128,14 +128,14 @@ pub struct dibs_motion {
     pub rotation: dibs_vec3,
 }
 
-impl From<dibs_motion> for Motion {
-    fn from(dibs_motion { about, translation, rotation }: dibs_motion) -> Self {
+impl From<dibs_rigid_motion> for RigidMotion {
+    fn from(dibs_rigid_motion { about, translation, rotation }: dibs_rigid_motion) -> Self {
         Self::new(about.into(), translation.into(), rotation.into())
     }
 }
 
-impl From<Motion> for dibs_motion {
-    fn from(Motion { about, translation, rotation }: Motion) -> Self {
+impl From<RigidMotion> for dibs_rigid_motion {
+    fn from(RigidMotion { about, translation, rotation }: RigidMotion) -> Self {
         Self { about: about.into(), translation: translation.into(), rotation: rotation.into() }
     }
 }
@@ -198,9 +198,9 @@ impl From<Reason> for dibs_reason {
 /// The motion that a filter admits.
 #[derive(Clone, Copy)]
 #[repr(C)]
-pub struct dibs_admitted {
+pub struct dibs_admitted_motion {
     /// The motion to execute.
-    pub motion: dibs_motion,
+    pub motion: dibs_rigid_motion,
     /// At no instant of the period the separation (mm) of any tool is less, as long as the tissue is within its
     /// uncertainty.
     pub least_separation: f32,
@@ -212,8 +212,8 @@ pub struct dibs_admitted {
     pub instructions: u32,
 }
 
-impl From<Admitted> for dibs_admitted {
-    fn from(admitted: Admitted) -> Self {
+impl From<AdmittedMotion> for dibs_admitted_motion {
+    fn from(admitted: AdmittedMotion) -> Self {
         Self {
             motion: admitted.motion.into(),
             least_separation: admitted.least_separation,
@@ -227,7 +227,7 @@ impl From<Admitted> for dibs_admitted {
 /// The arguments of a filter's tick, except its tools.
 struct Command<'r> {
     filter: Filter<DIBS_FILTER_LABELS>,
-    motion: Motion,
+    motion: RigidMotion,
     period: f32,
     uncertainty: Uncertainty,
     rows: &'r [MotionRow],
@@ -237,7 +237,7 @@ impl Command<'_> {
     fn admit<S: MovingSurface>(
         &self,
         tools: &mut [(&mut TheTracker, &S, &Capsule)],
-    ) -> Result<Admitted, dibs_code> {
+    ) -> Result<AdmittedMotion, dibs_code> {
         let Self { filter, motion, period, uncertainty, rows } = self;
         Ok(filter.admit(tools, motion, *period, uncertainty, rows)?)
     }
@@ -275,12 +275,12 @@ pub extern "C" fn dibs_filter_admit(
     frame: *mut dibs_frame,
     tools: *const dibs_tool,
     count: u32,
-    command: *const dibs_motion,
+    command: *const dibs_rigid_motion,
     period: f32,
     uncertainty: *const dibs_uncertainty,
     rows: *const dibs_motion_row,
     row_count: u32,
-    admitted: *mut dibs_admitted,
+    admitted: *mut dibs_admitted_motion,
 ) -> dibs_code {
     dibs_code::of(|| {
         let admitted = admitted.check()?;
@@ -346,13 +346,13 @@ fn read_rows(
 /// @param moved   Receives the tool after; may be the same.
 /// @return `DIBS_CODE_OK`, or a misuse.
 #[unsafe(no_mangle)]
-pub extern "C" fn dibs_motion_apply(
-    motion: *const dibs_motion,
+pub extern "C" fn dibs_rigid_motion_apply(
+    motion: *const dibs_rigid_motion,
     tool: *const dibs_tool,
     moved: *mut dibs_tool,
 ) -> dibs_code {
     dibs_code::of(|| {
-        let (place, motion) = (moved.check()?, Motion::from(motion.get()?));
+        let (place, motion) = (moved.check()?, RigidMotion::from(motion.get()?));
         let dibs_tool { start, end, radius } = tool.get()?;
         let [start, end] = [start, end].map(|end| motion.apply(Vec3::from(end)).into());
         place.set(dibs_tool { start, end, radius });

@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::filter::{FilterError, Motion};
+use dibs_nostd::filter::{FilterError, RigidMotion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Guard, Rows};
 use dibs_nostd::{Contacts, Interval, Millis, Proximity, TreeBytes, Unavailable};
@@ -13,7 +13,7 @@ use crate::code::dibs_code;
 use crate::constraint::{dibs_force, dibs_wall, dibs_wall_force};
 use crate::contacts::dibs_contacts;
 use crate::failsafe::dibs_verdict;
-use crate::filter::{dibs_admitted, dibs_filter, dibs_motion};
+use crate::filter::{dibs_admitted_motion, dibs_filter, dibs_rigid_motion};
 use crate::limits::dibs_guard_limits;
 use crate::query::{STACK, dibs_interval, dibs_proximity};
 use crate::reader::{dibs_age, dibs_link};
@@ -125,13 +125,13 @@ pub struct dibs_answer {
     /// The health of the bus.
     pub link: dibs_link,
     /// The searched surface, and the pair on it, trusted or not: for records.
-    pub searched: dibs_searched,
+    pub searched: dibs_searched_surface,
 }
 
 /// The surface that a tick searched.
 #[derive(Clone, Copy, AnyBitPattern)]
 #[repr(C)]
-pub struct dibs_searched {
+pub struct dibs_searched_surface {
     /// A `dibs_code`: `DIBS_CODE_OK` if there is a pair; otherwise why there is none. Before the first surface all
     /// other fields are 0, and the residual is -1.
     pub outcome: u32,
@@ -149,7 +149,7 @@ pub struct dibs_searched {
     pub velocity: dibs_vec3,
 }
 
-impl From<&Answer> for dibs_searched {
+impl From<&Answer> for dibs_searched_surface {
     fn from(answer: &Answer) -> Self {
         let searched = answer.searched.as_ref();
         let tracked = answer.tracked.map_or_else(|_| dibs_tracked::nowhere(), dibs_tracked::from);
@@ -303,14 +303,14 @@ pub extern "C" fn dibs_guard_admit(
     guard: *mut dibs_guard,
     filter: *const dibs_filter,
     tool: *const dibs_tool,
-    command: *const dibs_motion,
+    command: *const dibs_rigid_motion,
     now: u32,
     answer: *mut dibs_answer,
-    admitted: *mut dibs_admitted,
+    admitted: *mut dibs_admitted_motion,
 ) -> dibs_code {
     dibs_code::of(|| {
         let (answer, place) = (answer.check_if_any()?, admitted.check()?);
-        let (filter, command) = (filter.get()?.read()?, Motion::from(command.get()?));
+        let (filter, command) = (filter.get()?.read()?, RigidMotion::from(command.get()?));
         let (tool, mut guard, now) = (tool.get()?, guard.open()?, Millis(now));
         let shape = Shape::try_from(tool);
         let (found, admitted) = match &shape {

@@ -10,7 +10,7 @@ use dibs_nostd::RigidPose;
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{AesCmac, Content, Event};
 use dibs_stream::transport::{Line, Target};
-use dibs_stream::{SendError, Sender, Sent, Settings, SurfaceOrder};
+use dibs_stream::{SendError, Sender, SentFrame, Settings, SurfaceOrder};
 
 use crate::border::{Handle, Input, Kind, Out, Output, Storage, text};
 use crate::code::dibs_code;
@@ -68,7 +68,7 @@ impl Kind for dibs_sender {
 /// A frame that was sent.
 #[derive(Clone, Copy)]
 #[repr(C)]
-pub struct dibs_sent {
+pub struct dibs_sent_frame {
     /// Its number.
     pub epoch: u32,
     /// 0 for a whole frame.
@@ -83,8 +83,8 @@ pub struct dibs_sent {
     pub error: f32,
 }
 
-impl From<Sent> for dibs_sent {
-    fn from(sent: Sent) -> Self {
+impl From<SentFrame> for dibs_sent_frame {
+    fn from(sent: SentFrame) -> Self {
         Self {
             epoch: sent.epoch,
             is_partial: u32::from(sent.content != Content::Whole),
@@ -230,7 +230,7 @@ pub extern "C" fn dibs_sender_send(
     positions: *const f32,
     count: u32,
     age: u32,
-    sent: *mut dibs_sent,
+    sent: *mut dibs_sent_frame,
 ) -> dibs_code {
     dibs_code::of(|| send(sender, positions, count, None, age, sent))
 }
@@ -253,7 +253,7 @@ pub extern "C" fn dibs_sender_send_at(
     count: u32,
     pose: *const dibs_pose,
     age: u32,
-    sent: *mut dibs_sent,
+    sent: *mut dibs_sent_frame,
 ) -> dibs_code {
     dibs_code::of(|| send(sender, positions, count, Some(pose.get()?), age, sent))
 }
@@ -264,7 +264,7 @@ fn send(
     count: u32,
     pose: Option<dibs_pose>,
     age: u32,
-    sent: *mut dibs_sent,
+    sent: *mut dibs_sent_frame,
 ) -> Result<(), dibs_code> {
     let (sent, mut sender, rows) = (sent.check_if_any()?, sender.open()?, rows(positions, count)?);
     let dibs_sender { sender: own, positions, .. } = &mut *sender;

@@ -6,7 +6,7 @@ use core::slice;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{Notes, Posed, Rows};
+use dibs_nostd::guard::{Notes, PosedRows, Rows};
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{
     Buffer, Buffers, FrameGuard, FrameReader, FrameWriter, Head, MeasuredStretch, Position,
@@ -47,8 +47,8 @@ impl Kind for dibs_surface {
 }
 
 /// Every frame of a bus may have a pose. Frames without one behave bit for bit as if poses did not exist.
-pub(crate) type OfVertices = Posed;
-pub(crate) type OfNodes = Posed<Nodes<'static>>;
+pub(crate) type OfVertices = PosedRows;
+pub(crate) type OfNodes = PosedRows<Nodes<'static>>;
 pub(crate) type Poses = <OfVertices as Rows>::Poses;
 
 pub(crate) type Writer = FrameWriter<'static>;

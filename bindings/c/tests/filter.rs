@@ -7,7 +7,7 @@ use std::fs;
 use std::process::Command;
 
 use dibs_build::{Builder, generate};
-use dibs_nostd::filter::{Filter, Motion, MotionRow, Reason, Uncertainty};
+use dibs_nostd::filter::{Filter, MotionRow, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Capsule, MovingTable, Odometer, Tracker, Tree};
 
@@ -79,7 +79,7 @@ fn admitted_motions_have_the_same_bits() {
         let tools =
             chain.map(|(start, end, radius)| Capsule::new(start, end, radius).expect("one"));
         let [x, y, z, a, b, c] = motion;
-        let command = Motion::new(chain[1].1, Vec3::new(x, y, z), Vec3::new(a, b, c));
+        let command = RigidMotion::new(chain[1].1, Vec3::new(x, y, z), Vec3::new(a, b, c));
         let instructions = if tick % 5 == 4 { 30_000 } else { 200_000 };
         let filter = Filter::new(1.0, 400.0).expect("a filter");
         let filter = filter.budget(instructions);
@@ -106,7 +106,7 @@ fn admitted_motions_have_the_same_bits() {
         reasons[number] += 1;
         let mut line = format!("{number} {} {}", admitted.queries, admitted.instructions);
         bits(&mut line, &[admitted.least_separation]);
-        let Motion { about, translation, rotation } = admitted.motion;
+        let RigidMotion { about, translation, rotation } = admitted.motion;
         [about, translation, rotation].iter().for_each(|of| bits(&mut line, &of.to_array()));
         for (start, end, radius) in &mut chain {
             (*start, *end) = (admitted.motion.apply(*start), admitted.motion.apply(*end));

@@ -15,7 +15,7 @@ use dibs_build::glam::DVec3;
 use dibs_build::{Builder, BuiltTree, Volume, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper};
 use dibs_nostd::failsafe::State;
-use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, Reason};
+use dibs_nostd::filter::{AdmittedMotion, Filter, FilterError, Reason, RigidMotion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Rows, Surface, Vertices};
 use dibs_nostd::nodes::Nodes;
@@ -243,7 +243,7 @@ fn answer<R: Rows<Poses = ()>>((bus, guard): &mut Ends<'_, R>, step: &Step) -> S
             let (start, end) = (Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f));
             let tool = Capsule::new(start, end, *radius).expect("a tool");
             let filter = Filter::new(1.0, 200.0).expect("a filter");
-            let command = Motion::new(start, Vec3::new(-0.1, 0.0, 0.0), Vec3::ZERO);
+            let command = RigidMotion::new(start, Vec3::new(-0.1, 0.0, 0.0), Vec3::ZERO);
             let (answer, admitted) = guard.admit(&filter, &tool, &command, Millis(*now));
             tick(0, &answer) + &motion(admitted)
         }
@@ -354,9 +354,9 @@ fn tick(code: u32, answer: &Answer) -> String {
 }
 
 /// The code, and the motion where there is one.
-fn motion(admitted: Result<Admitted, FilterError>) -> String {
+fn motion(admitted: Result<AdmittedMotion, FilterError>) -> String {
     match admitted {
-        Ok(Admitted { motion, least_separation, reason, queries, instructions, .. }) => {
+        Ok(AdmittedMotion { motion, least_separation, reason, queries, instructions, .. }) => {
             let reasons = [
                 Reason::Commanded,
                 Reason::Nearest,

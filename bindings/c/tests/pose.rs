@@ -8,7 +8,7 @@ use std::process::Command;
 
 use dibs_build::{Builder, generate};
 use dibs_nostd::glam::{Quat, Vec3};
-use dibs_nostd::guard::{Bus, Guard, GuardLimits, Posed, Surface};
+use dibs_nostd::guard::{Bus, Guard, GuardLimits, PosedRows, Surface};
 use dibs_nostd::wire::NoMac;
 use dibs_nostd::{Advance, Capsule, Millis, TreeBytes};
 
@@ -18,14 +18,14 @@ const VERTICES: usize = 162;
 const FRAMES: u32 = 20;
 const PERIOD: u32 = 30;
 
-type Ends<'s, 't> = (Bus<'s, 't, u16, NoMac, Posed>, Guard<'s, 't, u16, 512, 256, Posed>);
+type Ends<'s, 't> = (Bus<'s, 't, u16, NoMac, PosedRows>, Guard<'s, 't, u16, 512, 256, PosedRows>);
 
 #[test]
 fn frames_with_poses_have_the_same_bits() {
     let folder = tempfile::tempdir().expect("a folder");
     let mesh = generate::heart(320).expect("a size").mesh;
     let built = Builder::new().stretch(1.5).build(&mesh).expect("a tree");
-    let surface: Surface<VERTICES, Posed> = Surface::new();
+    let surface: Surface<VERTICES, PosedRows> = Surface::new();
     let limits = GuardLimits::new(300.0, Millis(80)).automatic();
     let tree = TreeBytes::<u16>::new(built.blob());
     let (mut bus, mut guard): Ends<'_, '_> = surface.start(tree, limits).expect("valid");

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{Bus, Guard, GuardLimits, Posed, Surface};
+use dibs_nostd::guard::{Bus, Guard, GuardLimits, PosedRows, Surface};
 use dibs_nostd::wire::{AesCmac, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac};
 use dibs_nostd::{Millis, ReceiveError, TreeBytes, VertexTable};
 
@@ -21,8 +21,8 @@ const CHALLENGE: u64 = 0x89AB_CDEF_00C0_FFEE;
 /// Largest frame speed (mm/s) and age, as in `tags.c`.
 const LIMITS: GuardLimits = GuardLimits::new(100_000.0, Millis(1_000));
 
-type TheBus<'s, 't> = Bus<'s, 't, u16, AesCmac, Posed>;
-type Ends<'s, 't> = (TheBus<'s, 't>, Guard<'s, 't, u16, 512, 256, Posed>);
+type TheBus<'s, 't> = Bus<'s, 't, u16, AesCmac, PosedRows>;
+type Ends<'s, 't> = (TheBus<'s, 't>, Guard<'s, 't, u16, 512, 256, PosedRows>);
 
 fn heart() -> (BuiltTree, Vec<Vec3>) {
     let mesh = generate::heart(320).expect("a size").mesh;
@@ -30,7 +30,7 @@ fn heart() -> (BuiltTree, Vec<Vec3>) {
 }
 
 fn with_bus<T>(tree: &[u8], use_it: impl FnOnce(&mut TheBus<'_, '_>) -> T) -> T {
-    let surface: Surface<VERTICES, Posed> = Surface::new();
+    let surface: Surface<VERTICES, PosedRows> = Surface::new();
     let mac = AesCmac::new(&KEY, RECEIVER, CHALLENGE);
     let ends = surface.start_with_mac(TreeBytes::<u16>::new(tree), LIMITS, mac);
     let (mut bus, _): Ends<'_, '_> = ends.expect("valid");

@@ -10,7 +10,7 @@ use dibs_build::generate::MovingMesh;
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, generate};
 use dibs_nostd::glam::{Quat, Vec3};
-use dibs_nostd::guard::{Bus, Guard, GuardLimits, Posed, Surface};
+use dibs_nostd::guard::{Bus, Guard, GuardLimits, PosedRows, Surface};
 use dibs_nostd::modes::Modes;
 use dibs_nostd::wire::NoMac;
 use dibs_nostd::{
@@ -24,7 +24,7 @@ const VERTICES: usize = 162;
 const FRAMES: usize = 20;
 const PERIOD: u32 = 30;
 
-type Ends<'s, 't> = (Bus<'s, 't, u16, NoMac, Posed>, Guard<'s, 't, u16, 512, 256, Posed>);
+type Ends<'s, 't> = (Bus<'s, 't, u16, NoMac, PosedRows>, Guard<'s, 't, u16, 512, 256, PosedRows>);
 
 #[test]
 fn frames_of_weights_have_the_bits_of_the_modal_surface() {
@@ -37,7 +37,7 @@ fn frames_of_weights_have_the_bits_of_the_modal_surface() {
     let modes = Modes::of(&tree).expect("modes");
     let recorded = &built.modal_motion().expect("a motion").weights;
     let weights: Vec<&Vec<f32>> = recorded.iter().cycle().take(FRAMES).collect();
-    let surface: Surface<VERTICES, Posed> = Surface::new();
+    let surface: Surface<VERTICES, PosedRows> = Surface::new();
     let limits = GuardLimits::new(30_000.0, Millis(80)).automatic();
     let (mut bus, mut guard): Ends<'_, '_> =
         surface.start(TreeBytes::new(built.blob()), limits).expect("valid");

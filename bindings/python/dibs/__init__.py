@@ -11,11 +11,11 @@ Lengths are in millimetres, in the coordinates of the mesh's file. Wrong values 
 `TypeError`, each with one sentence; files and lines that fail raise `OSError`.
 """
 
-from ._filter import Admitted, Filter, RigidMotion, Tracked, Tracker, Uncertainty
+from ._filter import AdmittedMotion, Filter, RigidMotion, Tracker, TrackerAnswer, Uncertainty
 from ._guard import Answer, Guard, State
 from ._mesh import Mesh, MeshWarning, Reading, build, generate, read
 from ._motion import Motion, MotionStretch, read_motion
-from ._stream import Sender, Sent, Totals
+from ._stream import Sender, SentFrame, Totals
 from ._tools import capsules, spheres
 from ._tree import ANSWER, CONTACT, SIDE_REASONS, Contacts, Coverage, Scene, Side, Surface, Tree
 from ._wall import EnergyAccount, ForbiddenRegion, Force, ForceState, Proxy, Wrench
@@ -24,7 +24,7 @@ __all__ = [
     "ANSWER",
     "CONTACT",
     "SIDE_REASONS",
-    "Admitted",
+    "AdmittedMotion",
     "Answer",
     "Contacts",
     "Coverage",
@@ -43,13 +43,13 @@ __all__ = [
     "RigidMotion",
     "Scene",
     "Sender",
-    "Sent",
+    "SentFrame",
     "Side",
     "State",
     "Surface",
     "Totals",
-    "Tracked",
     "Tracker",
+    "TrackerAnswer",
     "Tree",
     "Uncertainty",
     "Wrench",

@@ -30,7 +30,7 @@ def contacts_of(native: tuple[bytearray, float, float]) -> Contacts:
     return Contacts(np.frombuffer(found, CONTACT), *single)
 
 
-class Tracked(Bound):
+class TrackerAnswer(Bound):
     """The answer of a tracker's tick."""
 
     closest: np.void
@@ -48,14 +48,14 @@ class Tracked(Bound):
 
     _instead = "send its `closest`"
 
-    def __init__(self, native: _dibs.Tracked, contacts: Optional[tuple[bytearray, float, float]]) -> None:
+    def __init__(self, native: _dibs.TrackerAnswer, contacts: Optional[tuple[bytearray, float, float]]) -> None:
         self._native = native
         self.closest = np.frombuffer(native.record(), ANSWER)[0]
         self.is_kept, self.fallback, self.moved = native.facts()
         self.contacts = None if contacts is None else contacts_of(contacts)
 
     def __repr__(self) -> str:
-        return f"Tracked({self.closest['separation']} mm)"
+        return f"TrackerAnswer({self.closest['separation']} mm)"
 
 
 class Tracker(Remade):
@@ -71,7 +71,7 @@ class Tracker(Remade):
         *,
         instructions: Optional[int] = None,
         margin: Optional[float] = None,
-    ) -> Tracked:
+    ) -> TrackerAnswer:
         """The closest pair of this tick, on the present surface.
 
         `tool` is x, y, z, radius of a sphere, or x1, y1, z1, x2, y2, z2, radius of a capsule. `instructions` limits the
@@ -82,7 +82,7 @@ class Tracker(Remade):
         numbers = tool_of(tool)
         margin = None if margin is None else _at_least("margin", margin, 0)
         budget = None if instructions is None else _whole("instructions", instructions)
-        return Tracked(*self._native.tick(_surface(surface)._native, numbers, budget, margin))
+        return TrackerAnswer(*self._native.tick(_surface(surface)._native, numbers, budget, margin))
 
 
 class RigidMotion(NamedTuple):
@@ -137,7 +137,7 @@ class Uncertainty(NamedTuple):
         return _at_least("tissue_speed", self.tissue_speed, 0), _at_least("error", self.error, 0)
 
 
-class Admitted(NamedTuple):
+class AdmittedMotion(NamedTuple):
     """The motion that a filter admits."""
 
     motion: RigidMotion
@@ -196,7 +196,7 @@ class Filter(Remade):
         tissue_speed: float = 0.0,
         error: float = 0.0,
         rows: Iterable[npt.ArrayLike] = (),
-    ) -> Admitted:
+    ) -> AdmittedMotion:
         """The motion to execute in the next `period` (s).
 
         `tools` are the capsules of one rigid instrument as they are now, up to 8, or one of them; a sphere is a capsule whose
@@ -251,10 +251,12 @@ def motion_of(command: Any) -> list[list[float]]:
     return [_vector(name, each).tolist() for name, each in zip(names, command)]
 
 
-def admitted_of(command: list[list[float]], native: tuple[list[float], list[float], float, Reason, int, int]) -> Admitted:
+def admitted_of(
+    command: list[list[float]], native: tuple[list[float], list[float], float, Reason, int, int]
+) -> AdmittedMotion:
     translation, rotation, least, reason, queries, instructions = native
     motion = RigidMotion(np.array(command[0]), np.array(translation), np.array(rotation))
-    return Admitted(motion, least, reason, queries, instructions)
+    return AdmittedMotion(motion, least, reason, queries, instructions)
 
 
 def _tree(tree: Any) -> Tree:

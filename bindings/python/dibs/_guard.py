@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arrays, _dibs
-from ._filter import Admitted, Filter, RigidMotion, _at_least, admitted_of, contacts_of, motion_of, tool_of
+from ._filter import AdmittedMotion, Filter, RigidMotion, _at_least, admitted_of, contacts_of, motion_of, tool_of
 from ._pickle import Bound, Remade
 from ._tree import ANSWER, Contacts, Tree, _tests
 
@@ -186,7 +186,7 @@ class Guard(Remade):
 
     def admit(
         self, filter: Filter, tool: npt.ArrayLike, command: RigidMotion, now: int
-    ) -> tuple[Answer, Optional[Admitted]]:
+    ) -> tuple[Answer, Optional[AdmittedMotion]]:
         """The answer of this tick, and the motion closest to `command` that keeps the tool out of the tissue until the
         next.
 

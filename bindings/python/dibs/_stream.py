@@ -15,7 +15,7 @@ _GLANCE = 0.002
 """Seconds between two polls while a frame is not yet due."""
 
 
-class Sent(NamedTuple):
+class SentFrame(NamedTuple):
     """A frame that was sent."""
 
     epoch: int
@@ -82,7 +82,7 @@ class Sender(Bound):
         *,
         age: Optional[float] = None,
         pose: Optional[tuple[npt.ArrayLike, npt.ArrayLike]] = None,
-    ) -> Sent:
+    ) -> SentFrame:
         """Sends a frame: positions of the mesh's vertices, captured `age` seconds ago.
 
         Without `age` a frame counts as captured now, unless it equals the last one in every bit. `pose` is as for
@@ -93,7 +93,7 @@ class Sender(Bound):
         if count is not None and len(points) != count:
             raise ValueError(f"positions: {len(points)} positions, and the mesh has {count} vertices")
         placed = None if pose is None else _arrays.pose(pose)
-        return Sent(*self._native.send(points.tobytes(), age, placed))
+        return SentFrame(*self._native.send(points.tobytes(), age, placed))
 
     def poll(self) -> None:
         """Sends a heartbeat if one is due, and receives the receiver's statuses. Does not block."""

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arrays, _dibs
-from ._filter import Tracked, _vector
+from ._filter import TrackerAnswer, _vector
 from ._guard import Answer
 from ._pickle import Remade
 
@@ -70,10 +70,10 @@ class ForbiddenRegion(Remade):
         spring = _spring(stiffness, damping, hold_damping, max_force)
         self._native = _dibs.ForbiddenRegion(spring, _arrays.number("margin", margin))
 
-    def force(self, answer: Union[Answer, Tracked], velocity: Optional[npt.ArrayLike] = None) -> Force:
+    def force(self, answer: Union[Answer, TrackerAnswer], velocity: Optional[npt.ArrayLike] = None) -> Force:
         """The force on the tool, at every tick. For a tracker's answer pass the `velocity` (mm/s) of the tool's point
         of the pair relative to the surface's; a guard's answer has it."""
-        if isinstance(answer, Tracked):
+        if isinstance(answer, TrackerAnswer):
             flow = _vector("velocity", _NONE if velocity is None else velocity).tolist()
             force, state, cause = self._native.force_of(answer._native, flow)
         elif isinstance(answer, Answer):
@@ -100,7 +100,7 @@ class Proxy(Remade):
 
     def force(
         self,
-        answer: Union[Answer, Tracked],
+        answer: Union[Answer, TrackerAnswer],
         origin: npt.ArrayLike,
         velocity: npt.ArrayLike = _NONE,
         angular: npt.ArrayLike = _NONE,
@@ -113,7 +113,7 @@ class Proxy(Remade):
         """
         names = ("origin", "velocity", "angular")
         twist = [_vector(name, value).tolist() for name, value in zip(names, (origin, velocity, angular))]
-        if isinstance(answer, Tracked):
+        if isinstance(answer, TrackerAnswer):
             found = self._native.force_of(answer._native, twist)
         elif isinstance(answer, Answer):
             found = self._native.force(answer._native, twist)

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use dibs_build::glam::{DVec3, Vec3};
 use dibs_nostd::failsafe::LimitError;
 use dibs_nostd::filter::FilterError;
-use dibs_nostd::guard::{Bus, GuardLimits, Notes, Posed, Rows, Vertices};
+use dibs_nostd::guard::{Bus, GuardLimits, Notes, PosedRows, Rows, Vertices};
 use dibs_nostd::modes::Modes;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::{Event, NoMac};
@@ -21,7 +21,7 @@ use pyo3::types::{PyByteArray, PyBytes};
 use crate::record::push_answer;
 use crate::surface::{Kept, List};
 use crate::tool::AnyTool;
-use crate::tracker::{Admitted, Filter, Listed, listed, motion, named, record};
+use crate::tracker::{AdmittedMotion, Filter, Listed, listed, motion, named, record};
 use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, error, invalid, pose};
 
@@ -58,11 +58,11 @@ impl Memory {
 /// The bus's end and the control tick's. Every frame may have a pose; frames without one behave bit for bit as if poses
 /// did not exist.
 struct Pair<'m, I: Index, R: Rows<Poses = ()>> {
-    bus: Bus<'m, 'm, I, NoMac, Posed<R>>,
-    guard: guard::Guard<'m, 'm, I, STACK, OPENED, Posed<R>, OPENED>,
+    bus: Bus<'m, 'm, I, NoMac, PosedRows<R>>,
+    guard: guard::Guard<'m, 'm, I, STACK, OPENED, PosedRows<R>, OPENED>,
 }
 
-type Poses = <Posed as Rows>::Poses;
+type Poses = <PosedRows as Rows>::Poses;
 
 impl<'m, I: Index, R: Rows<Poses = ()>> Pair<'m, I, R> {
     fn new(
@@ -74,7 +74,7 @@ impl<'m, I: Index, R: Rows<Poses = ()>> Pair<'m, I, R> {
             |number: usize| Buffer { head: &memory.heads[number], rows: &memory.rows[number] };
         let buffers = Buffers::new(&memory.state, [buffer(0), buffer(1)], Some(buffer(2)));
         let (writer, reader) = buffers.ends();
-        let (rows, bytes) = (Posed::<R>::of(tree)?, TreeBytes::new(memory.tree.bytes()));
+        let (rows, bytes) = (PosedRows::<R>::of(tree)?, TreeBytes::new(memory.tree.bytes()));
         let bus = Bus::new(&memory.notes, writer, (tree, bytes, &rows), limits, NoMac)?;
         let guard = guard::Guard::new(&memory.notes, reader, (tree, bytes, rows), limits)?;
         Ok(Box::new(Self { bus, guard }))
@@ -306,7 +306,7 @@ impl Guard {
         tool: &[u8],
         command: [[f64; 3]; 3],
         now: u32,
-    ) -> PyResult<(Answer, Option<Admitted>)> {
+    ) -> PyResult<(Answer, Option<AdmittedMotion>)> {
         let (origin, now) = (self.tree.origin, Millis(now));
         let tool = AnyTool::of(&bytes::doubles(tool), origin);
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;

@@ -38,7 +38,7 @@ mod _dibs {
     #[pymodule_export]
     use crate::surface::Surface;
     #[pymodule_export]
-    use crate::tracker::{Filter, Tracked, Tracker, after, stand_off};
+    use crate::tracker::{Filter, Tracker, TrackerAnswer, after, stand_off};
     #[pymodule_export]
     use crate::tree::Tree;
     #[pymodule_export]

@@ -10,7 +10,7 @@ use dibs_nostd::RigidPose;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{AesCmac, Content, Counters, Event, Mac};
 use dibs_stream::transport::{Line, Target, Transport};
-use dibs_stream::{self, SendError, Sent, Settings, SurfaceOrder, Totals};
+use dibs_stream::{self, SendError, SentFrame, Settings, SurfaceOrder, Totals};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -42,13 +42,13 @@ impl Transport for Outlet {
 
 /// A sender with any packet size.
 trait AnySender: Send {
-    fn send(&mut self, positions: &[Vec3], age: Option<Duration>) -> Result<Sent, SendError>;
+    fn send(&mut self, positions: &[Vec3], age: Option<Duration>) -> Result<SentFrame, SendError>;
     fn send_at(
         &mut self,
         positions: &[Vec3],
         pose: RigidPose,
         age: Duration,
-    ) -> Result<Sent, SendError>;
+    ) -> Result<SentFrame, SendError>;
     fn poll(&mut self) -> Result<(), SendError>;
     fn totals(&self) -> Totals;
     /// Whether frames can be sent.
@@ -61,7 +61,7 @@ trait AnySender: Send {
 }
 
 impl<const MTU: usize, M: Mac + Send> AnySender for dibs_stream::Sender<Outlet, MTU, M> {
-    fn send(&mut self, positions: &[Vec3], age: Option<Duration>) -> Result<Sent, SendError> {
+    fn send(&mut self, positions: &[Vec3], age: Option<Duration>) -> Result<SentFrame, SendError> {
         match age {
             Some(age) => self.send_captured(positions, age),
             None => self.send(positions),
@@ -73,7 +73,7 @@ impl<const MTU: usize, M: Mac + Send> AnySender for dibs_stream::Sender<Outlet, 
         positions: &[Vec3],
         pose: RigidPose,
         age: Duration,
-    ) -> Result<Sent, SendError> {
+    ) -> Result<SentFrame, SendError> {
         self.send_at(positions, pose, age)
     }
 
@@ -184,7 +184,7 @@ impl Sender {
                 }
             }
         });
-        let Sent { epoch, content, rows, packets, bytes, error } =
+        let SentFrame { epoch, content, rows, packets, bytes, error } =
             sent.map_err(|error| error::send(&error))?;
         let content = match content {
             Content::Partial { .. } => "partial",

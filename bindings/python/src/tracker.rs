@@ -4,10 +4,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use dibs_build::SurfaceRows;
 use dibs_build::glam::DVec3;
-use dibs_nostd::filter::{self, FilterError, Motion, MotionRow, Uncertainty};
+use dibs_nostd::filter::{self, FilterError, MotionRow, RigidMotion, Uncertainty};
 use dibs_nostd::{
     Budget, Capsule, Cost, Fallback, Index, Millis, MovingTable, Odometer, Options, Proximity,
-    TrackerAnswer,
 };
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -143,7 +142,7 @@ impl Tracker {
         tool: &[u8],
         instructions: Option<u32>,
         margin: Option<f32>,
-    ) -> PyResult<(Tracked, Option<Listed<'py>>)> {
+    ) -> PyResult<(TrackerAnswer, Option<Listed<'py>>)> {
         check(surface.get(), &self.tree)?;
         let tool = AnyTool::of(&bytes::doubles(tool), self.tree.origin);
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
@@ -178,26 +177,26 @@ impl Tracker {
         let found = found.map_err(invalid)?;
         let listed = margin.map(|_| listed(py, contacts, &self.tree));
         let kept = margin.map(|_| Box::new(contacts.without_search()));
-        Ok((Tracked { found, contacts: kept, tree: Arc::clone(&self.tree) }, listed))
+        Ok((TrackerAnswer { found, contacts: kept, tree: Arc::clone(&self.tree) }, listed))
     }
 }
 
 /// A tick's closest pair.
 #[pyclass(frozen, module = "dibs._dibs")]
-pub struct Tracked {
-    found: TrackerAnswer,
+pub struct TrackerAnswer {
+    found: dibs_nostd::TrackerAnswer,
     pub contacts: Option<Box<Kept>>,
     pub tree: Arc<Owned>,
 }
 
-impl Tracked {
+impl TrackerAnswer {
     pub const fn closest(&self) -> Proximity {
         self.found.closest
     }
 }
 
 #[pymethods]
-impl Tracked {
+impl TrackerAnswer {
     fn record<'py>(&self, py: Python<'py>) -> Bound<'py, PyByteArray> {
         let mut record = Vec::new();
         push_answer(&mut record, &self.found.closest, &self.tree, [0, 0]);
@@ -230,7 +229,7 @@ pub fn stand_off(speed: f32, error: f32, period: f32) -> f32 {
 }
 
 /// Translation and rotation, least separation, reason, queries, instructions.
-pub type Admitted = ([f32; 3], [f32; 3], f32, &'static str, u32, u32);
+pub type AdmittedMotion = ([f32; 3], [f32; 3], f32, &'static str, u32, u32);
 
 /// Most labels with a stand-off of their own.
 const LABELS: usize = <filter::Filter>::MOST_PAIRS - 1;
@@ -288,7 +287,7 @@ impl Filter {
         command: [[f64; 3]; 3],
         tissue: (f32, f32, f32),
         rows: Vec<[f32; 7]>,
-    ) -> PyResult<Admitted> {
+    ) -> PyResult<AdmittedMotion> {
         check(surface.get(), &self.tree)?;
         let origin = self.tree.origin;
         let numbers = bytes::doubles(tools);
@@ -336,13 +335,13 @@ impl Filter {
 }
 
 /// The motion of a reference point, a translation and a rotation.
-pub fn motion(command: [[f64; 3]; 3], origin: DVec3) -> Motion {
+pub fn motion(command: [[f64; 3]; 3], origin: DVec3) -> RigidMotion {
     let [about, translation, rotation] = command.map(DVec3::from);
-    Motion::new((about - origin).as_vec3(), translation.as_vec3(), rotation.as_vec3())
+    RigidMotion::new((about - origin).as_vec3(), translation.as_vec3(), rotation.as_vec3())
 }
 
 /// Converts an admitted motion for Python.
-pub fn record(admitted: filter::Admitted) -> Admitted {
+pub fn record(admitted: filter::AdmittedMotion) -> AdmittedMotion {
     (
         admitted.motion.translation.to_array(),
         admitted.motion.rotation.to_array(),

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::guard::Answer;
 use crate::surface::Kept;
-use crate::tracker::Tracked;
+use crate::tracker::TrackerAnswer;
 use crate::{error, invalid};
 
 /// Stiffness, damping, damping of the hold, and largest force.
@@ -37,7 +37,7 @@ impl ForbiddenRegion {
     }
 
     /// The same of a tracker's pair, for a velocity (mm/s) of the tool relative to the surface.
-    fn force_of(&self, tracked: &Tracked, velocity: [f32; 3]) -> Force {
+    fn force_of(&self, tracked: &TrackerAnswer, velocity: [f32; 3]) -> Force {
         force(self.0.force(&Ok(tracked.closest()), velocity.into()))
     }
 }
@@ -89,7 +89,7 @@ impl Proxy {
     }
 
     /// Of a tracker's contacts.
-    fn force_of(&self, tracked: &Tracked, twist: Twist) -> PyResult<Torqued> {
+    fn force_of(&self, tracked: &TrackerAnswer, twist: Twist) -> PyResult<Torqued> {
         self.wrench(tracked.contacts.as_deref(), None, tracked.tree.origin, twist)
     }
 }

@@ -6,7 +6,7 @@ use dibs_nostd::format::section;
 use super::emit::BuiltTree;
 use super::sections::append;
 use crate::error::BuildError;
-use crate::modes::{self, ModalFit, ModalMotion, ModesError};
+use crate::modes::{self, FitError, ModalFit, ModalMotion};
 
 impl BuiltTree {
     /// The same tree with the first `count` modes of a fitted motion: `dibs-nostd`'s `docs/format.md`, section 7.
@@ -17,18 +17,18 @@ impl BuiltTree {
     /// Cost: linear in modes, frames and vertices; seconds at most.
     ///
     /// # Errors
-    /// [`ModesError`] for a number of modes that the motion does not have, a fit on another mesh, or a tree without a
+    /// [`FitError`] for a number of modes that the motion does not have, a fit on another mesh, or a tree without a
     /// rest shape.
-    pub fn with_modes(&self, fit: &ModalFit, count: usize) -> Result<Self, ModesError> {
+    pub fn with_modes(&self, fit: &ModalFit, count: usize) -> Result<Self, FitError> {
         match self.index_bytes {
             2 => self.with_modes_in::<u16>(fit, count),
             _ => self.with_modes_in::<u32>(fit, count),
         }
     }
 
-    fn with_modes_in<I: Index>(&self, fit: &ModalFit, count: usize) -> Result<Self, ModesError> {
+    fn with_modes_in<I: Index>(&self, fit: &ModalFit, count: usize) -> Result<Self, FitError> {
         if self.motion.is_some() {
-            return Err(ModesError::OtherMesh);
+            return Err(FitError::OtherMesh);
         }
         let tree = self.tree::<I>().map_err(BuildError::from)?;
         let append = |content: &[u8]| append(&self.bytes, section::MODES, content);

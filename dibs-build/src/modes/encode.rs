@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::growth::Triangles;
 use super::quantise::{QuantisedMode, gain, quantise, unit};
-use super::{MARGIN, ModalFit, ModalMotion, ModesError, Projector};
+use super::{FitError, MARGIN, ModalFit, ModalMotion, Projector};
 use crate::BuildError;
 use crate::rounding::round_up;
 
@@ -19,22 +19,21 @@ pub(crate) fn encode<I: Index>(
     tree: &Tree<'_, I>,
     order: &[u32],
     append: impl Fn(&[u8]) -> Result<Vec<u8>, BuildError>,
-) -> Result<(Vec<u8>, ModalMotion), ModesError> {
+) -> Result<(Vec<u8>, ModalMotion), FitError> {
     let available = fit.available();
     if !(1..=MAX_MODES.min(available)).contains(&count) {
-        return Err(ModesError::Count { asked: count, available });
+        return Err(FitError::Count { asked: count, available });
     }
     let rest: Vec<Vec3> = (0..tree.vertex_count())
         .map(|row| tree.rest_position(row))
         .collect::<Option<_>>()
-        .ok_or(ModesError::NoRestShape)?;
+        .ok_or(FitError::NoRestShape)?;
     let is_same = |(row, vertex): (&Vec3, &u32)| fit.rest.get(*vertex as usize) == Some(row);
     if fit.rest.len() < order.len() || !rest.iter().zip(order).all(is_same) {
-        return Err(ModesError::OtherMesh);
+        return Err(FitError::OtherMesh);
     }
     let frames: Vec<Vec<Vec3>> = fit.frames.iter().map(|frame| to_rows(order, frame)).collect();
-    let quantised =
-        |mode: &Vec<DVec3>| quantise(&to_rows(order, mode)).ok_or(ModesError::Degenerate);
+    let quantised = |mode: &Vec<DVec3>| quantise(&to_rows(order, mode)).ok_or(FitError::Degenerate);
     let modes = fit.modes[..count].iter().map(quantised).collect::<Result<Vec<_>, _>>()?;
     let displacements: Vec<Vec<DVec3>> = modes.iter().map(QuantisedMode::displacements).collect();
 
@@ -43,7 +42,7 @@ pub(crate) fn encode<I: Index>(
         rest.iter().map(|p| p.as_dvec3()).collect(),
     )?;
     let weights: Vec<Vec<f32>> = frames.iter().map(|frame| projector.weights(frame)).collect();
-    let triangles = Triangles::new(tree).ok_or(ModesError::NoRestShape)?;
+    let triangles = Triangles::new(tree).ok_or(FitError::NoRestShape)?;
     let growths = displacements.iter().map(|d| triangles.growth(d)).collect();
     let mut section = Section::new(modes, growths, &weights);
     section.allow_for_rounding(&rest, &triangles);
@@ -76,12 +75,12 @@ struct Shapes<'a, I> {
 }
 
 impl<'a, I: Index> Shapes<'a, I> {
-    fn at(&self, weights: &[f32]) -> Result<ModalSurface<'a, MAX_MODES>, ModesError> {
-        self.modes.surface(weights).map_err(|_| ModesError::Degenerate)
+    fn at(&self, weights: &[f32]) -> Result<ModalSurface<'a, MAX_MODES>, FitError> {
+        self.modes.surface(weights).map_err(|_| FitError::Degenerate)
     }
 
     /// Largest distance and root mean square of the distances from the recorded frames.
-    fn errors(&self, weights: &[Vec<f32>], frames: &[Vec<Vec3>]) -> Result<(f32, f32), ModesError> {
+    fn errors(&self, weights: &[Vec<f32>], frames: &[Vec<Vec3>]) -> Result<(f32, f32), FitError> {
         let (mut largest, mut sum, mut points) = (0.0_f64, 0.0, 0_u64);
         for (weights, frame) in weights.iter().zip(frames) {
             let surface = self.at(weights)?;
@@ -96,7 +95,7 @@ impl<'a, I: Index> Shapes<'a, I> {
 
     /// The rest shape and the recorded frames within the limit, with their stretch, evenly sampled if there are too
     /// many; and the frames beyond the limit.
-    fn anchors(&self, recorded: &[Vec<f32>]) -> Result<(Vec<Anchor>, Vec<usize>), ModesError> {
+    fn anchors(&self, recorded: &[Vec<f32>]) -> Result<(Vec<Anchor>, Vec<usize>), FitError> {
         let anchor = |weights: &[f32]| match measure_stretch(&self.tree, &self.at(weights)?) {
             Ok(measured) => Ok(Some(Anchor {
                 weights: weights.to_vec(),
@@ -104,7 +103,7 @@ impl<'a, I: Index> Shapes<'a, I> {
                 triangle: measured.triangle().0,
             })),
             Err(StretchError::Exceeded { .. }) => Ok(None),
-            Err(error) => Err(ModesError::Stretch(error)),
+            Err(error) => Err(FitError::Stretch(error)),
         };
         let every = recorded.len().div_ceil(MAX_ANCHORS - 1);
         let mut anchors: Vec<Anchor> =

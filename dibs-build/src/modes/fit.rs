@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
-use super::{MAX_FRAMES, ModalError, ModesError};
+use super::{FitError, MAX_FRAMES, ModalError};
 use crate::{Mesh, Motion};
 
 /// A direction with less than this fraction of the motion's energy counts as rounding: a millionth of the motion's
@@ -45,16 +45,16 @@ impl ModalFit {
     /// problem of size `f`.
     ///
     /// # Errors
-    /// [`ModesError`] for a motion that does not fit the mesh, has no frame, too many of them or a
+    /// [`FitError`] for a motion that does not fit the mesh, has no frame, too many of them or a
     /// coordinate that is not finite, or does not move.
-    pub fn new(mesh: &Mesh, motion: &Motion) -> Result<Self, ModesError> {
+    pub fn new(mesh: &Mesh, motion: &Motion) -> Result<Self, FitError> {
         motion.check_fits(mesh)?;
         if !(1..=MAX_FRAMES).contains(&motion.frames.len()) {
-            return Err(ModesError::Frames { frames: motion.frames.len() });
+            return Err(FitError::Frames { frames: motion.frames.len() });
         }
         for (frame, positions) in motion.frames.iter().enumerate() {
             if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
-                return Err(ModesError::Coordinate { frame, vertex });
+                return Err(FitError::Coordinate { frame, vertex });
             }
         }
         let displacements: Vec<Vec<DVec3>> = motion
@@ -67,7 +67,7 @@ impl ModalFit {
             .collect();
         let modes = decompose(&displacements);
         if modes.is_empty() {
-            return Err(ModesError::Still);
+            return Err(FitError::Still);
         }
         let errors = errors(displacements, &modes);
         let (rest, frames) = (mesh.positions.clone(), motion.frames.clone());

@@ -49,7 +49,7 @@ pub const MARGIN: f32 = 0.25;
 /// Why modes cannot be fitted to a motion or added to a tree.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum ModesError {
+pub enum FitError {
     /// The motion does not fit the mesh.
     #[error(transparent)]
     Mismatch(#[from] MotionMismatchError),

@@ -4,7 +4,7 @@ use dibs_nostd::modes::Modes;
 use glam::{DVec3, Vec3};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::ModesError;
+use super::FitError;
 
 /// Finds the weights of the modal surface nearest to given positions, by least squares over all vertices.
 ///
@@ -34,8 +34,8 @@ impl Projector {
     /// A projector for the modes of a tree.
     ///
     /// # Errors
-    /// [`ModesError::Degenerate`] if one mode is a combination of others.
-    pub fn new(modes: &Modes<'_>) -> Result<Self, ModesError> {
+    /// [`FitError::Degenerate`] if one mode is a combination of others.
+    pub fn new(modes: &Modes<'_>) -> Result<Self, FitError> {
         let rows = 0..modes.vertex_count();
         let displacements = |mode| {
             let step = f64::from(modes.step(mode).unwrap_or_default());
@@ -52,9 +52,9 @@ impl Projector {
     pub(super) fn from_displacements(
         modes: Vec<Vec<DVec3>>,
         rest: Vec<DVec3>,
-    ) -> Result<Self, ModesError> {
+    ) -> Result<Self, FitError> {
         let products = DMatrix::from_fn(modes.len(), modes.len(), |i, j| dot(&modes[i], &modes[j]));
-        let normal = Cholesky::new(products).ok_or(ModesError::Degenerate)?;
+        let normal = Cholesky::new(products).ok_or(FitError::Degenerate)?;
         Ok(Self { modes, rest, normal })
     }
 

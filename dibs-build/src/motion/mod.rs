@@ -6,7 +6,7 @@ mod series;
 
 pub use pc2::MotionMismatchError;
 
-use crate::read::{FileCoordinates, ReadError, ReadErrorKind, Wanted, file};
+use crate::read::{FileCoordinates, ReadError, ReadErrorKind, ReadTarget, file};
 use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ impl Motion {
         unit: impl Into<Option<Unit>>,
         origin: DVec3,
     ) -> Result<Self, ReadError> {
-        Self::read_of(path.as_ref(), Wanted::Surface, unit.into(), origin)
+        Self::read_of(path.as_ref(), ReadTarget::Surface, unit.into(), origin)
     }
 
     /// As [`read_around`](Self::read_around), for a motion of a [volume](crate::Volume)'s nodes: an error in a file of a
@@ -54,12 +54,12 @@ impl Motion {
         unit: impl Into<Option<Unit>>,
         origin: DVec3,
     ) -> Result<Self, ReadError> {
-        Self::read_of(path.as_ref(), Wanted::Volume, unit.into(), origin)
+        Self::read_of(path.as_ref(), ReadTarget::Volume, unit.into(), origin)
     }
 
     fn read_of(
         path: &Path,
-        wanted: Wanted,
+        wanted: ReadTarget,
         unit: Option<Unit>,
         origin: DVec3,
     ) -> Result<Self, ReadError> {

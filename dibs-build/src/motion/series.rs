@@ -1,6 +1,6 @@
 //! A numbered series of mesh files, each a frame: `heart_%03d.vtp`.
 
-use crate::read::{self, ReadError, ReadErrorKind, Wanted};
+use crate::read::{self, ReadError, ReadErrorKind, ReadTarget};
 use crate::{Motion, Unit};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ impl<'a> Series<'a> {
 
     pub fn read(
         &self,
-        wanted: Wanted,
+        wanted: ReadTarget,
         unit: Option<Unit>,
         origin: DVec3,
     ) -> Result<Motion, ReadError> {
@@ -87,7 +87,7 @@ impl<'a> Series<'a> {
 /// Reads the positions in a file. Faces that differ from the first file's are an error.
 fn frame(
     path: &Path,
-    wanted: Wanted,
+    wanted: ReadTarget,
     number: u64,
     of_first: &mut Option<Vec<Vec<u32>>>,
     unit: Option<Unit>,

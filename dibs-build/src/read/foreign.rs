@@ -1,6 +1,6 @@
 //! Files of kinds that are not read: each with its name, and the command that converts it.
 
-use super::{ReadErrorKind, Wanted};
+use super::{ReadErrorKind, ReadTarget};
 use std::path::Path;
 
 /// How to convert a file to a mesh that can be read.
@@ -65,7 +65,7 @@ const ELEMENTS: &[(&[u8], &str, Remedy)] = &[
 const BEGINNING: usize = 1024;
 
 /// The error for a file of a kind that is known but not read.
-pub(super) fn named(bytes: &[u8], path: &Path, wanted: Wanted) -> Option<ReadErrorKind> {
+pub(super) fn named(bytes: &[u8], path: &Path, wanted: ReadTarget) -> Option<ReadErrorKind> {
     let starts = |at: usize, mark: &[u8]| {
         let found = bytes.get(at..).and_then(|bytes| bytes.get(..mark.len()));
         found.is_some_and(|found| found.eq_ignore_ascii_case(mark))
@@ -83,8 +83,8 @@ pub(super) fn named(bytes: &[u8], path: &Path, wanted: Wanted) -> Option<ReadErr
 }
 
 impl Remedy {
-    fn text(&self, path: &Path, wanted: Wanted) -> String {
-        let is_volume = wanted == Wanted::Volume;
+    fn text(&self, path: &Path, wanted: ReadTarget) -> String {
+        let is_volume = wanted == ReadTarget::Volume;
         let old = path.display();
         let new = path.with_extension(if is_volume { "vtu" } else { "ply" });
         let new = new.display();

@@ -8,7 +8,7 @@ use super::groups::FaceGroups;
 use super::raw::{Raw, excerpt};
 use super::scalar::{Endian, Scalar};
 use super::volume::{Shape, Volumes};
-use super::{Format, ReadErrorKind, Wanted};
+use super::{Format, ReadErrorKind, ReadTarget};
 use std::collections::HashMap;
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
@@ -22,8 +22,8 @@ enum Version {
     Four,
 }
 
-pub(super) fn read(bytes: &[u8], wanted: Wanted) -> Result<Raw> {
-    let groups = wanted == Wanted::Groups;
+pub(super) fn read(bytes: &[u8], wanted: ReadTarget) -> Result<Raw> {
+    let groups = wanted == ReadTarget::Groups;
     let mut file = Cursor::new(bytes, Format::Gmsh);
     let version = header(&mut file)?;
     let mut mesh = Mesh { wanted, ..Mesh::default() };
@@ -106,14 +106,14 @@ fn header(file: &mut Cursor<'_>) -> Result<Version> {
 }
 
 /// The remedy for curved elements.
-fn flatten(wanted: Wanted) -> String {
-    let dimension = if wanted == Wanted::Volume { 3 } else { 2 };
+fn flatten(wanted: ReadTarget) -> String {
+    let dimension = if wanted == ReadTarget::Volume { 3 } else { 2 };
     format!("mesh it again with flat elements: `gmsh MODEL.geo -{dimension} -order 1 -o NEW.msh`")
 }
 
 #[derive(Default)]
 struct Mesh {
-    wanted: Wanted,
+    wanted: ReadTarget,
     raw: Raw,
     /// The row of each node by its number.
     row: HashMap<u64, u32>,
@@ -340,7 +340,7 @@ fn skip_line(file: &mut Cursor<'_>) {
 }
 
 /// The number of nodes of an element of this type.
-fn nodes_of(kind: u64, wanted: Wanted) -> Result<u64> {
+fn nodes_of(kind: u64, wanted: ReadTarget) -> Result<u64> {
     let curved = match kind {
         15 => return Ok(1),
         1 => return Ok(2),

@@ -137,7 +137,7 @@ impl ReadOptions {
 
     fn read_bytes(&self, bytes: Vec<u8>, path: &Path) -> Result<Import, ReadErrorKind> {
         self.check_options()?;
-        let wanted = if self.groups { Wanted::Groups } else { Wanted::Surface };
+        let wanted = if self.groups { ReadTarget::Groups } else { ReadTarget::Surface };
         let (format, raw) = elements(bytes, path, wanted)?;
         let mut import = self.import(format, raw)?;
         let extension = path.extension().and_then(|extension| extension.to_str());
@@ -202,7 +202,7 @@ impl ReadOptions {
 
 /// What is read from a file: the remedies in errors depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Wanted {
+pub(crate) enum ReadTarget {
     #[default]
     Surface,
     /// A surface, and the groups of its faces.
@@ -234,7 +234,7 @@ pub(crate) fn unit_of(
 /// [`ReadErrorKind::UnnumberedFrame`] for STL, whose vertices may be numbered otherwise than the tree's.
 pub(crate) fn frame(
     path: &Path,
-    wanted: Wanted,
+    wanted: ReadTarget,
     number: usize,
     unit: Option<Unit>,
     origin: DVec3,
@@ -253,7 +253,7 @@ pub(crate) fn volume(
     path: &Path,
     unit: Option<Unit>,
 ) -> Result<(Vec<DVec3>, Vec<[u32; 4]>), ReadErrorKind> {
-    let (format, raw) = elements(file::whole(path)?, path, Wanted::Volume)?;
+    let (format, raw) = elements(file::whole(path)?, path, ReadTarget::Volume)?;
     if raw.other_cells > 0 || raw.tetrahedra.is_empty() {
         let (tetrahedra, others) = (raw.tetrahedra.len(), raw.other_cells);
         return Err(ReadErrorKind::NoVolume { format, tetrahedra, others });
@@ -267,13 +267,13 @@ pub(crate) fn volume(
 pub(crate) fn elements(
     bytes: Vec<u8>,
     path: &Path,
-    wanted: Wanted,
+    wanted: ReadTarget,
 ) -> Result<(Format, Raw), ReadErrorKind> {
     // A binary STL may begin with any bytes.
     let bytes = if stl::size_fits_count(&bytes) { bytes } else { text::normal(bytes) };
     let format = sniff::format(&bytes, path, wanted)?;
     let raw = match format {
-        Format::Obj => obj::read(&bytes, wanted == Wanted::Groups),
+        Format::Obj => obj::read(&bytes, wanted == ReadTarget::Groups),
         Format::StlAscii => stl::read_ascii(&bytes),
         Format::StlBinary => stl::read_binary(&bytes),
         Format::Ply => ply::read(bytes),

@@ -43,7 +43,7 @@ impl Format {
     /// [`ReadErrorKind::Foreign`] for a known kind of file that is not read, otherwise
     /// [`ReadErrorKind::UnknownFormat`].
     pub fn of(bytes: &[u8], path: impl AsRef<Path>) -> Result<Self, ReadErrorKind> {
-        super::sniff::format(bytes, path.as_ref(), super::Wanted::Surface)
+        super::sniff::format(bytes, path.as_ref(), super::ReadTarget::Surface)
     }
 
     /// Whether an extension, in any case, is one of the format's.

@@ -2,10 +2,14 @@
 
 use super::raw::{coordinate, lines};
 use super::text::trimmed;
-use super::{Format, ReadErrorKind, Wanted, foreign, off, stl};
+use super::{Format, ReadErrorKind, ReadTarget, foreign, off, stl};
 use std::path::Path;
 
-pub(super) fn format(bytes: &[u8], path: &Path, wanted: Wanted) -> Result<Format, ReadErrorKind> {
+pub(super) fn format(
+    bytes: &[u8],
+    path: &Path,
+    wanted: ReadTarget,
+) -> Result<Format, ReadErrorKind> {
     if bytes.is_empty() {
         return Err(ReadErrorKind::Empty);
     }

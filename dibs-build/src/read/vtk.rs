@@ -7,13 +7,13 @@
 use super::cursor::Cursor;
 use super::raw::{Raw, excerpt};
 use super::scalar::{Endian, Scalar};
-use super::vtk_cells::{Labelled, clamped, not_a_surface, split};
+use super::vtk_cells::{LabelledFaces, clamped, not_a_surface, split};
 use super::vtk_data::{self, field, skip_metadata};
-use super::{Format, ReadErrorKind, Wanted};
+use super::{Format, ReadErrorKind, ReadTarget};
 
 type Result<T> = std::result::Result<T, ReadErrorKind>;
 
-pub(super) fn read(bytes: &[u8], wanted: Wanted) -> Result<Raw> {
+pub(super) fn read(bytes: &[u8], wanted: ReadTarget) -> Result<Raw> {
     let mut file = Cursor::new(bytes, Format::Vtk);
     let version = file.line();
     if !version.to_ascii_lowercase().starts_with("# vtk datafile") {
@@ -64,7 +64,7 @@ pub(super) fn read(bytes: &[u8], wanted: Wanted) -> Result<Raw> {
             "METADATA" => skip_metadata(&mut file),
             "FIELD" => drop(field(&mut file, |_| false)?),
             // Data at points and cells follow the surface.
-            "POINT_DATA" | "CELL_DATA" if wanted == Wanted::Groups => {
+            "POINT_DATA" | "CELL_DATA" if wanted == ReadTarget::Groups => {
                 labels = vtk_data::labels(&mut file, &keyword)?;
                 break;
             }
@@ -77,7 +77,7 @@ pub(super) fn read(bytes: &[u8], wanted: Wanted) -> Result<Raw> {
         return Err(file.malformed(format!("{cells} cells and {types} cell types")));
     }
     let malformed = |what| file.malformed(what);
-    let mut labelled = Labelled::of(wanted);
+    let mut labelled = LabelledFaces::of(wanted);
     labelled.raw = raw;
     labelled.begin(labels);
     labelled.skip(lines);

@@ -2,12 +2,12 @@
 
 use super::raw::{Raw, excerpt};
 use super::volume::{Shape, Volumes};
-use super::{ReadErrorKind, Wanted};
+use super::{ReadErrorKind, ReadTarget};
 
 /// The remedy for curved cells.
-const fn flatten(wanted: Wanted) -> &'static str {
+const fn flatten(wanted: ReadTarget) -> &'static str {
     match wanted {
-        Wanted::Volume => {
+        ReadTarget::Volume => {
             "save it with linear tetrahedra: in ParaView, the filter Tetrahedralize and then Save Data"
         }
         _ => {
@@ -41,9 +41,9 @@ pub(super) fn clamped(point: u64) -> u32 {
 
 /// Faces, with a label for each cell if there are labels.
 #[derive(Default)]
-pub(super) struct Labelled {
+pub(super) struct LabelledFaces {
     pub raw: Raw,
-    pub wanted: Wanted,
+    pub wanted: ReadTarget,
     /// A label for each cell of the piece.
     labels: Option<Vec<f64>>,
     /// Cells of the piece so far.
@@ -53,8 +53,8 @@ pub(super) struct Labelled {
     volumes: Volumes,
 }
 
-impl Labelled {
-    pub fn of(wanted: Wanted) -> Self {
+impl LabelledFaces {
+    pub fn of(wanted: ReadTarget) -> Self {
         Self { wanted, ..Self::default() }
     }
 
@@ -199,7 +199,7 @@ impl Labelled {
     }
 }
 
-pub(super) fn not_a_surface(kind: &str, wanted: Wanted) -> ReadErrorKind {
+pub(super) fn not_a_surface(kind: &str, wanted: ReadTarget) -> ReadErrorKind {
     let names_others = kind.starts_with('P') && kind != "PolyData" && kind.len() > 1
         || ["MultiBlock", "Collection", "Partitioned", "Composite", "AMR"]
             .iter()
@@ -213,7 +213,7 @@ pub(super) fn not_a_surface(kind: &str, wanted: Wanted) -> ReadErrorKind {
         };
     }
     let (what, remedy) = match wanted {
-        Wanted::Volume => ("tetrahedra", flatten(wanted)),
+        ReadTarget::Volume => ("tetrahedra", flatten(wanted)),
         _ => (
             "surface",
             "save it as PolyData: in ParaView, the filter Extract Surface and then Save Data",

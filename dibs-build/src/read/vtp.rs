@@ -5,8 +5,8 @@
 use super::groups::is_name;
 use super::raw::{Raw, coordinate, excerpt};
 use super::scalar::{Endian, Scalar, index};
-use super::vtk_cells::{Labelled, not_a_surface, split};
-use super::{Format, ReadErrorKind, Wanted, base64, inflate};
+use super::vtk_cells::{LabelledFaces, not_a_surface, split};
+use super::{Format, ReadErrorKind, ReadTarget, base64, inflate};
 use flate2::read::ZlibDecoder;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -17,11 +17,11 @@ type Result<T> = std::result::Result<T, ReadErrorKind>;
 /// The element whose content may not be XML.
 const APPENDED: &[u8] = b"<AppendedData";
 
-pub(super) fn read(bytes: &[u8], wanted: Wanted) -> Result<Raw> {
+pub(super) fn read(bytes: &[u8], wanted: ReadTarget) -> Result<Raw> {
     let end = bytes.windows(APPENDED.len()).position(|window| window == APPENDED);
     let (head, appended) = bytes.split_at(end.unwrap_or(bytes.len()));
     let head = String::from_utf8_lossy(head);
-    let mut file = File { appended, surface: Labelled::of(wanted), ..File::default() };
+    let mut file = File { appended, surface: LabelledFaces::of(wanted), ..File::default() };
     let mut xml = Reader::from_str(&head);
     // Only the end of the document is cut off.
     xml.config_mut().check_end_names = false;
@@ -95,7 +95,7 @@ struct File<'a> {
     /// The piece's number of points, as stated.
     points: Option<usize>,
     labels: Option<Vec<f64>>,
-    surface: Labelled,
+    surface: LabelledFaces,
     is_complete: bool,
 }
 
@@ -175,7 +175,7 @@ impl File<'_> {
             "Polys" | "Strips" | "Cells" => {
                 matches!(name, "connectivity" | "offsets" | "types")
             }
-            "CellData" => self.surface.wanted == Wanted::Groups && is_name(name),
+            "CellData" => self.surface.wanted == ReadTarget::Groups && is_name(name),
             _ => false,
         }
     }
@@ -201,7 +201,7 @@ impl File<'_> {
             return Err(ReadErrorKind::Foreign {
                 what: "a VTK grid of volume cells in several pieces".to_owned(),
                 remedy: match self.surface.wanted {
-                    Wanted::Volume => {
+                    ReadTarget::Volume => {
                         "join them: in ParaView, the filter Merge Blocks and then Save Data"
                     }
                     _ => "save its skin: in ParaView, the filters Merge Blocks and Extract Surface",

@@ -97,7 +97,7 @@ pub fn write_limits(
     limits: &[f32],
     comment: &str,
 ) -> Result<(), WriteError> {
-    Limited::triangles(mesh).write(path.as_ref(), limits, comment)
+    LimitedElements::triangles(mesh).write(path.as_ref(), limits, comment)
 }
 
 /// Reads the limits of a mesh's triangles.
@@ -105,7 +105,7 @@ pub fn write_limits(
 /// # Errors
 /// [`LimitsError`] names the file and its defect, such as limits of another mesh.
 pub fn read_limits(path: impl AsRef<Path>, mesh: &Mesh) -> Result<Vec<f32>, LimitsError> {
-    Limited::triangles(mesh).read(path.as_ref())
+    LimitedElements::triangles(mesh).read(path.as_ref())
 }
 
 impl Volume {
@@ -122,7 +122,7 @@ impl Volume {
         limits: &[f32],
         comment: &str,
     ) -> Result<(), WriteError> {
-        Limited::tetrahedra(self).write(path.as_ref(), limits, comment)
+        LimitedElements::tetrahedra(self).write(path.as_ref(), limits, comment)
     }
 
     /// Reads the limits of the volume's tetrahedra.
@@ -130,18 +130,18 @@ impl Volume {
     /// # Errors
     /// [`LimitsError`] names the file and its defect, such as limits of another volume.
     pub fn read_limits(&self, path: impl AsRef<Path>) -> Result<Vec<f32>, LimitsError> {
-        Limited::tetrahedra(self).read(path.as_ref())
+        LimitedElements::tetrahedra(self).read(path.as_ref())
     }
 }
 
 /// The mesh or volume whose limits a file holds.
-struct Limited {
+struct LimitedElements {
     elements: &'static str,
     count: usize,
     checksum: u32,
 }
 
-impl Limited {
+impl LimitedElements {
     fn triangles(mesh: &Mesh) -> Self {
         let mut digest = CRC.digest();
         mesh.positions
@@ -187,7 +187,7 @@ impl Limited {
     }
 }
 
-fn parse(text: &str, of: &Limited) -> Result<Vec<f32>, LimitsErrorKind> {
+fn parse(text: &str, of: &LimitedElements) -> Result<Vec<f32>, LimitsErrorKind> {
     let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()));
     let mut lines = lines.filter(|(_, line)| !line.starts_with('#') && !line.is_empty());
     let mut field = |name: &str| {

@@ -33,14 +33,14 @@ use crate::{FrameError, Mesh, Motion, Paths};
 /// ```
 #[derive(Clone, Debug)]
 pub struct MotionStretch {
-    triangles: Vec<Needed>,
+    triangles: Vec<PeakStretch>,
     /// The factor by which the controller may overestimate each triangle's stretch.
     rounding: Vec<f64>,
 }
 
 /// The largest stretch of a triangle in a motion.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Needed {
+pub struct PeakStretch {
     /// The triangle of the mesh.
     pub triangle: usize,
     /// Its largest stretch.
@@ -52,14 +52,14 @@ pub struct Needed {
 /// A triangle that a motion stretches beyond its limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Beyond {
+pub struct LimitExcess {
     /// The triangle and its stretch.
-    pub needed: Needed,
+    pub needed: PeakStretch,
     /// Its limit.
     pub limit: f32,
 }
 
-impl Beyond {
+impl LimitExcess {
     /// The stretch over the limit.
     fn share(&self) -> f64 {
         self.needed.stretch / f64::from(self.limit)
@@ -91,7 +91,7 @@ impl MotionStretch {
         Ok(Self::of_elements(mesh.triangles.len(), rounding, motion, progress, stretch))
     }
 
-    /// The same for the tetrahedra of a volume whose nodes move: [`Needed::triangle`] is then a tetrahedron.
+    /// The same for the tetrahedra of a volume whose nodes move: [`PeakStretch::triangle`] is then a tetrahedron.
     ///
     /// # Errors
     /// [`MotionMismatchError`] where a frame does not fit the nodes, or turns a tetrahedron inside out, which no limit
@@ -135,12 +135,12 @@ impl MotionStretch {
     ) -> Self {
         let done = std::sync::atomic::AtomicUsize::new(0);
         let needed = |triangle: usize| {
-            let mut worst = Needed { triangle, stretch: 0.0, frame: 0 };
+            let mut worst = PeakStretch { triangle, stretch: 0.0, frame: 0 };
             for (frame, positions) in motion.frames.iter().enumerate() {
                 let stretch = stretch(triangle, positions);
                 // Written so that the NaN of a triangle without area is kept.
                 if !(stretch <= worst.stretch) {
-                    worst = Needed { stretch, frame, ..worst };
+                    worst = PeakStretch { stretch, frame, ..worst };
                 }
             }
             let count = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
@@ -154,13 +154,13 @@ impl MotionStretch {
 
     /// The largest stretch of each triangle of the mesh.
     #[must_use]
-    pub fn triangles(&self) -> &[Needed] {
+    pub fn triangles(&self) -> &[PeakStretch] {
         &self.triangles
     }
 
     /// The triangles, most stretched first.
     #[must_use]
-    pub fn ranked(&self) -> Vec<Needed> {
+    pub fn ranked(&self) -> Vec<PeakStretch> {
         let mut ranked = self.triangles.clone();
         ranked.sort_by(|a, b| b.stretch.total_cmp(&a.stretch));
         ranked
@@ -171,7 +171,7 @@ impl MotionStretch {
     /// # Panics
     /// If the mesh has no triangle.
     #[must_use]
-    pub fn worst(&self) -> Needed {
+    pub fn worst(&self) -> PeakStretch {
         self.ranked()[0]
     }
 
@@ -182,7 +182,7 @@ impl MotionStretch {
     pub fn limits(&self, margin: f32) -> Vec<f32> {
         // No frame is known that `SHARED` alone refuses: 400,000 pairs of flat triangles reached 0.00056. The proven
         // bound on the two roundings of such a pair is 0.00085, so both factors are applied.
-        let limit = |(needed, rounding): (&Needed, &f64)| {
+        let limit = |(needed, rounding): (&PeakStretch, &f64)| {
             round_up(needed.stretch.max(1.0) * (1.0 + f64::from(margin)) * SHARED * rounding)
         };
         self.triangles.iter().zip(&self.rounding).map(limit).collect()
@@ -193,13 +193,13 @@ impl MotionStretch {
     /// # Panics
     /// If the number of limits differs from the number of triangles.
     #[must_use]
-    pub fn beyond(&self, limits: &[f32]) -> Option<Beyond> {
+    pub fn beyond(&self, limits: &[f32]) -> Option<LimitExcess> {
         assert_eq!(limits.len(), self.triangles.len(), "a limit for each triangle");
         // The builder raises limits to the least that the controller can tell from the rest shape.
         let limits =
             limits.iter().zip(&self.rounding).map(|(&limit, &least)| limit.max(round_up(least)));
         let all = self.triangles.iter().zip(limits);
-        let all = all.map(|(&needed, limit)| Beyond { needed, limit });
+        let all = all.map(|(&needed, limit)| LimitExcess { needed, limit });
         let worst = all.max_by(|a, b| a.share().total_cmp(&b.share()))?;
         // NaN counts as beyond.
         if worst.share() <= 1.0 { None } else { Some(worst) }

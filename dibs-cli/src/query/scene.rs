@@ -85,7 +85,7 @@ impl<'a> Surface<'a> {
         Ok(Self { name: name.to_owned(), tree, rows, stretch, options: Options::cold() })
     }
 
-    fn ask(&self, tool: &ToolSpec, margin: Option<f32>, room: &mut Room) -> Result<Found> {
+    fn ask(&self, tool: &ToolSpec, margin: Option<f32>, room: &mut Room) -> Result<ToolResult> {
         let tool = tool.local(self.tree.origin());
         tool.and_then(|tool| match &self.tree {
             AnyTree::Narrow(tree) => self.ask_tree(tree, tool, margin, room),
@@ -100,7 +100,7 @@ impl<'a> Surface<'a> {
         tool: LocalTool,
         margin: Option<f32>,
         room: &mut Room,
-    ) -> Result<Found> {
+    ) -> Result<ToolResult> {
         let mut found = match tool {
             LocalTool::Sphere(sphere) => self.closest(tree, &sphere, margin, room)?,
             LocalTool::Capsule(capsule) => self.closest(tree, &capsule, margin, room)?,
@@ -122,16 +122,20 @@ impl<'a> Surface<'a> {
         tool: &impl Tool,
         margin: Option<f32>,
         room: &mut Room,
-    ) -> Result<Found> {
+    ) -> Result<ToolResult> {
         let positions = &self.rows;
         let mut query = Query::<I, STACK>::new(tree)?;
         let Some(margin) = margin else {
-            return Ok(Found::new(query.closest(positions, tool, &self.options)?));
+            return Ok(ToolResult::new(query.closest(positions, tool, &self.options)?));
         };
         let contacts = room.list();
         let closest = query.contacts(positions, tool, margin, &self.options, contacts)?;
         let bound = contacts.bound();
-        Ok(Found { contacts: contacts.iter().copied().collect(), bound, ..Found::new(closest) })
+        Ok(ToolResult {
+            contacts: contacts.iter().copied().collect(),
+            bound,
+            ..ToolResult::new(closest)
+        })
     }
 }
 
@@ -154,7 +158,7 @@ impl Room {
 }
 
 /// The result for one tool and one surface.
-struct Found {
+struct ToolResult {
     proximity: Proximity,
     /// Corners of its triangle, numbered as in the mesh file.
     triangle: [u32; 3],
@@ -165,7 +169,7 @@ struct Found {
     bound: f32,
 }
 
-impl Found {
+impl ToolResult {
     fn new(proximity: Proximity) -> Self {
         let (contacts, triangles) = (Vec::new(), Vec::new());
         Self { proximity, triangle: [0; 3], contacts, triangles, bound: f32::INFINITY }

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 const FIRST_GAP: Duration = Duration::from_millis(33);
 
 /// A frame of a source that fits the tree.
-pub struct Parsed {
+pub struct ParsedFrame {
     /// In the mesh's order.
     pub positions: Vec<Vec3>,
     /// The rigid pose of the whole surface, if the source has one.
@@ -26,7 +26,7 @@ pub struct Parsed {
 
 /// A frame of a live source.
 pub struct Frame {
-    pub parsed: Parsed,
+    pub parsed: ParsedFrame,
     /// Time since the previous frame.
     pub gap: Duration,
 }
@@ -41,10 +41,10 @@ pub enum Next {
 }
 
 /// A live source.
-pub struct Live(Arc<Shared>);
+pub struct Live(Arc<SharedSlot>);
 
 #[derive(Default)]
-struct Shared {
+struct SharedSlot {
     place: Mutex<Slot>,
     changed: Condvar,
 }
@@ -62,10 +62,10 @@ impl Live {
     /// Starts to read frames from `next`, which returns `None` at the end. With `keeps_all` a frame waits until the
     /// previous one is taken; otherwise it replaces it.
     pub fn start(
-        next: impl FnMut() -> Result<Option<Parsed>> + Send + 'static,
+        next: impl FnMut() -> Result<Option<ParsedFrame>> + Send + 'static,
         keeps_all: bool,
     ) -> Self {
-        let shared = Arc::new(Shared::default());
+        let shared = Arc::new(SharedSlot::default());
         let filled = Arc::clone(&shared);
         // This thread may wait for input for ever, so the program does not wait for it.
         thread::spawn(move || filled.fill(next, keeps_all));
@@ -97,12 +97,12 @@ impl Live {
     }
 }
 
-impl Shared {
+impl SharedSlot {
     fn place(&self) -> MutexGuard<'_, Slot> {
         self.place.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn fill(&self, mut next: impl FnMut() -> Result<Option<Parsed>>, keeps_all: bool) {
+    fn fill(&self, mut next: impl FnMut() -> Result<Option<ParsedFrame>>, keeps_all: bool) {
         let mut last: Option<Instant> = None;
         let end = loop {
             let parsed = match next() {

@@ -24,7 +24,7 @@ use dibs_build::{Builder, Import, ReadOptions};
 use dibs_nostd::wire::AesCmac;
 use dibs_stream::transport::Target;
 use dibs_stream::{Sender, Settings, SurfaceOrder};
-use igtl::{Address, Exchange, Igtl, Tracked};
+use igtl::{Address, Exchange, Igtl, TrackedTool};
 use interrupt::Interrupt;
 use live::Live;
 use memory::Memory;
@@ -266,7 +266,7 @@ fn live(
             let patience = Duration::from_secs(args.retry);
             let tool = args.tool.zip(args.tool_device.clone()).map(|(tool, device)| {
                 let most = Duration::from_millis(args.tool_age);
-                Tracked::new(tool, device, most, (tree, &args.tree))
+                TrackedTool::new(tool, device, most, (tree, &args.tree))
             });
             let (tool, counts) = (tool.transpose()?, Arc::clone(&exchange));
             let mut igtl = Igtl::new(address, devices, tool, patience, place, counts)?;

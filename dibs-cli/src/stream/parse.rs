@@ -1,7 +1,7 @@
 //! Frames from a stream of bytes: raw numbers, or JSON lines.
 
 use super::coordinates::SourceCoordinates;
-use super::live::Parsed;
+use super::live::ParsedFrame;
 use super::part::Part;
 use anyhow::{Result, anyhow, bail};
 use dibs_build::glam::Vec3;
@@ -40,7 +40,7 @@ pub struct Parser<R> {
 }
 
 /// Positions in the source's unit, and their stated age.
-type Unplaced = (Vec<[f64; 3]>, Option<Duration>);
+type RawFrame = (Vec<[f64; 3]>, Option<Duration>);
 
 /// JavaScript writes a coordinate that is not finite as `null`.
 type Point = [Option<f64>; 3];
@@ -65,7 +65,7 @@ impl<R: Read> Parser<R> {
     }
 
     /// The next frame; `None` at the end.
-    pub fn next(&mut self) -> Result<Option<Parsed>> {
+    pub fn next(&mut self) -> Result<Option<ParsedFrame>> {
         let (number, name) = (self.number, self.name.clone());
         let read = match self.format {
             Format::Raw => self.raw(),
@@ -89,10 +89,10 @@ impl<R: Read> Parser<R> {
             let part = Part { value: positions.clone(), time: 0.0, came, delay: Duration::ZERO };
             Part::replace(&mut self.last, part).age(came)
         };
-        Ok(Some(Parsed { positions, pose: None, came, age }))
+        Ok(Some(ParsedFrame { positions, pose: None, came, age }))
     }
 
-    fn raw(&mut self) -> Result<Option<Unplaced>> {
+    fn raw(&mut self) -> Result<Option<RawFrame>> {
         let count = self.place.order.positions();
         let size = RAW * count;
         let mut bytes = Vec::with_capacity(size);
@@ -116,7 +116,7 @@ impl<R: Read> Parser<R> {
         Ok((!points.is_empty()).then_some((points, None)))
     }
 
-    fn json(&mut self) -> Result<Option<Unplaced>> {
+    fn json(&mut self) -> Result<Option<RawFrame>> {
         let most = (MOST_JSON * (self.place.order.positions() + 16)) as u64;
         let mut line = Vec::new();
         while line.trim_ascii().is_empty() {

@@ -1,8 +1,8 @@
 //! Sends a motion to a receiver: a recording at its rate, live frames as they arrive.
 
-use super::igtl::{Exchange, Sent};
+use super::igtl::{Exchange, SentSurface};
 use super::interrupt::Interrupt;
-use super::live::{Frame, Next, Parsed};
+use super::live::{Frame, Next, ParsedFrame};
 use super::report::{self, Display, Outcome};
 use super::timing::Timing;
 use super::{Args, Frames, Source};
@@ -205,7 +205,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
         };
         while !self.interrupt.is_raised() {
             match live.next(GLANCE)? {
-                Next::Frame(Frame { parsed: Parsed { positions, pose, came, age }, gap }) => {
+                Next::Frame(Frame { parsed: ParsedFrame { positions, pose, came, age }, gap }) => {
                     *due = came.max(*due);
                     self.outcome.passed_over = live.passed_over();
                     let rows = Rows::Positions(Cow::Owned(positions), pose);
@@ -252,7 +252,7 @@ impl<'a, const MTU: usize, M: Mac> Player<'a, MTU, M> {
             && self.args.tool.is_some()
         {
             let (positions, ago) = (positions.to_vec(), frame.ago);
-            exchange.keep(Sent { positions, pose: *pose, at, ago });
+            exchange.keep(SentSurface { positions, pose: *pose, at, ago });
         }
         match sent {
             Ok(sent) => {

@@ -4,7 +4,7 @@ use super::igtl::{Exchange, Report};
 use super::timing::Timing;
 use dibs_nostd::wire::{Content, Counters, Event, Mac};
 use dibs_stream::transport::Line;
-use dibs_stream::{Sender, Sent};
+use dibs_stream::{Sender, SentFrame};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Write;
 use std::io::IsTerminal;
@@ -42,7 +42,11 @@ impl Display {
         Self { bar, last: Instant::now() }
     }
 
-    pub fn show<M: Mac, const MTU: usize>(&mut self, sender: &Sender<Line, MTU, M>, sent: &Sent) {
+    pub fn show<M: Mac, const MTU: usize>(
+        &mut self,
+        sender: &Sender<Line, MTU, M>,
+        sent: &SentFrame,
+    ) {
         let pause = Duration::from_millis(if std::io::stderr().is_terminal() { 100 } else { 1000 });
         if self.last.elapsed() < pause {
             return;
@@ -81,13 +85,13 @@ impl Display {
     }
 }
 
-fn line<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>, sent: &Sent) -> String {
+fn line<M: Mac, const MTU: usize>(sender: &Sender<Line, MTU, M>, sent: &SentFrame) -> String {
     let kind = match sent.content {
         Content::Whole => "whole, of vertices:",
         Content::Modal => "modal, of weights:",
         _ => "partial, of vertices:",
     };
-    let Sent { epoch, bytes, rows, .. } = sent;
+    let SentFrame { epoch, bytes, rows, .. } = sent;
     let mut text = format!("frame {epoch}: {bytes} bytes, {kind} {rows}");
     text += "; ";
     text += &receiver(sender).map_or("no status from the receiver yet".to_owned(), |it| it.text);

@@ -27,7 +27,7 @@ pub struct Answer {
     /// The health of the bus.
     pub link: Link,
     /// The surface that was searched; `None` before the first frame.
-    pub searched: Option<Searched>,
+    pub searched: Option<SearchedSurface>,
     /// The answer on that surface, even if the surface is not trusted.
     pub tracked: Result<TrackerAnswer, Unavailable>,
 }
@@ -37,7 +37,7 @@ pub struct Answer {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
-pub struct Searched {
+pub struct SearchedSurface {
     /// The last published frame, and its age.
     pub frame: FrameAge,
     /// Epoch of the previous frame; the last frame's own if the surface is held.

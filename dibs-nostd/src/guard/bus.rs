@@ -5,7 +5,7 @@
 use glam::{Quat, Vec3};
 
 use super::surface::Notes;
-use super::{GuardLimits, Posed, Rows, Vertices};
+use super::{GuardLimits, PosedRows, Rows, Vertices};
 #[cfg(feature = "modes")]
 use crate::modes::{MAX_MODES, ModalSurface, Modes, WeightsError};
 use crate::surface::FrameView;
@@ -282,7 +282,7 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
     }
 }
 
-impl<I: Index, M: Mac, R: Rows<Poses = ()>> Bus<'_, '_, I, M, Posed<R>> {
+impl<I: Index, M: Mac, R: Rows<Poses = ()>> Bus<'_, '_, I, M, PosedRows<R>> {
     /// As [`frame`](Self::frame), with a pose of the whole mesh: a position `p` is at `rotation p + shift`. A frame
     /// without a pose is in the coordinates of the mesh's file.
     ///

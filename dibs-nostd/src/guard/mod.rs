@@ -45,15 +45,15 @@ mod rows;
 mod surface;
 mod tick;
 
-pub use answer::{Answer, Searched};
+pub use answer::{Answer, SearchedSurface};
 pub use bus::Bus;
 pub use limits::GuardLimits;
-pub use posed::Posed;
+pub use posed::PosedRows;
 /// For the model checker and the fault matrix. They may change with any version.
 #[doc(hidden)]
 pub use poses::Poses;
 #[doc(hidden)]
-pub use rows::Shared;
+pub use rows::SharedState;
 /// The kinds of rows, for [`Bus`], [`Guard`] and [`Surface`].
 #[doc(hidden)]
 pub use rows::{Rows, Vertices};

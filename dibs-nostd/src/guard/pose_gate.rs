@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::poses::Poses;
 use crate::math::sqrt::sqrt;
-use crate::stretch::{Admission, Compared, FrameExtent, Gate, IncomingSurface, StretchError};
+use crate::stretch::{Admission, Comparison, FrameExtent, Gate, IncomingSurface, StretchError};
 use crate::surface::{MotionUnit, PoseStep};
 use crate::tree::SurfaceFacts;
 use crate::{Millis, RigidPose, VertexTable};
@@ -82,7 +82,7 @@ impl<'s, G> PoseGate<'s, G> {
 
     /// The largest distance (mm) of a vertex from the extrapolation of the two previous poses. It uses the fraction of
     /// a step that the rows' extrapolation added, and grows like it; NaN if the rows were not extrapolated.
-    fn shown(&self, compared: &Compared) -> f32 {
+    fn residual(&self, compared: &Comparison) -> f32 {
         let (Some(before), Some(last)) = (&self.before, &self.last) else { return f32::NAN };
         PoseStep::between(before, last, self.centre).map_or(f32::NAN, |step| {
             let off = step.beyond(compared.t).step(&self.pose, self.centre, self.lever());
@@ -94,7 +94,7 @@ impl<'s, G> PoseGate<'s, G> {
 impl<G: Gate> PoseGate<'_, G> {
     /// A vertex moves by at most its row's step in the mesh plus the step of the pose, turned and shifted, at its
     /// current position.
-    fn check_speed(&self, compared: &Compared, elapsed: Millis) -> Result<(), StretchError> {
+    fn check_speed(&self, compared: &Comparison, elapsed: Millis) -> Result<(), StretchError> {
         let Some(last) = &self.last else { return Ok(()) };
         let limit = self.rows.farthest(elapsed) * self.amplification;
         let own = sqrt(compared.largest) * self.amplification;
@@ -145,12 +145,12 @@ impl<G: Gate> Gate for PoseGate<'_, G> {
             return Ok(Admission::Pending);
         }
         // A registration is not compared with an earlier frame.
-        let mut shown = f32::NAN;
+        let mut residual = f32::NAN;
         if let (Some((_, elapsed)), Some(compared)) = (before, &compared) {
             self.check_speed(compared, elapsed)?;
-            shown = self.shown(compared);
+            residual = self.residual(compared);
         }
-        self.poses.set(self.buffer, &self.pose, shown);
+        self.poses.set(self.buffer, &self.pose, residual);
         Ok(admission)
     }
 
@@ -186,7 +186,7 @@ mod tests {
     use glam::Quat;
 
     use super::*;
-    use crate::guard::Shared;
+    use crate::guard::SharedState;
 
     /// Admits rows without work, up to this distance (mm).
     struct AtOnce(f32);
@@ -218,7 +218,7 @@ mod tests {
         gate.published();
         gate.begin(FrameExtent::Whole);
         gate.place(RigidPose::new(Quat::from_rotation_z(0.1), Vec3::ZERO).expect("a rotation"));
-        let compared = Some(Compared { largest: 0.0, rows: [0, 0], t: f32::NAN });
+        let compared = Some(Comparison { largest: 0.0, rows: [0, 0], t: f32::NAN });
         let before = Some((rows, Millis(30)));
         let mut verdicts = (1..=rows.len()).map(|slices| {
             let next = IncomingSurface { before, compared, ..IncomingSurface::new(rows, count) };

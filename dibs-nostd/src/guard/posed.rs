@@ -9,8 +9,8 @@ use glam::Vec3;
 use super::pose_gate::PoseGate;
 use super::poses::Poses;
 use super::rows::{Blend, Rows, sealed};
-use super::{Searched, Vertices};
-use crate::filter::{Admitted, Filter, Motion, Reason};
+use super::{SearchedSurface, Vertices};
+use crate::filter::{AdmittedMotion, Filter, Reason, RigidMotion};
 use crate::math::sqrt::sqrt;
 use crate::surface::{PoseStep, grown};
 use crate::tree::VertexOrder;
@@ -35,12 +35,12 @@ use crate::{
 /// ```
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::{Advance, Millis, Sphere, TreeBytes, glam::{Quat, Vec3}};
-/// use dibs_nostd::guard::{GuardLimits, Posed, Surface};
+/// use dibs_nostd::guard::{GuardLimits, PosedRows, Surface};
 ///
 /// # let heart = generate::heart(320)?.mesh;
 /// # let built = Builder::new().stretch(1.5).build(&heart)?;
 /// # let tree = TreeBytes::<u16>::new(built.blob());
-/// static HEART: Surface<162, Posed> = Surface::new();
+/// static HEART: Surface<162, PosedRows> = Surface::new();
 /// let (mut bus, mut guard) = HEART.start::<_, 32, 64>(tree, GuardLimits::new(300.0, Millis(80)))?;
 ///
 /// // The patient lies 500 mm away.
@@ -52,21 +52,21 @@ use crate::{
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Posed<R = Vertices>(PhantomData<R>);
+pub struct PosedRows<R = Vertices>(PhantomData<R>);
 
-impl<R: Rows<Poses = ()>> sealed::Sealed for Posed<R> {}
+impl<R: Rows<Poses = ()>> sealed::Sealed for PosedRows<R> {}
 
 /// The facts of a tree about rows with poses.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
-pub struct PosedOf<T> {
+pub struct PosedFacts<T> {
     of: T,
     /// The centre of the rest shape, about which the mesh turns between frames.
     centre: Vec3,
 }
 
-impl<R: Rows<Poses = ()>> Rows for Posed<R> {
-    type Of<'t> = PosedOf<R::Of<'t>>;
+impl<R: Rows<Poses = ()>> Rows for PosedRows<R> {
+    type Of<'t> = PosedFacts<R::Of<'t>>;
     type Gate<'s, 't, I: Index> = PoseGate<'s, R::Gate<'s, 't, I>>;
     type Surface<'f> = R::Surface<'f>;
     type Room<'f> = R::Room<'f>;
@@ -79,7 +79,7 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
             rest.map(|at| (at, at)).reduce(|(low, high), (at, _)| (low.min(at), high.max(at)));
         // Any centre is valid: the farther it is from the mesh, the looser the bound on the motion of a turn.
         let centre = corners.map_or(Vec3::ZERO, |(low, high)| (low + high) * 0.5);
-        Ok(PosedOf { of, centre })
+        Ok(PosedFacts { of, centre })
     }
 
     fn count<I: Index>(tree: &Tree<'_, I>, of: &Self::Of<'_>) -> u32 {
@@ -134,14 +134,14 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
         poses: &Poses,
         published: &FrameGuard<'_>,
         rows: &Blend<'_>,
-    ) -> Option<Placed> {
+    ) -> Option<TickPose> {
         // Frames that never had a pose are treated exactly as rows alone, to the bit.
         if poses.are_none(published) {
             return None;
         }
         Some(match poses.step(published, of.centre) {
-            Some((step, shown)) => Placed::moving(step, shown, rows),
-            None => Placed::at(poses.last(published)),
+            Some((step, residual)) => TickPose::moving(step, residual, rows),
+            None => TickPose::at(poses.last(published)),
         })
     }
 }
@@ -149,27 +149,27 @@ impl<R: Rows<Poses = ()>> Rows for Posed<R> {
 /// The pose of the surface at a tick.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
-pub struct Placed {
+pub struct TickPose {
     pose: RigidPose,
     /// The step that continues, the fraction of it beyond the last frame, and steps per second.
     step: Option<(PoseStep, f32, f32)>,
     /// The error of the extrapolation (mm), and the residual from which it grows.
     error: f32,
-    shown: f32,
+    residual: f32,
 }
 
-impl Placed {
+impl TickPose {
     const fn at(pose: RigidPose) -> Self {
-        Self { pose, step: None, error: 0.0, shown: 0.0 }
+        Self { pose, step: None, error: 0.0, residual: 0.0 }
     }
 
-    fn moving(step: PoseStep, shown: f32, rows: &Blend<'_>) -> Self {
+    fn moving(step: PoseStep, residual: f32, rows: &Blend<'_>) -> Self {
         let part = rows.t() - 1.0;
         Self {
             pose: step.beyond(part),
             step: Some((step, part, rows.rate())),
-            error: grown(shown, part),
-            shown,
+            error: grown(residual, part),
+            residual,
         }
     }
 
@@ -220,7 +220,7 @@ impl Placed {
     pub(super) fn error_of_motion<T: Tool, const LABELS: usize>(
         &self,
         tool: &T,
-        motion: &Motion,
+        motion: &RigidMotion,
         (filter, period): (&Filter<LABELS>, f32),
     ) -> f32 {
         let (shift, turn) = filter.most(tool, motion, period);
@@ -241,11 +241,11 @@ impl Placed {
         &self,
         tool: &impl Tool,
         tracked: Result<TrackerAnswer, QueryError>,
-        mut searched: Searched,
-    ) -> (Option<Searched>, Result<TrackerAnswer, Unavailable>) {
+        mut searched: SearchedSurface,
+    ) -> (Option<SearchedSurface>, Result<TrackerAnswer, Unavailable>) {
         let error = self.error(tool);
         searched.position_error += error;
-        searched.residual = searched.residual.map(|shown| shown + self.shown);
+        searched.residual = searched.residual.map(|residual| residual + self.residual);
         searched.velocity = self.pose.rotate(searched.velocity);
         let tracked = tracked.map(|answer| {
             let closest = answer.closest;
@@ -288,8 +288,8 @@ impl Placed {
     }
 
     /// The motion in mesh coordinates.
-    pub(super) fn motion(&self, motion: &Motion) -> Motion {
-        Motion {
+    pub(super) fn motion(&self, motion: &RigidMotion) -> RigidMotion {
+        RigidMotion {
             about: self.pose.apply_inverse(motion.about),
             translation: self.pose.rotate_inverse(motion.translation),
             rotation: self.pose.rotate_inverse(motion.rotation),
@@ -297,16 +297,20 @@ impl Placed {
     }
 
     /// The admitted motion in world coordinates; the command itself if that was admitted.
-    pub(super) fn admitted(&self, admitted: Admitted, command: &Motion) -> Admitted {
+    pub(super) fn admitted(
+        &self,
+        admitted: AdmittedMotion,
+        command: &RigidMotion,
+    ) -> AdmittedMotion {
         let motion = match admitted.reason {
             Reason::Commanded => *command,
-            _ => Motion {
+            _ => RigidMotion {
                 about: command.about,
                 translation: self.pose.rotate(admitted.motion.translation),
                 rotation: self.pose.rotate(admitted.motion.rotation),
             },
         };
-        Admitted { motion, ..admitted }
+        AdmittedMotion { motion, ..admitted }
     }
 }
 

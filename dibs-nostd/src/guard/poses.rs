@@ -7,7 +7,7 @@
 
 use glam::{Quat, Vec3};
 
-use super::rows::Shared;
+use super::rows::SharedState;
 use crate::surface::PoseStep;
 use crate::surface::{AtomicU32, Ordering};
 use crate::{FrameGuard, RigidPose};
@@ -18,13 +18,13 @@ use crate::{FrameGuard, RigidPose};
 pub struct Poses([[AtomicU32; 8]; 3]);
 
 #[cfg(not(loom))]
-impl Shared for Poses {
+impl SharedState for Poses {
     const NEW: Self = Self([const { [const { AtomicU32::new(0) }; 8] }; 3]);
 }
 
 /// For a model checker, whose atomics are no constants.
 #[cfg(loom)]
-impl Shared for Poses {
+impl SharedState for Poses {
     fn new() -> Self {
         use core::array::from_fn;
         Self(from_fn(|_| from_fn(|_| AtomicU32::new(0))))
@@ -33,10 +33,10 @@ impl Shared for Poses {
 
 impl Poses {
     /// Stores the pose of the buffer with this number.
-    pub fn set(&self, buffer: u32, pose: &RigidPose, shown: f32) {
+    pub fn set(&self, buffer: u32, pose: &RigidPose, residual: f32) {
         let ([x, y, z, w], [a, b, c]) = (pose.rotation().to_array(), pose.shift().to_array());
         let Some(words) = self.0.get(buffer as usize) else { return };
-        for (word, value) in words.iter().zip([x, y, z, w, a, b, c, shown]) {
+        for (word, value) in words.iter().zip([x, y, z, w, a, b, c, residual]) {
             word.store(value.to_bits(), Ordering::Relaxed);
         }
     }
@@ -55,11 +55,11 @@ impl Poses {
 
     /// The step to extrapolate, and the larger residual of the last two frames; `None` if there is no extrapolation.
     pub(super) fn step(&self, published: &FrameGuard<'_>, centre: Vec3) -> Option<(PoseStep, f32)> {
-        let [(before, earlier), (last, shown)] = self.of_frames(published);
+        let [(before, earlier), (last, residual)] = self.of_frames(published);
         let step = PoseStep::between(&before, &last, centre)?;
         // A single small residual may be by chance. False for NaN.
-        let shown = if earlier > shown { earlier } else { shown };
-        (shown >= 0.0).then_some((step, shown))
+        let residual = if earlier > residual { earlier } else { residual };
+        (residual >= 0.0).then_some((step, residual))
     }
 
     /// The poses of the previous frame and of the published one.
@@ -70,9 +70,9 @@ impl Poses {
             let Some(words) = self.0.get(buffer as usize) else {
                 return (RigidPose::IDENTITY, f32::NAN);
             };
-            let [x, y, z, w, a, b, c, shown] =
+            let [x, y, z, w, a, b, c, residual] =
                 words.each_ref().map(|word| f32::from_bits(word.load(Ordering::Relaxed)));
-            (RigidPose::kept(Quat::from_xyzw(x, y, z, w), Vec3::new(a, b, c)), shown)
+            (RigidPose::kept(Quat::from_xyzw(x, y, z, w), Vec3::new(a, b, c)), residual)
         })
     }
 }

@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use super::posed::Placed;
+use super::posed::TickPose;
 use crate::surface::FrameView;
 use crate::tree::VertexOrder;
 use crate::{
@@ -27,7 +27,7 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     /// Memory for the surface, if the rows are not the surface.
     type Room<'f>: Default;
     /// Data of frames besides their rows that the two ends share.
-    type Poses: Shared;
+    type Poses: SharedState;
 
     /// Reads a tree.
     #[doc(hidden)]
@@ -75,7 +75,7 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
         _: &Self::Poses,
         _: &FrameGuard<'_>,
         _: &Blend<'_>,
-    ) -> Option<Placed> {
+    ) -> Option<TickPose> {
         None
     }
 
@@ -94,7 +94,7 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
 
 /// Data of frames besides their rows that the two ends share.
 #[doc(hidden)]
-pub trait Shared: core::fmt::Debug + 'static {
+pub trait SharedState: core::fmt::Debug + 'static {
     /// Before the first frame.
     #[cfg(not(loom))]
     const NEW: Self;
@@ -104,7 +104,7 @@ pub trait Shared: core::fmt::Debug + 'static {
     fn new() -> Self;
 }
 
-impl Shared for () {
+impl SharedState for () {
     #[cfg(not(loom))]
     const NEW: Self = ();
 

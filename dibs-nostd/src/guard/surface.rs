@@ -5,7 +5,7 @@
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::rows::Shared;
+use super::rows::SharedState;
 use super::{Bus, Guard, GuardLimits, Rows, Vertices};
 use crate::failsafe::{LinkStatus, State};
 use crate::wire::{Mac, NoMac};
@@ -111,7 +111,7 @@ pub struct Notes<P = ()> {
     pub(super) poses: P,
 }
 
-impl<P: Shared> Notes<P> {
+impl<P: SharedState> Notes<P> {
     /// Before the first frame.
     #[cfg(not(loom))]
     #[expect(clippy::new_without_default, reason = "as its surface")]

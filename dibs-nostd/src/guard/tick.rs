@@ -4,12 +4,12 @@
 
 use glam::Vec3;
 
-use super::posed::Placed;
+use super::posed::TickPose;
 use super::rows::Blend;
 use super::surface::{Common, Notes};
-use super::{Answer, GuardLimits, Rows, Searched, Vertices};
+use super::{Answer, GuardLimits, Rows, SearchedSurface, Vertices};
 use crate::failsafe::{AcknowledgeError, FailSafe, Observation, State, Verdict};
-use crate::filter::{Admitted, Filter, FilterError, Motion, Uncertainty};
+use crate::filter::{AdmittedMotion, Filter, FilterError, RigidMotion, Uncertainty};
 use crate::math::round::sum_up;
 use crate::{
     Contacts, Error, FrameAge, FrameReader, Index, Millis, Options, QueryError, Tool, Tracker,
@@ -174,9 +174,9 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         &mut self,
         filter: &Filter<LABELS>,
         tool: &T,
-        command: &Motion,
+        command: &RigidMotion,
         now: Millis,
-    ) -> (Answer, Result<Admitted, FilterError>) {
+    ) -> (Answer, Result<AdmittedMotion, FilterError>) {
         let (period, speed) = (1.0 / self.rate, self.speed * 1_000.0);
         let (answer, admitted) = self.on_latest(
             tool,
@@ -227,7 +227,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
         then: impl FnOnce(
             &mut Tracker<'t, I, STACK, OPENED, RANGE>,
             &R::Surface<'_>,
-            Option<&Placed>,
+            Option<&TickPose>,
             &Verdict,
         ) -> A,
     ) -> (Answer, Option<A>) {
@@ -257,7 +257,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
                 let notes = &notes.of_all;
                 let flow = SurfaceFlow { rows, blend, placed, frame, failsafe, notes, now };
                 let tracked = search(tracker, surface, own, &flow, options);
-                let searched = Searched {
+                let searched = SearchedSurface {
                     frame,
                     before: blend.before().epoch().unwrap_or(frame.epoch),
                     t: blend.t(),
@@ -329,7 +329,7 @@ impl<'s, 't, I: Index, const STACK: usize, const OPENED: usize, R: Rows, const R
 struct SurfaceFlow<'a, 'f, 't, R: Rows> {
     rows: &'f R::Of<'t>,
     blend: &'f Blend<'f>,
-    placed: Option<&'a Placed>,
+    placed: Option<&'a TickPose>,
     frame: FrameAge,
     failsafe: &'a FailSafe,
     notes: &'a Common,
@@ -349,14 +349,14 @@ impl<R: Rows> SurfaceFlow<'_, '_, '_, R> {
 }
 
 /// The frame, the searched surface, and the pair on it.
-type Found = (Option<FrameAge>, Option<Searched>, Result<TrackerAnswer, Unavailable>);
+type TickResult = (Option<FrameAge>, Option<SearchedSurface>, Result<TrackerAnswer, Unavailable>);
 
 /// The tick's answer, by the trust in the searched surface.
 fn judge(
     notes: &Common,
     failsafe: &mut FailSafe,
     is_tree_corrupt: bool,
-    (frame, searched, tracked): Found,
+    (frame, searched, tracked): TickResult,
     velocity: Vec3,
     now: Millis,
 ) -> Answer {

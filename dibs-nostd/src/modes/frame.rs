@@ -57,7 +57,7 @@ pub(super) struct WeightStep<const K: usize> {
     pub units: u64,
     units_ahead: u64,
     /// Distances of the previous frame and of this one from their extrapolations; NaN if unknown.
-    shown: [f32; 2],
+    residuals: [f32; 2],
     /// The second of them in units.
     ahead: PredictionCheck,
 }
@@ -90,14 +90,15 @@ impl<const K: usize> WeightStep<K> {
             modes.motion.units_of(reach.between(&other.surface(modes), &surface))
         };
         let (step, units_ahead) = (units(before), units(&end));
-        let (mut shown, mut ahead) = ([f32::NAN; 2], PredictionCheck::UNKNOWN);
+        let (mut residuals, mut ahead) = ([f32::NAN; 2], PredictionCheck::UNKNOWN);
         if let Some(last) = last {
             let t = last.ahead(interval);
             let expected = before.towards(&last.end, t, modes);
             // For a velocity that changes at a constant rate, one time of this step later.
             let longer = 2.0 * interval.0 as f32 / (interval.0 as f32 + last.interval.0 as f32);
             let longer = if longer > 1.0 { longer } else { 1.0 };
-            shown = [last.shown[1], reach.between(&expected.surface(modes), &surface) * longer];
+            residuals =
+                [last.residuals[1], reach.between(&expected.surface(modes), &surface) * longer];
             // Weights and `t` are rounded by a few times 2^-24.
             let rounding = (units(&rest) + step + last.units_ahead) / (1 << 20);
             // At the end, where the error has tripled, the surface differs from its prediction by the whole clipped
@@ -110,7 +111,7 @@ impl<const K: usize> WeightStep<K> {
             }
         }
         let (before, units) = (*before, step);
-        Self { before, end, interval, from, units, units_ahead, shown, ahead }
+        Self { before, end, interval, from, units, units_ahead, residuals, ahead }
     }
 
     /// The `t` of the blend with the end, at this age.
@@ -133,8 +134,8 @@ pub struct ModalFrame<'a, const K: usize> {
     /// Age of the frame when it was read.
     age: Millis,
     is_frame: bool,
-    shown: f32,
-    /// The part of `shown` included in its error so far.
+    residual: f32,
+    /// The part of `residual` included in its error so far.
     own_error: f32,
     lag: Millis,
 }
@@ -150,9 +151,9 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         age: Millis,
     ) -> Self {
         let surface = weights.surface(modes);
-        let (is_frame, shown, own_error) = (true, f32::NAN, 0.0);
+        let (is_frame, residual, own_error) = (true, f32::NAN, 0.0);
         let (weights, lag) = (*weights, age);
-        Self { surface, label, weights, motion, step, age, is_frame, shown, own_error, lag }
+        Self { surface, label, weights, motion, step, age, is_frame, residual, own_error, lag }
     }
 
     /// The facts about this frame; for a surface between frames, about the later one. Its position error is that of the
@@ -189,7 +190,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         let modes = self.surface.modes();
         let is_within = |end: MeasuredStretch| end.sigma() <= modes.stretch_limit();
         // False for NaN: the error is not known before the third frame.
-        let is_known = step.shown[1] >= 0.0;
+        let is_known = step.residuals[1] >= 0.0;
         if !is_known || !step.end.stretch.is_some_and(is_within) {
             return *self;
         }
@@ -199,11 +200,11 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         let motion = motion.beside((t * step.units_ahead as f32) as u64);
         let motion = motion.map(|motion| motion.on(prediction));
         // A single small residual may be by chance. False for NaN.
-        let [before, now] = step.shown;
-        let shown = if before > now { before } else { now };
+        let [before, now] = step.residuals;
+        let residual = if before > now { before } else { now };
         let end = Millis((step.interval.0 as f32 * FARTHEST) as u32);
         let lag = Millis(self.age.0.saturating_sub(end.0));
-        self.moved(weights, motion, (shown, grown(shown, t * FARTHEST)), lag)
+        self.moved(weights, motion, (residual, grown(residual, t * FARTHEST)), lag)
     }
 
     /// A bound (mm) on the distance of the last frame's vertices from its extrapolation by the two previous frames; the
@@ -212,7 +213,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
     /// not extrapolated.
     #[must_use]
     pub fn residual(&self) -> Option<f32> {
-        (self.shown >= 0.0).then_some(self.shown)
+        (self.residual >= 0.0).then_some(self.residual)
     }
 
     /// How far this surface is behind the present: see [`SurfaceBlend::lag`](crate::SurfaceBlend::lag).
@@ -225,12 +226,12 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         &self,
         weights: Weights<K>,
         motion: Option<MotionReading>,
-        (shown, own_error): (f32, f32),
+        (residual, own_error): (f32, f32),
         lag: Millis,
     ) -> Self {
         let surface = weights.surface(self.surface.modes());
         let (step, is_frame) = (None, false);
-        Self { surface, weights, motion, step, shown, own_error, lag, is_frame, ..*self }
+        Self { surface, weights, motion, step, residual, own_error, lag, is_frame, ..*self }
     }
 }
 

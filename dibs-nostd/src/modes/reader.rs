@@ -19,11 +19,11 @@ pub struct ModalReader<'f, 'a, const K: usize> {
     frames: FrameReader<'f>,
     modes: Modes<'a>,
     reach: Reach<K>,
-    last: Option<Last<K>>,
+    last: Option<LastFrame<K>>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Last<const K: usize> {
+struct LastFrame<const K: usize> {
     weights: Weights<K>,
     epoch: u32,
     received: Millis,
@@ -71,7 +71,7 @@ impl<'f, 'a, const K: usize> ModalReader<'f, 'a, K> {
 fn next<'a, const K: usize>(
     modes: &Modes<'a>,
     reach: &Reach<K>,
-    last: &mut Option<Last<K>>,
+    last: &mut Option<LastFrame<K>>,
     frame: &FrameGuard<'_>,
 ) -> ModalFrame<'a, K> {
     let label = frame.label();
@@ -81,13 +81,13 @@ fn next<'a, const K: usize>(
     }
     let now = match last {
         Some(last) if last.is(&label, &weights) => *last,
-        _ => Last::new(modes, reach, last.as_ref(), &label, weights),
+        _ => LastFrame::new(modes, reach, last.as_ref(), &label, weights),
     };
     *last = Some(now);
     ModalFrame::new(modes, label, &now.weights, now.motion, now.step, frame.age())
 }
 
-impl<const K: usize> Last<K> {
+impl<const K: usize> LastFrame<K> {
     fn is(&self, label: &FrameLabel, weights: &Weights<K>) -> bool {
         let names = (self.epoch, self.received) == (label.epoch, label.received);
         names && self.weights.values == weights.values

@@ -3,8 +3,8 @@
 use super::Nodes;
 use super::measure::Pass;
 use crate::stretch::{
-    Admission, Compared, FrameExtent, Gate, IncomingSurface, StretchError, SurfaceLimits, farthest,
-    largest_step, too_fast,
+    Admission, Comparison, FrameExtent, Gate, IncomingSurface, StretchError, SurfaceLimits,
+    farthest, largest_step, too_fast,
 };
 use crate::surface::{Millis, MotionUnit, SurfaceBlend, VertexTable};
 use crate::tree::SurfaceFacts;
@@ -96,7 +96,7 @@ impl<'a, const SURFACES: usize> NodeMonitor<'a, SURFACES> {
         if limit == f32::INFINITY {
             return Ok((work, true));
         }
-        if let Some(Compared { largest, rows: [first, end], .. }) = compared {
+        if let Some(Comparison { largest, rows: [first, end], .. }) = compared {
             if !(largest <= limit * limit) {
                 return Err(too_fast(surface, before, self.nodes.carrying(first..end), limit));
             }

@@ -142,10 +142,13 @@ mod tests {
             let after = step.after();
             let counted = nodes.surface(&after).motion().expect("measured");
             let at = |frame: &[Vec3]| nodes.surface(frame).position(vertex).expect("a vertex");
-            let way = at(&next).distance(at(&rest));
+            let distance = at(&next).distance(at(&rest));
             let counted = counted.since(&before).expect("one run");
-            assert!(counted >= unit.units_of(way - 1e-4) && way > 0.99, "{vertex}: {way}");
-            longest = longest.max(way);
+            assert!(
+                counted >= unit.units_of(distance - 1e-4) && distance > 0.99,
+                "{vertex}: {distance}"
+            );
+            longest = longest.max(distance);
         }
         assert!(longest > 1.5 && (longest - nodes.amplification()).abs() < 1e-3, "{longest}");
     }

@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 use super::contacts::Pair;
-use super::passed::{self, Passed};
+use super::passed::{self, SkippedTools};
 use super::search::WITHIN;
 use super::{Contacts, NoSide, Options, Proximity, Query, Side};
 use crate::unavailable::QueryError;
@@ -234,7 +234,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     ) -> Result<(), QueryError> {
         scene.enter(self.tree.has_adjacency(), self.tree.is_closed());
         let (nearest, _) = self.nearest(vertices, tools, &scene.options);
-        let (mut passed, mut best) = (Passed::new(), None);
+        let (mut passed, mut best) = (SkippedTools::new(), None);
         for number in nearest_first(nearest, tools.len()) {
             let Some(tool) = tools.get(number) else { continue };
             let limit = if number < passed::MOST { scene.limit() } else { f32::INFINITY };

@@ -26,7 +26,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tree, VertexTable};
 
 /// Whether the point is above, or why that is not certain.
-pub(super) type Above = Result<bool, NoSide>;
+pub(super) type SideOfPlane = Result<bool, NoSide>;
 
 /// The point, and the closest triangles so far.
 pub(super) struct Exact<'s, 't, I, V: ?Sized, P: Precision> {
@@ -38,9 +38,9 @@ pub(super) struct Exact<'s, 't, I, V: ?Sized, P: Precision> {
     /// Square of the least distance, and its error.
     least: P,
     doubt: P,
-    above: Above,
+    above: SideOfPlane,
     /// The last vertex, by the least row of a triangle around it, and its answer.
-    vertex: Option<(u32, u32, Above)>,
+    vertex: Option<(u32, u32, SideOfPlane)>,
     /// Node tests left, and made.
     left: u32,
     pub work: u32,
@@ -48,7 +48,7 @@ pub(super) struct Exact<'s, 't, I, V: ?Sized, P: Precision> {
 
 /// A triangle as seen from the point.
 #[derive(Clone, Copy)]
-struct Seen<P: Precision> {
+struct TriangleView<P: Precision> {
     /// The vectors from the point to the corners.
     to: [P::Vector; 3],
     /// Edge `e` leads from corner `e` to the next one.
@@ -88,7 +88,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
     }
 
     /// Whether the point is above the closest of the triangles.
-    pub fn of(&mut self, rows: impl Iterator<Item = u32>) -> Result<Above, QueryError> {
+    pub fn of(&mut self, rows: impl Iterator<Item = u32>) -> Result<SideOfPlane, QueryError> {
         for row in rows {
             if !self.add(row)? {
                 break;
@@ -98,7 +98,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
     }
 
     /// Whether the point is above the closest of the triangles added.
-    pub const fn answer(&self) -> Above {
+    pub const fn answer(&self) -> SideOfPlane {
         self.above
     }
 
@@ -134,7 +134,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         if square + doubt < self.least - self.doubt {
             self.above = above;
         } else if self.above != above {
-            let reason = |above: Above| above.err().unwrap_or(NoSide::BelowAccuracy);
+            let reason = |above: SideOfPlane| above.err().unwrap_or(NoSide::BelowAccuracy);
             let (one, other) = (reason(self.above), reason(above));
             self.above = Err(if one == NoSide::BelowAccuracy { other } else { one });
         }
@@ -154,16 +154,21 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
     }
 
     #[inline(always)] // A tick needs only the planes.
-    fn see(&self, row: u32) -> Result<Seen<P>, QueryError> {
+    fn see(&self, row: u32) -> Result<TriangleView<P>, QueryError> {
         let corrupt = QueryError::Corrupt { row };
         let [a, b, c] = self.tree.triangle(row).ok_or(corrupt)?;
         let position = |row| self.vertices.position(row).map(P::vector).ok_or(corrupt);
         let corners = [position(a)?, position(b)?, position(c)?];
-        Ok(Seen::new(corners, self.start, self.along))
+        Ok(TriangleView::new(corners, self.start, self.along))
     }
 
     /// Whether the point is above a triangle's feature.
-    fn above(&mut self, row: u32, feature: Feature, seen: &Seen<P>) -> Result<Above, QueryError> {
+    fn above(
+        &mut self,
+        row: u32,
+        feature: Feature,
+        seen: &TriangleView<P>,
+    ) -> Result<SideOfPlane, QueryError> {
         match feature {
             Feature::Face => Ok(seen.is_above().ok_or(NoSide::BelowAccuracy)),
             Feature::Edge(edge) => {
@@ -197,7 +202,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
 
     /// Around a vertex whose triangles intersect each other, the angle-weighted pseudonormal (f32, where it is clear)
     /// may disagree with the nearest triangle. Then no side is certain.
-    fn unless_cut(&self, above: Above, row: u32, corner: u32, vertex: u32) -> Above {
+    fn unless_cut(&self, above: SideOfPlane, row: u32, corner: u32, vertex: u32) -> SideOfPlane {
         let Some(centre) = self.vertices.position(vertex) else { return above };
         let towards = (self.at.start - centre) + self.at.span * self.at.parameter;
         let normal = Feature::Vertex(corner).pseudonormal(self.tree, self.vertices, row);
@@ -230,8 +235,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         &mut self,
         first: u32,
         mut corner: u32,
-        seen: &Seen<P>,
-    ) -> Result<Above, QueryError> {
+        seen: &TriangleView<P>,
+    ) -> Result<SideOfPlane, QueryError> {
         let (mut row, mut seen) = (first, *seen);
         // The square of the cosine, with its sign, times the square of the distance.
         let mut largest = P::from(f32::NEG_INFINITY);
@@ -273,7 +278,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
     }
 }
 
-impl<P: Precision> Seen<P> {
+impl<P: Precision> TriangleView<P> {
     #[inline(always)]
     fn new(corners: [P::Vector; 3], start: P::Vector, along: P::Vector) -> Self {
         let [a, b, c] = corners;
@@ -356,7 +361,7 @@ impl<P: Precision> Seen<P> {
     }
 
     /// Whether the point is above the edge between this triangle and `other`.
-    fn above_edge(&self, other: &Self) -> Above {
+    fn above_edge(&self, other: &Self) -> SideOfPlane {
         let (one, two) = (self.is_above(), other.is_above());
         if let Some(above) = one
             && (one == two || self.has_larger_sine_than(other))
@@ -378,10 +383,10 @@ mod tests {
 
     #[test]
     fn only_f64_tells_the_plane_of_a_triangle_whose_area_squared_leaves_f32() {
-        fn seen<P: Precision>(size: f32) -> Seen<P> {
+        fn seen<P: Precision>(size: f32) -> TriangleView<P> {
             let corners = [[1.0, 1.0, 1.0], [-2.0, 1.0, 1.0], [1.0, -2.0, 1.0]];
             let corners = corners.map(|at| P::vector(glam::Vec3::from(at) * size));
-            Seen::new(corners, P::vector(glam::Vec3::ZERO), P::vector(glam::Vec3::ZERO))
+            TriangleView::new(corners, P::vector(glam::Vec3::ZERO), P::vector(glam::Vec3::ZERO))
         }
         for (size, is_told) in [(1e-14, false), (1.0, true), (1e8, true), (1e10, false)] {
             let (rough, fine) = (seen::<f32>(size), seen::<f64>(size));

@@ -36,7 +36,7 @@ pub use cost::Cost;
 pub use options::{Budget, Options};
 pub use proximity::{Interval, Proximity};
 #[cfg(feature = "control")]
-pub(crate) use search::OfLabel;
+pub(crate) use search::LabelDistance;
 pub use side::{NoSide, Side};
 pub use swept::{Sweep, SweepAnswer};
 pub use tracker::{Fallback, Tracker, TrackerAnswer};

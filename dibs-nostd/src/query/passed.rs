@@ -11,7 +11,7 @@ use crate::Tool;
 pub(super) const MOST: usize = 64;
 
 /// The tools on one surface.
-pub(super) struct Passed {
+pub(super) struct SkippedTools {
     /// The distance from each tool's axis within which there is no surface; 0 if unknown.
     clear: [f32; MOST],
     /// Tools that were skipped, and tools that are certainly outside.
@@ -19,7 +19,7 @@ pub(super) struct Passed {
     outside: u64,
 }
 
-impl Passed {
+impl SkippedTools {
     pub const fn new() -> Self {
         Self { clear: [0.0; MOST], passed: 0, outside: 0 }
     }

@@ -20,7 +20,7 @@ mod wide;
 
 pub(super) use super::memory::waiting::Waiting;
 #[cfg(feature = "control")]
-pub(crate) use near::OfLabel;
+pub(crate) use near::LabelDistance;
 pub(super) use tick::{Outcome, Tick};
 pub(super) use ties::Ties;
 #[cfg(feature = "wide")]

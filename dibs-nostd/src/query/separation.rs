@@ -17,7 +17,7 @@ use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
-pub(super) struct Asked<'a, 't, I, V: ?Sized, T> {
+pub(super) struct Request<'a, 't, I, V: ?Sized, T> {
     pub tree: &'a Tree<'t, I>,
     pub vertices: &'a V,
     pub tool: &'a T,
@@ -36,7 +36,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     found: &mut Proximity,
     memory: (&mut Ties, Option<KnownDepthMut<'_>>),
 ) -> Result<(), QueryError> {
-    let asked = Asked { tree, vertices, tool, options };
+    let asked = Request { tree, vertices, tool, options };
     if !options.is_signed {
         found.side = Side::Undefined(NoSide::NotAsked);
     } else if !tree.has_adjacency() {
@@ -50,7 +50,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     Ok(())
 }
 
-impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> Request<'_, '_, I, V, T> {
     /// Replaces `found`, the closest pair below some roots, by their signed answer.
     #[inline(always)]
     pub fn signed(
@@ -77,7 +77,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Asked<'_, '_, I, V, T> {
         }
         if !(is_open || is_touching && has_length) {
             let on_axis = tool.axis_point(found.axis_parameter);
-            let is_many = ties.are_lost() && !is_touching;
+            let is_many = ties.are_missing() && !is_touching;
             let many = is_many
                 .then(|| side::of_many(roots, tree, stack, vertices, found, on_axis, options))
                 .transpose()?;

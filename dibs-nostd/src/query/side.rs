@@ -6,7 +6,7 @@ use core::fmt;
 
 use glam::Vec3;
 
-use super::exact::{Above, Exact};
+use super::exact::{Exact, SideOfPlane};
 use super::normal::{Feature, NORMAL, NoNormal, corners};
 use super::search::{Search, Ties, Waiting};
 use super::{Options, Proximity};
@@ -135,7 +135,7 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     pair: &Proximity,
     at: &OnAxis,
     ties: &Ties,
-    many: Option<Above>,
+    many: Option<SideOfPlane>,
     left: u32,
 ) -> Result<PointSide, QueryError> {
     if pair.triangle.is_none() {
@@ -192,8 +192,8 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
 fn decided<I: Index, V: VertexTable + ?Sized>(
     mut rough: Exact<'_, '_, I, V, f32>,
     ties: &Ties,
-    many: Option<Above>,
-) -> Result<(Above, u32), QueryError> {
+    many: Option<SideOfPlane>,
+) -> Result<(SideOfPlane, u32), QueryError> {
     let (Some(rows), Some(again)) = (ties.deciding(), ties.deciding()) else {
         return Ok((many.unwrap_or(Err(NoSide::BelowAccuracy)), 0));
     };
@@ -217,7 +217,7 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
     pair: &mut Proximity,
     point: Vec3,
     options: &Options,
-) -> Result<Above, QueryError> {
+) -> Result<SideOfPlane, QueryError> {
     let (tool, first) = (AxisPoint(point), pair.triangle);
     let at = OnAxis::new(&tool, 0.0);
     let rest = |pair: &Proximity| options.after(pair.tests());

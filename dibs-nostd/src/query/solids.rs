@@ -9,7 +9,7 @@
 use super::Proximity;
 use super::memory::depth::KnownDepthMut;
 use super::search::{Search, Ties, WHOLE, Waiting};
-use super::separation::Asked;
+use super::separation::Request;
 use super::side::{NoSide, Side};
 use crate::math::sqrt::sqrt;
 use crate::tree::RootSet;
@@ -20,12 +20,12 @@ use crate::{Index, Tool, VertexTable};
 #[cold]
 #[inline(never)]
 pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
-    asked: &Asked<'_, '_, I, V, T>,
+    asked: &Request<'_, '_, I, V, T>,
     stack: &mut [Waiting],
     answer: &mut Proximity,
     memory: (&mut Ties, Option<KnownDepthMut<'_>>),
 ) -> Result<(), QueryError> {
-    let &Asked { tree, vertices, tool, options } = asked;
+    let &Request { tree, vertices, tool, options } = asked;
     let closest = *answer;
     let root = closest.triangle.map_or(0, |row| tree.root_of(row.0));
     let nearest = tree.shells_of(root);
@@ -57,14 +57,14 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
 
 /// The signed answer of one solid, with the budget left after the answer's tests so far.
 fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
-    asked: &Asked<'_, '_, I, V, T>,
+    asked: &Request<'_, '_, I, V, T>,
     stack: &mut [Waiting],
     answer: &Proximity,
     roots: RootSet,
 ) -> Result<Proximity, QueryError> {
-    let &Asked { tree, vertices, tool, options } = asked;
+    let &Request { tree, vertices, tool, options } = asked;
     let rest = options.after(answer.tests());
-    let asked = Asked { options: &rest, ..*asked };
+    let asked = Request { options: &rest, ..*asked };
     let mut ties = Ties::new();
     let memory = Some(&mut ties);
     let search = Search::start(roots, tree, stack, vertices, tool, &rest, None, memory)?;

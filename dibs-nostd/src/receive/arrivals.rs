@@ -43,7 +43,7 @@ pub(super) struct Arrivals {
 
 /// Why a packet cannot be placed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Misplaced {
+pub(super) enum PlacementError {
     /// It arrived before.
     Duplicate,
     /// Its rows do not fit between those of the packets before and after it.
@@ -98,7 +98,11 @@ impl Arrivals {
 
     /// The position of a packet. O(1) in order, O([`GAPS`]) otherwise.
     #[inline]
-    pub fn locate(&self, sequence: u16, rows: Range<u32>) -> Result<PacketPosition, Misplaced> {
+    pub fn locate(
+        &self,
+        sequence: u16,
+        rows: Range<u32>,
+    ) -> Result<PacketPosition, PlacementError> {
         let rows = Range32 { first: rows.start, end: rows.end };
         let mut place = PacketPosition { sequence, rows, before: None, after: None, free: GAPS };
         self.meet(&self.prefix, PREFIX, &mut place)?;
@@ -114,12 +118,17 @@ impl Arrivals {
             }
         }
         let is_alone = place.before.is_none() && place.after.is_none();
-        if is_alone && place.free == GAPS { Err(Misplaced::Gaps) } else { Ok(place) }
+        if is_alone && place.free == GAPS { Err(PlacementError::Gaps) } else { Ok(place) }
     }
 
     /// Compares a packet with one range.
     #[inline]
-    fn meet(&self, range: &Contig, at: usize, place: &mut PacketPosition) -> Result<(), Misplaced> {
+    fn meet(
+        &self,
+        range: &Contig,
+        at: usize,
+        place: &mut PacketPosition,
+    ) -> Result<(), PlacementError> {
         let PacketPosition { sequence, rows, .. } = *place;
         let fits = if range.to <= sequence {
             if range.to == sequence {
@@ -137,9 +146,9 @@ impl Arrivals {
             }
             if self.is_exact && touches { rows.end == range.first } else { rows.end <= range.first }
         } else {
-            return Err(Misplaced::Duplicate);
+            return Err(PlacementError::Duplicate);
         };
-        if fits { Ok(()) } else { Err(Misplaced::Order) }
+        if fits { Ok(()) } else { Err(PlacementError::Order) }
     }
 
     /// Notes a packet at its position.

@@ -9,7 +9,7 @@
 mod heartbeats;
 
 use super::ReceiveError;
-use super::arrivals::{Arrivals, Misplaced, PacketPosition};
+use super::arrivals::{Arrivals, PacketPosition, PlacementError};
 use super::health::{BusHealth, FrameName, Trouble};
 use crate::surface::{AHEAD, Millis, elapsed};
 use crate::tree::SurfaceFacts;
@@ -42,7 +42,7 @@ pub(super) struct Frame {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Published {
+struct PublishedFrame {
     id: FrameId,
     captured: Millis,
     /// The stated age: below 65,535.
@@ -59,7 +59,7 @@ struct Published {
 #[derive(Debug)]
 pub(super) struct Collector {
     mesh_id: u32,
-    published: Option<Published>,
+    published: Option<PublishedFrame>,
     pub frame: Option<Frame>,
     heartbeat: Option<LastHeartbeat>,
     wants_whole: bool,
@@ -414,7 +414,7 @@ impl Collector {
             _ => 0,
         };
         self.trouble.note_published(self.published.is_none());
-        self.published = Some(Published {
+        self.published = Some(PublishedFrame {
             id: frame.id,
             captured: frame.captured(),
             back,
@@ -429,7 +429,7 @@ impl Collector {
 
     /// The time from the latest published capture to this one, or how much earlier this one is.
     fn since_newest(&self, captured: Millis) -> Option<Result<Millis, Millis>> {
-        let Published { captured: last, back, .. } = self.published?;
+        let PublishedFrame { captured: last, back, .. } = self.published?;
         let newest = last.after(Millis(back.into()));
         let by = newest.since(captured);
         let is_earlier = by > Millis(0) && by <= EARLIEST;
@@ -519,9 +519,9 @@ impl Frame {
         }
         match self.arrivals.locate(sequence, rows) {
             Ok(place) => Ok(Some(place)),
-            Err(Misplaced::Duplicate) => Ok(None),
-            Err(Misplaced::Order) => Err(ReceiveError::Order { sequence }),
-            Err(Misplaced::Gaps) => Err(ReceiveError::Gaps { sequence }),
+            Err(PlacementError::Duplicate) => Ok(None),
+            Err(PlacementError::Order) => Err(ReceiveError::Order { sequence }),
+            Err(PlacementError::Gaps) => Err(ReceiveError::Gaps { sequence }),
         }
     }
 }

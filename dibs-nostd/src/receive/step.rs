@@ -7,7 +7,7 @@
 // Requirement: T-04
 
 use crate::math::sqrt::sqrt;
-use crate::stretch::{Compared, Gate, largest_change, largest_step};
+use crate::stretch::{Comparison, Gate, largest_change, largest_step};
 use crate::surface::{MotionReading, MotionUnit, PredictionCheck, VertexTable};
 
 /// Most units of an extrapolated step: more than 32 times the root sphere's radius.
@@ -73,8 +73,8 @@ impl StepMeter {
         self.rows
     }
 
-    pub const fn compared(&self) -> Compared {
-        Compared { largest: self.largest, rows: self.fastest, t: self.t }
+    pub const fn compared(&self) -> Comparison {
+        Comparison { largest: self.largest, rows: self.fastest, t: self.t }
     }
 
     /// The distance of the frame from its extrapolation, if any; its stretch is not known here.
@@ -89,8 +89,8 @@ impl StepMeter {
             _ => None,
         };
         let (passed, off) = known.unwrap_or((0, PredictionCheck::UNKNOWN.off));
-        let shown = sqrt(self.off) * self.compared().growth();
-        PredictionCheck { shown, passed, off, ..PredictionCheck::UNKNOWN }
+        let residual = sqrt(self.off) * self.compared().growth();
+        PredictionCheck { residual, passed, off, ..PredictionCheck::UNKNOWN }
     }
 
     /// The odometer's reading after the step from a frame with the reading `before`; a new start if that is unknown or

@@ -40,12 +40,12 @@ pub struct IncomingSurface<'a, V: ?Sized> {
     pub before: Option<(&'a V, Millis)>,
     /// The motion of the rows since `before`, if already measured.
     #[doc(hidden)]
-    pub compared: Option<Compared>,
+    pub compared: Option<Comparison>,
 }
 
 /// The comparison of a surface's rows with the published ones.
 #[derive(Clone, Copy, Debug)]
-pub struct Compared {
+pub struct Comparison {
     /// The largest squared distance (mm²) of any row compared so far.
     pub largest: f32,
     /// Start and end of a range of rows that contains it.
@@ -54,7 +54,7 @@ pub struct Compared {
     pub t: f32,
 }
 
-impl Compared {
+impl Comparison {
     /// The factor from the observed residual to that of the next extrapolation. With a constant acceleration the error,
     /// a time `b` beyond a step that took `a`, grows as `b (a + b)`. For the observed residual `b` was the last step's
     /// time; for the next one both times are assumed to be the last step's. With `t = b / a` of the observed one the

@@ -17,7 +17,7 @@ use core::fmt;
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 use crate::tree::{Index, Tree, TriangleRow};
 
-pub use gate::{Admission, Compared, FrameExtent, Gate, IncomingSurface, NoGate};
+pub use gate::{Admission, Comparison, FrameExtent, Gate, IncomingSurface, NoGate};
 use kernel::Worst;
 #[cfg(feature = "nodes")]
 pub(crate) use kernel::{LEAST, root_up, squared_limit};

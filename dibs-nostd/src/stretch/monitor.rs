@@ -9,7 +9,7 @@ use super::pass::{ALL, Pass};
 use super::regions::region_rows;
 use super::volume::Volume;
 use super::{
-    Admission, Compared, FrameExtent, Gate, IncomingSurface, StretchError, SurfaceLimits,
+    Admission, Comparison, FrameExtent, Gate, IncomingSurface, StretchError, SurfaceLimits,
     check_tables,
 };
 use crate::surface::{Millis, MotionUnit, REGIONS, SurfaceBlend, VertexTable};
@@ -190,7 +190,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
         let limit = farthest(self.speed, self.recovery, elapsed);
         if limit == f32::INFINITY {
             self.blocks_left = 0;
-        } else if let Some(Compared { largest, rows: [first, end], .. }) = compared {
+        } else if let Some(Comparison { largest, rows: [first, end], .. }) = compared {
             self.blocks_left = 0;
             if !(largest <= limit * limit) {
                 return Err(too_fast(surface, before, first..end, limit));

@@ -12,9 +12,9 @@ use crate::surface::{Millis, VertexTable};
 /// Upper bound (mm) on a vertex's motion in this time, at this speed and at most `recovery`; infinite without either.
 pub(crate) const fn farthest(speed: f32, recovery: f32, elapsed: Millis) -> f32 {
     // Plus one millisecond, because the clock counts whole ones.
-    let way = speed * (elapsed.0 as f32 + 1.0);
+    let distance = speed * (elapsed.0 as f32 + 1.0);
     // A speed or distance that is NaN or negative refuses every frame; the square of a negative one would be a limit.
-    let most = if way <= recovery || way.is_nan() { way } else { recovery };
+    let most = if distance <= recovery || distance.is_nan() { distance } else { recovery };
     if most < 0.0 { f32::NAN } else { most }
 }
 

@@ -178,7 +178,7 @@ impl MetricBits for [u8; METRIC_BYTES] {
 
 /// The state passed from one triangle to the next.
 #[derive(Clone, Copy)]
-struct Before {
+struct PreviousTriangle {
     centre: Vec3,
     third: Vec3,
     /// The edge from the centre to the third corner.
@@ -254,7 +254,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         metric: &impl MetricBits,
         corners: &I::Corners,
         largest: f32,
-    ) -> Option<Before> {
+    ) -> Option<PreviousTriangle> {
         let metric = Metric::new(metric.bits().map(f32::from_bits));
         let (a, b) = (self.corner::<I>(corners, 0)?, self.corner::<I>(corners, 1)?);
         let [centre, other, _] = metric.centre_first([a, b, b]);
@@ -263,19 +263,19 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let left = largest * rest - edge.length_squared();
         // NaN fails the quick check, so that `look_closer` measures the triangle.
         let edge = if left > 0.0 { edge } else { Vec3::NAN };
-        Some(Before { centre, third: centre, edge, left, square: 0.0 })
+        Some(PreviousTriangle { centre, third: centre, edge, left, square: 0.0 })
     }
 
     /// Measures one triangle.
     #[inline(always)]
     fn next<I: Index, M: Measure, const UNIFORM: bool>(
         &self,
-        before: Before,
+        before: PreviousTriangle,
         metric: &impl MetricBits,
         corners: &I::Corners,
         row: u32,
         worst: &mut Worst,
-    ) -> Option<Before> {
+    ) -> Option<PreviousTriangle> {
         match self.pass::<I, M, UNIFORM>(before, metric, corners, worst.squared) {
             Some(next) => Some(next),
             None => {
@@ -291,12 +291,12 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     #[inline(always)]
     fn pass<I: Index, M: Measure, const UNIFORM: bool>(
         &self,
-        before: Before,
+        before: PreviousTriangle,
         metric: &impl MetricBits,
         corners: &I::Corners,
         largest: f32,
-    ) -> Option<Before> {
-        let Before { mut centre, third, edge: mut first, mut left, .. } = before;
+    ) -> Option<PreviousTriangle> {
+        let PreviousTriangle { mut centre, third, edge: mut first, mut left, .. } = before;
         let [mark, between, second] = metric.bits();
         let (rest_between, rest_second) = (f32::from_bits(between), f32::from_bits(second));
         // The codes of `Join`, the most frequent first: written out, since a match would make an enum of them.
@@ -328,7 +328,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let left_second = largest * rest_second - square;
         let now = Edges { first, second: edge };
         let is_within = M::is_within(left, left_second, largest * rest_between, now);
-        is_within.then_some(Before { centre, third, edge, left: left_second, square })
+        is_within.then_some(PreviousTriangle { centre, third, edge, left: left_second, square })
     }
 
     /// Raises `worst` if a triangle is stretched more; `None` beyond the limit.
@@ -340,7 +340,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         corners: &I::Corners,
         row: u32,
         mut worst: Worst,
-    ) -> Option<(Before, Worst)> {
+    ) -> Option<(PreviousTriangle, Worst)> {
         let metric = Metric::new(metric.bits().map(f32::from_bits));
         let a = self.corner::<I>(corners, 0)?;
         let b = self.corner::<I>(corners, 1)?;
@@ -359,7 +359,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let left = worst.squared * rest_second - square;
         // The triangle is now within the largest square, so a value below 0 is rounding.
         let left = if left > 0.0 { left } else { 0.0 };
-        Some((Before { centre, third, edge: now.second, left, square }, worst))
+        Some((PreviousTriangle { centre, third, edge: now.second, left, square }, worst))
     }
 
     /// Positions of a triangle's first two corners; `None` unless both rows are below `ready`.

@@ -30,7 +30,7 @@ pub struct PredictionCheck {
     pub sigma: f32,
     /// Largest distance (mm) of a vertex of this frame from its extrapolation by the two previous frames; NaN if
     /// unknown.
-    pub shown: f32,
+    pub residual: f32,
     /// Odometer units from the previous frame to that extrapolation, along the step of the two previous frames.
     pub passed: u32,
     /// Upper bound on the units from there to this frame; the largest number if unknown.
@@ -39,7 +39,7 @@ pub struct PredictionCheck {
 
 impl PredictionCheck {
     pub(crate) const UNKNOWN: Self =
-        Self { sigma: f32::NAN, shown: f32::NAN, passed: 0, off: u32::MAX };
+        Self { sigma: f32::NAN, residual: f32::NAN, passed: 0, off: u32::MAX };
 }
 
 /// One position, as bits of `f32`.
@@ -148,17 +148,23 @@ impl Head {
         for (at, word) in self.motion.iter().zip(words) {
             at.store(word, Ordering::Relaxed);
         }
-        let PredictionCheck { sigma, shown, passed, off } = ahead;
-        for (at, word) in self.ahead.iter().zip([sigma.to_bits(), shown.to_bits(), passed, off]) {
+        let PredictionCheck { sigma, residual, passed, off } = ahead;
+        for (at, word) in self.ahead.iter().zip([sigma.to_bits(), residual.to_bits(), passed, off])
+        {
             at.store(word, Ordering::Relaxed);
         }
     }
 
     /// The prediction check of a labelled frame.
     pub(super) fn ahead(&self) -> PredictionCheck {
-        let [sigma, shown, passed, off] =
+        let [sigma, residual, passed, off] =
             self.ahead.each_ref().map(|word| word.load(Ordering::Relaxed));
-        PredictionCheck { sigma: f32::from_bits(sigma), shown: f32::from_bits(shown), passed, off }
+        PredictionCheck {
+            sigma: f32::from_bits(sigma),
+            residual: f32::from_bits(residual),
+            passed,
+            off,
+        }
     }
 
     pub(super) fn epoch(&self) -> u32 {

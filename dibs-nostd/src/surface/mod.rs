@@ -16,7 +16,7 @@ mod prediction;
 mod reader;
 mod vertices;
 
-pub(crate) use crate::time::Ageing;
+pub(crate) use crate::time::StampAge;
 #[cfg(feature = "bus")]
 pub(crate) use crate::time::{AHEAD, elapsed};
 pub use crate::time::{Millis, Ticks};

@@ -93,10 +93,10 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> Step<'v, W, V> {
 /// frame interval is two intervals old when the next one arrives.
 pub(crate) const FARTHEST: f32 = 2.0;
 
-/// The error of an extrapolation by `beyond` frame intervals, if it was `shown` after one, for a velocity that changes
-/// at a constant rate.
-pub(crate) fn grown(shown: f32, beyond: f32) -> f32 {
-    shown * beyond * (beyond + 1.0) * 0.5
+/// The error of an extrapolation by `beyond` frame intervals, if it was `residual` after one, for a velocity that
+/// changes at a constant rate.
+pub(crate) fn grown(residual: f32, beyond: f32) -> f32 {
+    residual * beyond * (beyond + 1.0) * 0.5
 }
 
 /// A number clamped to 0 to `most`: 0 for NaN.
@@ -234,7 +234,7 @@ impl<'v, W: VertexTable + ?Sized, V: VertexTable + ?Sized> SurfaceBlend<'v, W, V
     /// not extrapolated.
     #[must_use]
     pub fn residual(&self) -> Option<f32> {
-        (self.ahead.shown >= 0.0).then_some(self.ahead.shown)
+        (self.ahead.residual >= 0.0).then_some(self.ahead.residual)
     }
 }
 
@@ -306,7 +306,7 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized> VertexTable for SurfaceBl
         let (before, after) = (self.before.position_error(), self.after.position_error());
         let frames = (1.0 - self.t).abs() * before + self.t * after;
         match self.residual() {
-            Some(shown) => frames + grown(shown, self.t - 1.0),
+            Some(residual) => frames + grown(residual, self.t - 1.0),
             None => frames,
         }
     }

@@ -14,7 +14,7 @@ use super::motion::{MotionReading, MovingSurface};
 use super::moving::SurfaceBlend;
 use super::moving::{FARTHEST, clamped};
 use super::prediction::Prediction;
-use super::{Ageing, FrameAge, LatestSurface, MeasuredStretch, Millis, VertexTable};
+use super::{FrameAge, LatestSurface, MeasuredStretch, Millis, StampAge, VertexTable};
 #[cfg(feature = "bus")]
 use crate::time::elapsed;
 
@@ -23,12 +23,12 @@ use crate::time::elapsed;
 pub struct FrameReader<'f> {
     buffers: Buffers<'f>,
     /// Epoch and age of the last frame read.
-    ageing: (u32, Ageing),
+    ageing: (u32, StampAge),
 }
 
 impl<'f> FrameReader<'f> {
     pub(super) fn new(buffers: Buffers<'f>) -> Self {
-        Self { buffers, ageing: (0, Ageing::default()) }
+        Self { buffers, ageing: (0, StampAge::default()) }
     }
 
     /// Rows of a frame.
@@ -44,7 +44,7 @@ impl<'f> FrameReader<'f> {
         let (epoch_before, before) = self.ageing;
         let Some(mut guard) = read(&self.buffers) else { return LatestSurface::new(None) };
         let FrameLabel { epoch, received, .. } = guard.label();
-        let before = if epoch == epoch_before { before } else { Ageing::default() };
+        let before = if epoch == epoch_before { before } else { StampAge::default() };
         let ageing = before.at(now, received);
         self.ageing = (epoch, ageing);
         guard.age = ageing.oldest;
@@ -127,12 +127,12 @@ impl<'f> FrameGuard<'f> {
     pub fn extrapolated(&self) -> SurfaceBlend<'_, FrameView<'f>, FrameView<'f>> {
         let (ahead, before) = (self.view.buffer.head.ahead(), self.before.buffer.head.ahead());
         match self.last_step() {
-            Some(step) if ahead.sigma >= 0.0 && ahead.shown >= 0.0 => {
+            Some(step) if ahead.sigma >= 0.0 && ahead.residual >= 0.0 => {
                 // A single small residual may be by chance. False for NaN.
-                let is_worse = before.shown > ahead.shown;
-                let shown = if is_worse { before.shown } else { ahead.shown };
+                let is_worse = before.residual > ahead.residual;
+                let residual = if is_worse { before.residual } else { ahead.residual };
                 let lag = Millis(self.age.0.saturating_sub(step.end().0));
-                let ahead = PredictionCheck { shown, ..ahead };
+                let ahead = PredictionCheck { residual, ..ahead };
                 step.outside([&self.before, &self.view], self.age, ahead).lagging(lag)
             }
             _ => self.held(),

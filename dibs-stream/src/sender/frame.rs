@@ -5,7 +5,7 @@ use dibs_nostd::wire::{Body, Content, Encoding, FrameEncoder, Mac, Packet, Quant
 
 /// A frame that was sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sent {
+pub struct SentFrame {
     /// Its number.
     pub epoch: u32,
     /// Whether the frame is whole, partial or modal.
@@ -22,15 +22,15 @@ pub struct Sent {
 
 /// A frame whose packets are encoded but not sent.
 #[derive(Debug)]
-pub struct Prepared {
-    pub(super) sent: Sent,
+pub struct PreparedFrame {
+    pub(super) sent: SentFrame,
     pub(super) packets: Packets,
 }
 
-impl Prepared {
+impl PreparedFrame {
     /// The counts that apply once it is sent.
     #[must_use]
-    pub const fn sent(&self) -> &Sent {
+    pub const fn sent(&self) -> &SentFrame {
         &self.sent
     }
 }
@@ -64,9 +64,9 @@ impl Packets {
     }
 
     /// The description of these packets once they are sent.
-    pub fn sent(&self, epoch: u32, content: Content, rows: usize, error: f32) -> Sent {
+    pub fn sent(&self, epoch: u32, content: Content, rows: usize, error: f32) -> SentFrame {
         let (packets, bytes) = (self.ends.len(), self.bytes.len());
-        Sent { epoch, content, rows, packets, bytes, error }
+        SentFrame { epoch, content, rows, packets, bytes, error }
     }
 
     pub fn iter(&self) -> impl Iterator<Item = &[u8]> {

@@ -14,7 +14,7 @@ mod settings;
 mod totals;
 
 pub use error::SendError;
-pub use frame::{Prepared, Sent};
+pub use frame::{PreparedFrame, SentFrame};
 pub use order::SurfaceOrder;
 pub use settings::Settings;
 pub use totals::Totals;
@@ -187,7 +187,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     ///
     /// # Errors
     /// [`SendError`] names the vertex that cannot be sent, or the line's error.
-    pub fn send(&mut self, positions: &[Vec3]) -> Result<Sent, SendError> {
+    pub fn send(&mut self, positions: &[Vec3]) -> Result<SentFrame, SendError> {
         let frame = self.prepare(positions)?;
         self.transmit(frame)
     }
@@ -196,13 +196,17 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     ///
     /// # Errors
     /// As [`send`](Self::send).
-    pub fn send_captured(&mut self, positions: &[Vec3], ago: Duration) -> Result<Sent, SendError> {
+    pub fn send_captured(
+        &mut self,
+        positions: &[Vec3],
+        ago: Duration,
+    ) -> Result<SentFrame, SendError> {
         let frame = self.prepare_captured(positions, ago)?;
         self.transmit(frame)
     }
 
     /// Sends a frame that was captured some time ago, with a rigid pose of the whole surface: the positions are in the
-    /// mesh's own coordinates. For a receiver of [`Posed`](dibs_nostd::guard::Posed) frames.
+    /// mesh's own coordinates. For a receiver of [`PosedRows`](dibs_nostd::guard::PosedRows).
     ///
     /// # Errors
     /// As [`send`](Self::send).
@@ -211,7 +215,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         positions: &[Vec3],
         pose: RigidPose,
         ago: Duration,
-    ) -> Result<Sent, SendError> {
+    ) -> Result<SentFrame, SendError> {
         let frame = self.prepare_at(positions, pose, ago)?;
         self.transmit(frame)
     }
@@ -220,7 +224,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     ///
     /// # Errors
     /// [`SendError::Line`] when the connection is lost.
-    pub fn transmit(&mut self, frame: Prepared) -> Result<Sent, SendError> {
+    pub fn transmit(&mut self, frame: PreparedFrame) -> Result<SentFrame, SendError> {
         self.transmit_paced(frame, || ())
     }
 
@@ -230,10 +234,10 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     /// As [`transmit`](Self::transmit).
     pub fn transmit_paced(
         &mut self,
-        frame: Prepared,
+        frame: PreparedFrame,
         mut wait: impl FnMut(),
-    ) -> Result<Sent, SendError> {
-        let Prepared { sent, packets } = frame;
+    ) -> Result<SentFrame, SendError> {
+        let PreparedFrame { sent, packets } = frame;
         for packet in packets.iter() {
             wait();
             self.heartbeat()?;

@@ -7,7 +7,7 @@ use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Content, FrameEncoder, Freshness, Mac, WeightsEncoder};
 
 use super::frame::{Packets, apply};
-use super::{Prepared, SendError, Sender, Sent};
+use super::{PreparedFrame, SendError, Sender, SentFrame};
 use crate::transport::Transport;
 
 impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
@@ -16,7 +16,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     ///
     /// # Errors
     /// [`SendError`] names the vertex that cannot be sent.
-    pub fn prepare(&mut self, positions: &[Vec3]) -> Result<Prepared, SendError> {
+    pub fn prepare(&mut self, positions: &[Vec3]) -> Result<PreparedFrame, SendError> {
         let ago = self.since_change(positions.iter().flat_map(Vec3::to_array));
         self.prepare_captured(positions, ago)
     }
@@ -29,7 +29,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         &mut self,
         positions: &[Vec3],
         ago: Duration,
-    ) -> Result<Prepared, SendError> {
+    ) -> Result<PreparedFrame, SendError> {
         self.prepare_frame(positions, None, ago)
     }
 
@@ -42,7 +42,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         positions: &[Vec3],
         pose: RigidPose,
         ago: Duration,
-    ) -> Result<Prepared, SendError> {
+    ) -> Result<PreparedFrame, SendError> {
         self.prepare_frame(positions, Some(pose), ago)
     }
 
@@ -51,7 +51,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         positions: &[Vec3],
         pose: Option<RigidPose>,
         ago: Duration,
-    ) -> Result<Prepared, SendError> {
+    ) -> Result<PreparedFrame, SendError> {
         self.check()?;
         let freshness = self.freshness(ago);
         let (mut memory, mut held) = (std::mem::take(&mut self.memory), self.held.take());
@@ -67,7 +67,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
                 // A receiver refuses a frame whose age is too large for its field, so no partial frame can build on it.
                 self.whole_wanted = freshness.age_ms == u16::MAX;
                 self.has_pose = pose.is_some();
-                Ok(Prepared { sent, packets })
+                Ok(PreparedFrame { sent, packets })
             }
             // Nothing was sent, so the receiver's frame is unchanged.
             Err(error) => {
@@ -84,7 +84,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         (freshness, pose): (Freshness, Option<RigidPose>),
         (rows, packets): &mut (Vec<Vec3>, Packets),
         held: &mut Option<(u32, Vec<Vec3>)>,
-    ) -> Result<(Sent, Vec<Vec3>), SendError> {
+    ) -> Result<(SentFrame, Vec<Vec3>), SendError> {
         self.surface.to_rows_in(positions, rows)?;
         let encoding = self.encoding(rows)?;
         let id = self.next_id();
@@ -120,7 +120,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     ///
     /// # Errors
     /// [`SendError`] names the weight that cannot be sent.
-    pub fn prepare_weights(&mut self, weights: &[f32]) -> Result<Prepared, SendError> {
+    pub fn prepare_weights(&mut self, weights: &[f32]) -> Result<PreparedFrame, SendError> {
         let ago = self.since_change(weights.iter().copied());
         self.prepare_weights_captured(weights, ago)
     }
@@ -133,7 +133,7 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
         &mut self,
         weights: &[f32],
         ago: Duration,
-    ) -> Result<Prepared, SendError> {
+    ) -> Result<PreparedFrame, SendError> {
         self.check()?;
         let freshness = self.freshness(ago);
         let id = self.next_id();
@@ -147,6 +147,6 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
             packets.push(packet);
         }
         let sent = packets.sent(id.epoch, Content::Modal, weights.len(), 0.0);
-        Ok(Prepared { sent, packets })
+        Ok(PreparedFrame { sent, packets })
     }
 }

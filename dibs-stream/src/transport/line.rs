@@ -31,7 +31,7 @@ pub struct Line {
     received: Receiver<io::Result<Vec<u8>>>,
     over: Arc<AtomicBool>,
     stop: Arc<AtomicBool>,
-    refusals: Shared,
+    refusals: SharedRefusals,
     /// Ends the connection. The argument tells whether bytes that were written may be dropped.
     hang_up: Box<dyn Fn(bool) + Send>,
 }
@@ -47,9 +47,9 @@ pub struct Refusals {
 
 /// Counted by both threads.
 #[derive(Clone, Debug, Default)]
-struct Shared(Arc<Mutex<Refusals>>);
+struct SharedRefusals(Arc<Mutex<Refusals>>);
 
-impl Shared {
+impl SharedRefusals {
     fn get(&self) -> Refusals {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -138,7 +138,7 @@ impl Line {
         writer: impl FnOnce(Datagrams) -> W,
     ) -> io::Result<Self> {
         socket.set_read_timeout(Some(PATIENCE))?;
-        let (reader, refusals) = (socket.try_clone()?, Shared::default());
+        let (reader, refusals) = (socket.try_clone()?, SharedRefusals::default());
         let (here, there) = (refusals.clone(), refusals.clone());
         let mut line = Self::datagrams(writer(Datagrams(socket, here)), move |buffer| {
             // There is no receiver yet: the sender continues, as after any lost datagram.
@@ -233,7 +233,7 @@ impl Line {
             received,
             over,
             stop: Arc::default(),
-            refusals: Shared::default(),
+            refusals: SharedRefusals::default(),
             hang_up: Box::new(hang_up),
         }
     }
@@ -345,7 +345,7 @@ impl Write for Port {
 
 /// A UDP socket as a writer: a write is a datagram.
 #[derive(Debug)]
-pub struct Datagrams(UdpSocket, Shared);
+pub struct Datagrams(UdpSocket, SharedRefusals);
 
 impl Write for Datagrams {
     fn write(&mut self, packet: &[u8]) -> io::Result<usize> {

@@ -34,7 +34,7 @@ static void write_bus(tick_record *record) {
 }
 
 /* Writes the searched surface, and the pair on it. */
-static void write_searched(const dibs_searched *searched, tick_record *record) {
+static void write_searched(const dibs_searched_surface *searched, tick_record *record) {
     const dibs_proximity *found = &searched->tracked.proximity;
     record->epoch_before = searched->before;
     record->blend = searched->t;

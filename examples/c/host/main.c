@@ -57,7 +57,7 @@ static void print_words(const uint32_t *words, size_t count) {
     }
 }
 
-static void print_searched(const dibs_searched *searched) {
+static void print_searched(const dibs_searched_surface *searched) {
     const dibs_tracked *tracked = &searched->tracked;
     print_words(&searched->outcome, 1);
     print_floats(&tracked->proximity.separation, 3);
@@ -162,9 +162,9 @@ static void answer_event(dibs_bus *bus, dibs_guard *guard, const char *name, uin
     } else if (strcmp(name, "admit") == 0) {
         const dibs_tool tool = take_tool(rest);
         const dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
-        const dibs_motion command = {.about = tool.start, .translation = {-0.1f, 0.0f, 0.0f}};
+        const dibs_rigid_motion command = {.about = tool.start, .translation = {-0.1f, 0.0f, 0.0f}};
         dibs_answer answer;
-        dibs_admitted admitted;
+        dibs_admitted_motion admitted;
         const dibs_code code = dibs_guard_admit(guard, &filter, &tool, &command, now, &answer, &admitted);
         printf("tick 0");
         print_answer(&answer);

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use dibs_build::{Builder, BuiltTree, generate};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::guard::{Bus, Guard, GuardLimits, Posed, Surface};
+use dibs_nostd::guard::{Bus, Guard, GuardLimits, PosedRows, Surface};
 use dibs_nostd::wire::NoMac;
 use dibs_nostd::{Advance, Millis, Sphere, TreeBytes, VertexTable};
 use dibs_tests::bus::reseal;
@@ -17,13 +17,11 @@ static TREE: LazyLock<BuiltTree> = LazyLock::new(|| {
     Builder::new().stretch(1.5).build(&heart).expect("a tree")
 });
 
-type Ends<'s> = (
-    Bus<'s, 'static, u16, NoMac, Posed>,
-    Guard<'s, 'static, u16, 64, 96, Posed>,
-);
+type Ends<'s> =
+    (Bus<'s, 'static, u16, NoMac, PosedRows>, Guard<'s, 'static, u16, 64, 96, PosedRows>);
 
 fuzz_target!(|input: &[u8]| {
-    let surface: Surface<162, Posed> = Surface::new();
+    let surface: Surface<162, PosedRows> = Surface::new();
     let limits = GuardLimits::new(3_000.0, Millis(10_000)).automatic().without_transit();
     let tree = TreeBytes::<u16>::new(TREE.blob());
     let (mut bus, mut guard): Ends<'_> = surface.start(tree, limits).expect("a sound tree");

@@ -3,7 +3,7 @@
 //! A script is a tree, then walks, all little-endian words; `cargo xtask guarantees` makes it from walks on the host, whose
 //! answers it knows.
 
-use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Uncertainty};
+use dibs_nostd::filter::{AdmittedMotion, Filter, MotionRow, RigidMotion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
@@ -60,8 +60,8 @@ impl<const OPENED: usize> Default for Trackers<OPENED> {
 
 /// The bits of what was admitted.
 #[must_use]
-pub fn words(admitted: &Admitted) -> [u32; ADMITTED_WORDS] {
-    let Motion { translation, rotation, .. } = admitted.motion;
+pub fn words(admitted: &AdmittedMotion) -> [u32; ADMITTED_WORDS] {
+    let RigidMotion { translation, rotation, .. } = admitted.motion;
     let ([a, b, c], [d, e, f]) = (translation.to_array(), rotation.to_array());
     let [a, b, c, d, e, f, least] = [a, b, c, d, e, f, admitted.least_separation].map(f32::to_bits);
     [a, b, c, d, e, f, least, admitted.reason as u32, admitted.queries, admitted.instructions]
@@ -170,7 +170,7 @@ impl Walk {
     ) -> Result<(), Fault> {
         let [a, b, c] = [point(machine)?, point(machine)?, point(machine)?];
         let radii = [number(machine)?, number(machine)?];
-        let command = Motion::new(a, point(machine)?, point(machine)?);
+        let command = RigidMotion::new(a, point(machine)?, point(machine)?);
         let tissue = Uncertainty::new(number(machine)?);
         let tissue = tissue.error(number(machine)?).error(number(machine)?);
         let [tip, shaft] = [(a, b, radii[0]), (b, c, radii[1])];

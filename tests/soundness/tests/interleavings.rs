@@ -6,7 +6,7 @@
 #![cfg(loom)]
 
 use dibs_nostd::glam::{Quat, Vec3};
-use dibs_nostd::guard::{Poses, Shared};
+use dibs_nostd::guard::{Poses, SharedState};
 use dibs_nostd::{FrameLabel, Frames, Millis, PublishError, RigidPose, VertexTable};
 use loom::cell::UnsafeCell;
 use loom::thread;

@@ -1,6 +1,6 @@
 //! Records a filter's inputs, so that another machine can be tested with the same.
 
-use dibs_nostd::filter::{Admitted, Motion};
+use dibs_nostd::filter::{AdmittedMotion, RigidMotion};
 use glam::Vec3;
 
 /// The settings of a walk.
@@ -30,11 +30,11 @@ pub struct Asked {
     /// Its capsules' radii.
     pub radii: [f32; 2],
     /// The command, about the first joint.
-    pub command: Motion,
+    pub command: RigidMotion,
     /// The tissue's speed (mm/s), and two errors (mm).
     pub tissue: [f32; 3],
     /// The answer.
-    pub admitted: Admitted,
+    pub admitted: AdmittedMotion,
 }
 
 /// Receives the inputs of a walk.

@@ -1,7 +1,7 @@
 //! An instrument of two capsules that is commanded along and against a beating heart.
 
-use dibs_build::{Builder, Mesh, Motion as Recorded};
-use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
+use dibs_build::{Builder, Mesh, Motion};
+use dibs_nostd::filter::{Filter, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Contacts, Options, Query, Tracker, measure_stretch};
 use glam::Vec3;
@@ -55,7 +55,7 @@ pub struct Glided {
 /// # Panics
 /// If the tree cannot be built or a query fails.
 #[must_use]
-pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64) -> Glided {
+pub fn glide(mesh: &Mesh, motion: &Motion, stretch: f32, ticks: u32, seed: u64) -> Glided {
     glide_told(mesh, motion, stretch, (ticks, seed), &mut ())
 }
 
@@ -66,7 +66,7 @@ pub fn glide(mesh: &Mesh, motion: &Recorded, stretch: f32, ticks: u32, seed: u64
 #[must_use]
 pub fn glide_told(
     mesh: &Mesh,
-    motion: &Recorded,
+    motion: &Motion,
     stretch: f32,
     (ticks, seed): (u32, u64),
     listener: &mut impl Listener,
@@ -119,7 +119,7 @@ pub fn glide_told(
         }
         let way = (goal - joints[0]).clamp_length_max(ROBOT * TICK);
         let turn = unit(&mut rng) * 0.0005;
-        let command = Motion::new(joints[0], way, turn);
+        let command = RigidMotion::new(joints[0], way, turn);
         let tools =
             [0, 1].map(|at| Capsule::new(joints[at], joints[at + 1], RADIUS).expect("finite"));
         let filter = filter.options(Options::new().stretch(measured));
@@ -170,7 +170,7 @@ pub fn glide_told(
 }
 
 /// The largest speed (mm/s) of a vertex from frame to frame.
-pub fn fastest(motion: &Recorded) -> f32 {
+pub fn fastest(motion: &Motion) -> f32 {
     let next = motion.frames.iter().cycle().skip(1);
     let steps = motion.frames.iter().zip(next).flat_map(|(a, b)| a.iter().zip(b));
     steps.map(|(a, b)| a.distance(*b)).fold(0.0, f32::max) * motion.rate * 1.001

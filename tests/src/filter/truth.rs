@@ -1,6 +1,6 @@
 //! The truth about a tick, by exhaustive search in f64.
 
-use dibs_nostd::filter::Motion;
+use dibs_nostd::filter::RigidMotion;
 use glam::{DQuat, DVec3, Vec3};
 
 use super::{Course, Scene};
@@ -43,7 +43,7 @@ impl Truth<'_> {
     pub fn separations(
         &self,
         axes: &[[Vec3; 2]; 2],
-        motion: &Motion,
+        motion: &RigidMotion,
         share: f64,
         by_arc: bool,
     ) -> Separations {

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::ops::AddAssign;
 
-use dibs_nostd::filter::{Admitted, Filter, Motion, MotionRow, Reason, Uncertainty};
+use dibs_nostd::filter::{AdmittedMotion, Filter, MotionRow, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, MovingSurface, Odometer, Tracker};
 use fastrand::Rng;
@@ -258,7 +258,7 @@ pub fn walk_by_label<const LABELS: usize>(
         };
         let is_at = |centre: Vec3| centre.distance(joints[0]) < 0.1;
         tally.medial += u64::from(medial.is_some_and(is_at));
-        let mut command = Motion::new(joints[0], way, spin * most);
+        let mut command = RigidMotion::new(joints[0], way, spin * most);
         let period = episode.period;
         let truth = Truth { scene, course, start, period, radii, labels: &labels };
         if episode.climbs {
@@ -268,7 +268,7 @@ pub fn walk_by_label<const LABELS: usize>(
                 let tried = if other == 0 {
                     command
                 } else {
-                    Motion::new(joints[0], unit(&mut rng) * most, unit(&mut rng) * most / 40.0)
+                    RigidMotion::new(joints[0], unit(&mut rng) * most, unit(&mut rng) * most / 40.0)
                 };
                 let mut trackers = trackers.clone();
                 let admitted =
@@ -307,9 +307,9 @@ fn ask<const LABELS: usize>(
     trackers: &mut [Follower<'_>; 2],
     surface: &impl MovingSurface,
     tools: &[Capsule; 2],
-    command: &Motion,
+    command: &RigidMotion,
     (episode, uncertainty): (&Episode, &Uncertainty),
-) -> Admitted {
+) -> AdmittedMotion {
     let [one, other] = trackers;
     let mut pairs = [(one, surface, &tools[0]), (other, surface, &tools[1])];
     const NONE: [MotionRow; 0] = [];
@@ -321,7 +321,7 @@ impl Tally {
         &mut self,
         truth: &Truth<'_>,
         axes: &[[Vec3; 2]; 2],
-        admitted: &Admitted,
+        admitted: &AdmittedMotion,
         episode: &Episode,
         by_arc: bool,
     ) {

@@ -5,7 +5,7 @@
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Guidance, SpringDamper};
 use dibs_nostd::failsafe::{LimitError, Limits, State, Watch};
-use dibs_nostd::filter::{Filter, FilterError, Motion, Reason};
+use dibs_nostd::filter::{Filter, FilterError, Reason, RigidMotion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, Freshness, enframe};
@@ -300,11 +300,11 @@ fn an_admitted_motion_keeps_off_the_tissue_as_it_is() {
         }
         world.now += 1;
         let towards = (middle + world.shift() - at).normalize_or_zero() * 0.1;
-        let push = Motion::new(at, towards, Vec3::new(0.0, 2e-4, 0.0));
+        let push = RigidMotion::new(at, towards, Vec3::new(0.0, 2e-4, 0.0));
         let tool = Capsule::new(at, end, 2.0).expect("valid");
         if tick == 2_000 {
             // An invalid command is an error without a motion.
-            let none = Motion::translation(Vec3::NAN);
+            let none = RigidMotion::translation(Vec3::NAN);
             let (_, admitted) = world.ends.1.admit(&filter, &tool, &none, Millis(world.now));
             assert_eq!(admitted, Err(FilterError::Command));
         }
@@ -344,7 +344,7 @@ fn an_admitted_motion_keeps_off_the_tissue_as_it_is() {
     let mut world = World::new(&built, &heart.positions, limits);
     world.now += 1;
     let tool = Capsule::new(at, end, 2.0).expect("valid");
-    let push = Motion::translation(Vec3::X);
+    let push = RigidMotion::translation(Vec3::X);
     let (_, admitted) = world.ends.1.admit(&filter, &tool, &push, Millis(1_001));
     assert_eq!(admitted, Err(FilterError::Untrusted(Unavailable::NoSurface)));
     // Nor at the very first tick, although a frame arrived before it.

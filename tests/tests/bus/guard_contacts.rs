@@ -5,7 +5,7 @@
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{ConstraintState, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::glam::{Quat, Vec3};
-use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Posed, Surface, Vertices};
+use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, PosedRows, Surface, Vertices};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, Freshness, NoMac};
 use dibs_nostd::{
     Advance, Assembler, Budget, Capsule, Contact, Contacts, Frames, Millis, Options, QueryError,
@@ -166,8 +166,8 @@ fn acts(proxy: &Proxy, answer: &Answer, list: &List, tool: &Capsule) -> bool {
 }
 
 type PosedEnds = (
-    Bus<'static, 'static, u16, NoMac, Posed>,
-    Guard<'static, 'static, u16, 64, OPENED, Posed, RANGE>,
+    Bus<'static, 'static, u16, NoMac, PosedRows>,
+    Guard<'static, 'static, u16, 64, OPENED, PosedRows, RANGE>,
 );
 
 /// Contacts of frames with poses equal those of frames whose vertices were moved: the mesh is rotated and travels in a
@@ -180,7 +180,7 @@ fn contacts_on_a_mesh_with_a_pose_are_those_of_the_moved_mesh() {
     let tree = TreeBytes::new(bytes);
     let surfaces = SurfaceLimits::reach_mm(2_000.0).speed(f32::INFINITY).recovery_mm(f32::INFINITY);
     let limits = GuardLimits::new(300.0, Millis(200)).surfaces(surfaces).automatic();
-    let posed: &'static Surface<ROWS, Posed> = Box::leak(Box::new(Surface::new()));
+    let posed: &'static Surface<ROWS, PosedRows> = Box::leak(Box::new(Surface::new()));
     let moved: &'static Surface<ROWS> = Box::leak(Box::new(Surface::new()));
     let (mut bus, mut guard): PosedEnds =
         posed.start_with_contacts(tree, limits, NoMac).expect("valid");

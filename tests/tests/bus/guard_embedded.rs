@@ -3,7 +3,7 @@
 // Requirements: C-07, F-07
 
 use dibs_build::{Builder, Volume, generate};
-use dibs_nostd::filter::{Filter, Motion, Reason};
+use dibs_nostd::filter::{Filter, Reason, RigidMotion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{GuardLimits, Rows, Surface, Vertices};
 use dibs_nostd::nodes::{Nodes, NodesError};
@@ -83,7 +83,7 @@ fn a_controller_runs_on_nodes() {
         let towards = (FLOW * (tick as f32 * 1e-3) - tool_at).normalize_or_zero() * 0.1;
         let end = tool_at + Vec3::new(30.0, 4.0, 10.0);
         let tool = Capsule::new(tool_at, end, 2.0).expect("valid");
-        let command = Motion::new(tool_at, towards, Vec3::ZERO);
+        let command = RigidMotion::new(tool_at, towards, Vec3::ZERO);
         let (answer, motion) = guard.admit(&filter, &tool, &command, Millis(now));
         let next = motion.map_or(Vec3::ZERO, |admitted| admitted.motion.apply(tool_at) - tool_at);
         if let Ok(closest) = answer.closest

@@ -3,7 +3,7 @@
 // Requirement: F-08
 
 use dibs_nostd::glam::{DVec3, Quat, Vec3};
-use dibs_nostd::guard::{Bus, Guard, GuardLimits, Posed, Surface};
+use dibs_nostd::guard::{Bus, Guard, GuardLimits, PosedRows, Surface};
 use dibs_nostd::wire::NoMac;
 use dibs_nostd::{Advance, Capsule, Millis, ReceiveError, SurfaceLimits, TreeBytes};
 use dibs_tests::posed::{Heart, Sent, beyond, exact, off, steady, truth};
@@ -14,8 +14,8 @@ pub const ROWS: usize = 162;
 /// Milliseconds between two frames.
 pub const PERIOD: u32 = 30;
 
-pub type TheBus<'s, 't> = Bus<'s, 't, u16, NoMac, Posed>;
-pub type TheGuard<'s, 't> = Guard<'s, 't, u16, 64, 96, Posed>;
+pub type TheBus<'s, 't> = Bus<'s, 't, u16, NoMac, PosedRows>;
+pub type TheGuard<'s, 't> = Guard<'s, 't, u16, 64, 96, PosedRows>;
 
 /// Without a limit on speed.
 pub fn limits() -> GuardLimits {
@@ -112,7 +112,7 @@ impl Case {
             poses[2] = (rotation.as_quat(), shift.as_vec3());
         }
         let frames = self.grown.map(|part| heart.grown(part));
-        let surface: Surface<ROWS, Posed> = Surface::new();
+        let surface: Surface<ROWS, PosedRows> = Surface::new();
         let tree = TreeBytes::<u16>::new(heart.built.blob());
         let (mut bus, mut guard): (TheBus<'_, '_>, TheGuard<'_, '_>) =
             surface.start(tree, limits()).expect("valid");
@@ -148,7 +148,7 @@ impl Case {
 fn without_poses_the_answers_are_those_of_rows_alone() {
     let heart = Heart::new(Vec3::new(20.0, 30.0, -10.0));
     let tree = TreeBytes::<u16>::new(heart.built.blob());
-    let (surface, rows_alone): (Surface<ROWS, Posed>, Surface<ROWS>) =
+    let (surface, rows_alone): (Surface<ROWS, PosedRows>, Surface<ROWS>) =
         (Surface::new(), Surface::new());
     let (mut bus, mut guard): (TheBus<'_, '_>, TheGuard<'_, '_>) =
         surface.start(tree, limits()).expect("valid");

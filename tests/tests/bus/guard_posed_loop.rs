@@ -2,9 +2,9 @@
 
 // Requirement: F-08
 
-use dibs_nostd::filter::{Filter, Motion, Reason};
+use dibs_nostd::filter::{Filter, Reason, RigidMotion};
 use dibs_nostd::glam::{DQuat, DVec3, Quat, Vec3};
-use dibs_nostd::guard::{GuardLimits, Posed, Surface};
+use dibs_nostd::guard::{GuardLimits, PosedRows, Surface};
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, Freshness};
 use dibs_nostd::{
@@ -79,7 +79,7 @@ fn is_right(truth: &Truth, found: &Proximity, now: u32) -> bool {
 
 fn walk(world: &World<'_>) -> u32 {
     let heart = world.heart;
-    let surface: Surface<ROWS, Posed> = Surface::new();
+    let surface: Surface<ROWS, PosedRows> = Surface::new();
     let tree = TreeBytes::<u16>::new(heart.built.blob());
     let limits = GuardLimits::new(300.0, Millis(200)).automatic();
     let (mut bus, mut guard): (TheBus<'_, '_>, TheGuard<'_, '_>) =
@@ -101,9 +101,10 @@ fn walk(world: &World<'_>) -> u32 {
         let tool = Capsule::new(ends[0], ends[1], 2.0).expect("valid");
         let towards = (middle(now) - tip).normalize_or_zero() * 0.15;
         let turn = Vec3::new(0.4e-3, -0.3e-3, 0.2e-3) * (now as f32 * 2e-3).cos();
-        let command = Motion::new(tip, towards, turn);
+        let command = RigidMotion::new(tip, towards, turn);
         let (answer, motion) = guard.admit(&filter, &tool, &command, Millis(now));
-        let executed = motion.map_or(Motion::translation(Vec3::ZERO), |admitted| admitted.motion);
+        let executed =
+            motion.map_or(RigidMotion::translation(Vec3::ZERO), |admitted| admitted.motion);
         if let Ok(closest) = answer.closest
             && now > 40 * PERIOD
         {
@@ -149,7 +150,7 @@ fn walk(world: &World<'_>) -> u32 {
 #[test]
 fn nodes_may_have_a_pose() {
     const STACK: usize = embedded_heart::STACK;
-    static HEART: Surface<{ embedded_heart::NODES }, Posed<Nodes<'static>>> = Surface::new();
+    static HEART: Surface<{ embedded_heart::NODES }, PosedRows<Nodes<'static>>> = Surface::new();
     let limits = GuardLimits::new(300.0, Millis(200)).automatic();
     let (mut bus, mut guard) =
         HEART.start::<_, STACK, 96>(embedded_heart::TREE, limits).expect("valid");
@@ -197,7 +198,7 @@ fn nodes_may_have_a_pose() {
 #[test]
 fn a_change_of_the_meshs_speed_is_in_the_accuracy() {
     let heart = Heart::new(Vec3::ZERO);
-    let surface: Surface<ROWS, Posed> = Surface::new();
+    let surface: Surface<ROWS, PosedRows> = Surface::new();
     let tree = TreeBytes::<u16>::new(heart.built.blob());
     let (mut bus, mut guard): (TheBus<'_, '_>, TheGuard<'_, '_>) =
         surface.start(tree, limits()).expect("valid");
@@ -235,7 +236,7 @@ fn a_change_of_the_meshs_speed_is_in_the_accuracy() {
 #[test]
 fn a_capture_that_goes_back_leaves_no_residual_of_the_pose() {
     let heart = Heart::new(Vec3::ZERO);
-    let surface: Surface<ROWS, Posed> = Surface::new();
+    let surface: Surface<ROWS, PosedRows> = Surface::new();
     let tree = TreeBytes::<u16>::new(heart.built.blob());
     let (mut bus, mut guard): (TheBus<'_, '_>, TheGuard<'_, '_>) =
         surface.start(tree, limits()).expect("valid");
@@ -262,7 +263,7 @@ fn a_capture_that_goes_back_leaves_no_residual_of_the_pose() {
 #[test]
 fn a_wrong_pose_is_refused_and_the_last_good_frame_stays() {
     let heart = Heart::new(Vec3::ZERO);
-    let surface: Surface<ROWS, Posed> = Surface::new();
+    let surface: Surface<ROWS, PosedRows> = Surface::new();
     let tree = TreeBytes::<u16>::new(heart.built.blob());
     let limits = GuardLimits::new(100.0, Millis(200)).automatic();
     let (mut bus, mut guard): (TheBus<'_, '_>, TheGuard<'_, '_>) =
@@ -356,7 +357,7 @@ fn a_wrong_pose_is_refused_and_the_last_good_frame_stays() {
 #[test]
 fn packets_have_no_pose_and_a_fast_turn_is_held() {
     let heart = Heart::new(Vec3::ZERO);
-    let surface: Surface<ROWS, Posed> = Surface::new();
+    let surface: Surface<ROWS, PosedRows> = Surface::new();
     let tree = TreeBytes::<u16>::new(heart.built.blob());
     let (mut bus, mut guard): (TheBus<'_, '_>, TheGuard<'_, '_>) =
         surface.start(tree, limits()).expect("valid");

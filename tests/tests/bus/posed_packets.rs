@@ -3,7 +3,7 @@
 // Requirements: F-08, B-01
 
 use dibs_nostd::glam::{Quat, Vec3};
-use dibs_nostd::guard::{GuardLimits, Posed, Surface};
+use dibs_nostd::guard::{GuardLimits, PosedRows, Surface};
 use dibs_nostd::wire::{AesCmac, Content, Encoding, Event, FrameEncoder, FrameId, NoMac};
 use dibs_nostd::{
     Advance, Millis, PoseError, Progress, ReceiveError, RigidPose, Sphere, StretchError, TreeBytes,
@@ -33,7 +33,7 @@ struct Line<'h, 's> {
 }
 
 impl<'h, 's> Line<'h, 's> {
-    fn new(heart: &'h Heart, surface: &'s Surface<ROWS, Posed>, limits: GuardLimits) -> Self {
+    fn new(heart: &'h Heart, surface: &'s Surface<ROWS, PosedRows>, limits: GuardLimits) -> Self {
         let tree = TreeBytes::<u16>::new(heart.built.blob());
         let (bus, guard) = surface.start(tree, limits).expect("valid");
         Self { heart, bus, guard }
@@ -305,7 +305,7 @@ fn a_pose_is_refused_where_none_is_taken_and_without_its_tag() {
         assert_eq!(bus.packet(packet, Millis(1)), Err(ReceiveError::Refused { epoch: 1, cause }));
     }
 
-    let surface: Surface<ROWS, Posed> = Surface::new();
+    let surface: Surface<ROWS, PosedRows> = Surface::new();
     let mac = || AesCmac::new(&[7; 16], 3, 0);
     let (mut bus, _guard) =
         surface.start_with_mac::<_, _, 64, 96>(tree, limits(), mac()).expect("valid");

@@ -4,7 +4,7 @@
 
 use dibs_build::Builder;
 use dibs_build::modes::ModalFit;
-use dibs_nostd::guard::{GuardLimits, Posed, Surface};
+use dibs_nostd::guard::{GuardLimits, PosedRows, Surface};
 use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
@@ -320,7 +320,7 @@ fn a_guard_takes_weights_with_a_pose() {
     let (built, _) = small(4);
     let tree = built.tree::<u16>().expect("valid");
     let modes = Modes::of(&tree).expect("has modes");
-    let (plain, posed): (Surface<162>, Surface<162, Posed>) = (Surface::new(), Surface::new());
+    let (plain, posed): (Surface<162>, Surface<162, PosedRows>) = (Surface::new(), Surface::new());
     let limits = GuardLimits::new(1e5, Millis(1_000)).automatic();
     let bytes = TreeBytes::<u16>::new(built.blob());
     let (mut bus, mut guard) = plain.start::<_, 64, 96>(bytes, limits).expect("valid");

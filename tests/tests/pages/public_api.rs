@@ -1,10 +1,11 @@
 //! `docs/evidence/public-api.txt` lists the public items of the libraries. `DIBS_WRITE=1` writes it anew.
 //!
-//! An item has a path: a type, trait, function, constant or macro. Methods and fields are not listed.
+//! An item has a path: a type, trait, function, constant or macro. Methods and fields are not listed. A type's name is a
+//! noun, which no other type of these libraries has.
 
 // Requirement: E-04
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -35,6 +36,65 @@ fn the_public_items_are_those_that_are_listed() {
     keep("public-api.txt", &listing);
 }
 
+/// The list that is recorded.
+fn recorded() -> String {
+    let path = Path::new(REPOSITORY).join("docs/evidence/public-api.txt");
+    fs::read_to_string(path).expect("the list")
+}
+
+/// Prepositions and adverbs of place: no thing has such a name.
+const PREPOSITIONS: [&str; 22] = [
+    "Above", "After", "Ahead", "Around", "Before", "Behind", "Below", "Beside", "Between",
+    "Beyond", "From", "In", "Inside", "Into", "Near", "Of", "Outside", "Over", "Under", "With",
+    "Within", "Without",
+];
+
+/// Participles that do not end in "ed" or "ing".
+const PARTICIPLES: [&str; 18] = [
+    "Built", "Drawn", "Found", "Given", "Held", "Kept", "Known", "Left", "Lost", "Made", "Met",
+    "Seen", "Sent", "Shown", "Stuck", "Taken", "Told", "Written",
+];
+
+/// Types whose names end as a participle does: here the word is a noun.
+const NOUNS: [&str; 2] = [
+    // A code for positions, as in "character encoding".
+    "dibs_nostd::wire::Encoding",
+    // What a meter shows, as in "meter reading".
+    "dibs_nostd::MotionReading",
+];
+
+/// A type's name without its path; `None` for functions, constants, macros and modules.
+fn type_name(item: &str) -> Option<&str> {
+    let name = item.rsplit(':').next()?;
+    let is_type = name.starts_with(char::is_uppercase) && name.contains(char::is_lowercase);
+    is_type.then_some(name)
+}
+
+/// Whether the last word of a type's name can be a noun.
+fn is_noun(name: &str) -> bool {
+    let word = &name[name.rfind(char::is_uppercase).unwrap_or_default()..];
+    let is_participle =
+        word.ends_with("ed") || word.ends_with("ing") || PARTICIPLES.contains(&word);
+    !is_participle && !PREPOSITIONS.contains(&word)
+}
+
+#[test]
+fn types_are_named_by_nouns_and_each_name_stands_once() {
+    let listed = recorded();
+    let types: Vec<(&str, &str)> =
+        listed.lines().filter_map(|item| Some((item, type_name(item)?))).collect();
+    let wrong = types.iter().filter(|(_, name)| !is_noun(name)).map(|&(item, _)| item);
+    // An exception that is no longer needed goes, too.
+    assert_eq!(wrong.collect::<BTreeSet<_>>(), BTreeSet::from(NOUNS));
+    let mut paths: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for &(item, name) in &types {
+        paths.entry(name).or_default().push(item);
+    }
+    paths.retain(|_, paths| paths.len() > 1);
+    assert!(types.len() > 150 && paths.is_empty(), "of one name: {paths:?}");
+    assert!(["Posed", "LastSent", "Beyond", "FactsOf"].iter().all(|name| !is_noun(name)));
+}
+
 /// Where an item of the core's root may be used: examples, products, and the code in documents.
 const USES: [&str; 11] = [
     "examples",
@@ -52,8 +112,7 @@ const USES: [&str; 11] = [
 
 #[test]
 fn every_item_of_the_root_is_in_an_example_or_a_product() {
-    let path = Path::new(REPOSITORY).join("docs/evidence/public-api.txt");
-    let listed = fs::read_to_string(path).expect("the list");
+    let listed = recorded();
     let items = listed.lines().filter_map(|line| line.strip_prefix("dibs_nostd::"));
     let items: BTreeSet<&str> = items.filter(|item| !item.contains(':')).collect();
     let mut words = BTreeSet::new();

@@ -6,7 +6,9 @@
 // Requirements: C-05, C-06
 
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
-use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, MotionRow, Reason, Uncertainty};
+use dibs_nostd::filter::{
+    AdmittedMotion, Filter, FilterError, MotionRow, Reason, RigidMotion, Uncertainty,
+};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Cost, Millis, MovingTable, Odometer, Tracker};
 use dibs_tests::deform::unit;
@@ -110,7 +112,7 @@ impl Bench {
         Self { built, rows, filter, uncertainty: Uncertainty::NONE, own: vec![], period: 0.001 }
     }
 
-    fn ask(&self, tool: &Capsule, command: &Motion) -> Result<Admitted, FilterError> {
+    fn ask(&self, tool: &Capsule, command: &RigidMotion) -> Result<AdmittedMotion, FilterError> {
         let tree = self.built.tree::<u16>().expect("16-bit indices");
         let mut tracker = Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough");
         let mut odometer = Odometer::new(&tree);
@@ -128,14 +130,14 @@ fn capsule(start: Vec3, end: Vec3) -> Capsule {
 fn bad_input_is_named() {
     let mut bench = Bench::new(&ball(2), 1.0);
     let tool = capsule(Vec3::Z * 45.0, Vec3::Z * 80.0);
-    let step = Motion::translation(Vec3::X * 0.1);
+    let step = RigidMotion::translation(Vec3::X * 0.1);
     assert_eq!(bench.ask(&tool, &step).expect("an answer").reason, Reason::Commanded);
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for axis in [Vec3::X, Vec3::Z] {
             let commands = [
-                Motion { translation: axis * bad, ..step },
-                Motion { rotation: axis * bad, ..step },
-                Motion { about: axis * bad, ..step },
+                RigidMotion { translation: axis * bad, ..step },
+                RigidMotion { rotation: axis * bad, ..step },
+                RigidMotion { about: axis * bad, ..step },
             ];
             for command in commands {
                 assert_eq!(bench.ask(&tool, &command), Err(FilterError::Command));
@@ -188,7 +190,7 @@ fn bad_input_is_named() {
     assert_eq!(refused, Err(FilterError::Pairs { found: 0, most: Filter::MOST_PAIRS }));
     // A large command is shortened to the robot's speed.
     bench.own.clear();
-    let leap = Motion::new(tool.start(), Vec3::splat(1e30), Vec3::splat(-1e9));
+    let leap = RigidMotion::new(tool.start(), Vec3::splat(1e30), Vec3::splat(-1e9));
     let admitted = bench.ask(&tool, &leap).expect("an answer");
     assert!(admitted.motion.translation.length() < 0.2001, "{admitted:?}");
     assert_ne!(admitted.reason, Reason::Commanded);
@@ -214,7 +216,7 @@ fn a_start_too_near_leads_out_and_is_no_pass() {
         let bench = Bench::new(&mesh, stand_off);
         let (mut said, mut ticks) = (0, 0);
         while truth(&tool) < f64::from(stand_off) - 0.011 || ticks == 0 || ticks < 20 {
-            let command = Motion::new(tool.start(), Vec3::NEG_Z * 0.2, Vec3::ZERO);
+            let command = RigidMotion::new(tool.start(), Vec3::NEG_Z * 0.2, Vec3::ZERO);
             let admitted = bench.ask(&tool, &command).expect("an answer");
             let is_near = truth(&tool) < f64::from(stand_off) - 0.02;
             assert!(!is_near || admitted.reason == Reason::NoSafeMotion, "{number}: {admitted:?}");
@@ -234,7 +236,7 @@ fn a_gap_too_narrow_is_said() {
     let gap = sheet(12, 40.0, |x, _| 30.0 * ((x.abs() - 3.5) / 3.0).clamp(0.0, 1.0));
     let bench = Bench::new(&gap, 4.0);
     let tool = capsule(Vec3::new(0.1, 0.0, 10.0), Vec3::new(0.0, 0.0, 60.0));
-    let admitted = bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer");
+    let admitted = bench.ask(&tool, &RigidMotion::translation(Vec3::X * 0.1)).expect("an answer");
     assert_eq!(admitted.reason, Reason::NoSafeMotion);
 }
 
@@ -256,7 +258,7 @@ fn rows_of_the_caller_hold() {
     let (mut moved, mut walls) = (0, 0);
     for _ in 0..200 {
         let push = unit(&mut rng) * 0.2;
-        let command = Motion::new(tip, push, unit(&mut rng) * 0.003);
+        let command = RigidMotion::new(tip, push, unit(&mut rng) * 0.003);
         let admitted = bench.ask(&tool, &command).expect("an answer");
         let motion = admitted.motion;
         let at_port = motion.translation + motion.rotation.cross(port - tip);
@@ -279,9 +281,10 @@ fn rows_that_no_motion_keeps_leave_the_tool_at_rest() {
     let far = MotionRow { linear: [0.0; 3], angular: [0.0, 0.0, 1.0], least: 1e20 };
     for own in [apart.to_vec(), vec![far]] {
         bench.own = own;
-        let admitted = bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer");
+        let admitted =
+            bench.ask(&tool, &RigidMotion::translation(Vec3::X * 0.1)).expect("an answer");
         assert_eq!(admitted.reason, Reason::Stopped, "{admitted:?}");
-        let Motion { translation, rotation, .. } = admitted.motion;
+        let RigidMotion { translation, rotation, .. } = admitted.motion;
         assert_eq!((translation, rotation), (Vec3::ZERO, Vec3::ZERO));
     }
 }
@@ -295,7 +298,8 @@ fn a_tool_without_a_command_retreats_from_an_approaching_surface() {
     let tip = Vec3::new(0.3, 0.2, 2.05);
     let tool = capsule(tip, tip + Vec3::Z * 40.0);
     for (step, reason) in [(Vec3::ZERO, Reason::Retreating), (Vec3::X * 0.1, Reason::Nearest)] {
-        let admitted = bench.ask(&tool, &Motion::new(tip, step, Vec3::ZERO)).expect("an answer");
+        let admitted =
+            bench.ask(&tool, &RigidMotion::new(tip, step, Vec3::ZERO)).expect("an answer");
         assert_eq!(admitted.reason, reason, "{admitted:?}");
         let off = admitted.motion.translation - step - Vec3::Z * 0.05;
         assert!(off.length() < 5e-3, "{admitted:?}");
@@ -314,7 +318,7 @@ fn a_wall_beyond_the_sixteenth_row_replaces_another() {
     let [left, right] = [2.05, 2.1].map(|apart: f32| apart * std::f32::consts::SQRT_2);
     let tip = Vec3::new(0.5 * (left - right), 0.3, 0.5 * (left + right));
     let tool = capsule(tip, tip + Vec3::Z * 40.0);
-    let command = Motion::new(tip, Vec3::X * 0.2, Vec3::ZERO);
+    let command = RigidMotion::new(tip, Vec3::X * 0.2, Vec3::ZERO);
     let mut trackers: [_; Filter::<0>::MOST_PAIRS] =
         std::array::from_fn(|_| Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough"));
     let mut pairs: Vec<_> = trackers.iter_mut().map(|tracker| (tracker, &surface, &tool)).collect();
@@ -340,7 +344,7 @@ fn nothing_unverified_is_admitted() {
     let mut admitted = 0;
     for budget in [0, 2_000, 5_000, 10_000, 30_000, 100_000] {
         bench.filter = bench.filter.budget(budget);
-        let found = bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer");
+        let found = bench.ask(&tool, &RigidMotion::translation(Vec3::X * 0.1)).expect("an answer");
         assert!(found.instructions <= budget, "{budget}: {found:?}");
         let is_admitted = found.reason == Reason::Commanded;
         assert!(is_admitted || found.motion.translation == Vec3::ZERO, "{found:?}");
@@ -358,7 +362,7 @@ fn a_search_costs_what_the_filter_was_told() {
     let ample = bench.filter.budget(2_000_000);
     let mut asked = |filter: Filter| {
         bench.filter = filter;
-        bench.ask(&tool, &Motion::translation(Vec3::X * 0.1)).expect("an answer")
+        bench.ask(&tool, &RigidMotion::translation(Vec3::X * 0.1)).expect("an answer")
     };
     let by_default = asked(ample);
     assert_eq!(asked(ample.cost(Cost::M7_TICK)), by_default);
@@ -383,7 +387,7 @@ fn no_pair_goes_without_an_answer() {
         [-20.0, 0.0, 20.0].map(|x| capsule(Vec3::new(x, 0.0, 50.0), Vec3::new(x, 0.0, 90.0)));
     let mut trackers =
         tools.map(|_| Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough"));
-    let command = Motion::translation(Vec3::X * 0.1);
+    let command = RigidMotion::translation(Vec3::X * 0.1);
     for budget in [200_000, 3 * Cost::M7_TICK.base] {
         let mut pairs: Vec<_> = trackers
             .iter_mut()
@@ -407,7 +411,7 @@ fn an_approach_takes_its_time() {
     bench.filter = bench.filter.approach(TIME).expect("in range");
     let at = |height: f32| capsule(Vec3::new(0.0, 0.0, height), Vec3::new(0.0, 0.0, height + 40.0));
     let asked = |height: f32, step: Vec3| {
-        bench.ask(&at(height), &Motion::translation(step)).expect("an answer")
+        bench.ask(&at(height), &RigidMotion::translation(step)).expect("an answer")
     };
     let push = Vec3::Z * -0.2;
     let (mut height, mut eased) = (10.0, 0);

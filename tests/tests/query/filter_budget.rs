@@ -4,7 +4,7 @@
 // Requirement: C-05
 
 use dibs_build::{Builder, generate};
-use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
+use dibs_nostd::filter::{Filter, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Options, Query, Tracker};
 use dibs_tests::deform::unit;
@@ -58,7 +58,7 @@ fn push(instructions: u32, seed: u64) -> Run {
         let admitted = filter
             .admit(
                 &mut pairs,
-                &Motion { about: ends[0], ..Motion::translation(way) },
+                &RigidMotion { about: ends[0], ..RigidMotion::translation(way) },
                 TICK,
                 &uncertainty,
                 &[],

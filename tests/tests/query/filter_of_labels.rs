@@ -3,7 +3,7 @@
 // Requirements: C-05, C-06
 
 use dibs_build::{Builder, BuiltTree, Mesh};
-use dibs_nostd::filter::{Admitted, Filter, FilterError, Motion, Reason, Uncertainty};
+use dibs_nostd::filter::{AdmittedMotion, Filter, FilterError, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Odometer, Tracker};
 use dibs_tests::filter::{Episode, Tally, labelled_scenes, walk_by_label};
@@ -88,7 +88,7 @@ fn ask<const LABELS: usize>(
     filter: &Filter<LABELS>,
     tools: &[Capsule],
     step: Vec3,
-) -> Result<Admitted, FilterError> {
+) -> Result<AdmittedMotion, FilterError> {
     let tree = built.tree::<u16>().expect("16-bit indices");
     let mut odometer = Odometer::new(&tree);
     let surface = odometer.start(rows.as_slice());
@@ -96,7 +96,7 @@ fn ask<const LABELS: usize>(
     let mut trackers: Vec<_> = tools.iter().map(tracker).collect();
     let mut pairs: Vec<_> =
         trackers.iter_mut().zip(tools).map(|(tracker, tool)| (tracker, &surface, tool)).collect();
-    filter.admit(&mut pairs, &Motion::translation(step), 0.001, &Uncertainty::NONE, &[])
+    filter.admit(&mut pairs, &RigidMotion::translation(step), 0.001, &Uncertainty::NONE, &[])
 }
 
 /// Near a lesion the tool moves as if there were no vessel, and before the vessel it stops.

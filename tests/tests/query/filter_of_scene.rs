@@ -3,7 +3,7 @@
 // Requirements: C-05, C-06
 
 use dibs_build::{Builder, Mesh};
-use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
+use dibs_nostd::filter::{Filter, Reason, RigidMotion, Uncertainty};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Capsule, Odometer, Tracker};
 use dibs_tests::deform::unit;
@@ -58,7 +58,7 @@ fn two_tools_keep_off_two_surfaces() {
         let [a, b, c, d] = &mut trackers;
         let [tip, shaft] = &tools;
         let mut pairs = [(a, &wall, tip), (b, &wall, shaft), (c, &organ, tip), (d, &organ, shaft)];
-        let command = Motion::new(joints[0], (goal - joints[0]).clamp_length_max(0.2), spin);
+        let command = RigidMotion::new(joints[0], (goal - joints[0]).clamp_length_max(0.2), spin);
         let admitted = filter.admit(&mut pairs, &command, PERIOD as f32, &uncertainty, &[]);
         let admitted = admitted.expect("an answer");
         assert_ne!(admitted.reason, Reason::NoSafeMotion, "{tick}: {admitted:?}");

@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use std::collections::HashSet;
 use std::path::Path;
 
-use dibs_build::modes::{MARGIN, ModalFit, ModesError, Projector};
+use dibs_build::modes::{FitError, MARGIN, ModalFit, Projector};
 use dibs_build::{Builder, IndexWidth, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::modes::{
@@ -206,25 +206,25 @@ fn what_cannot_be_fitted_is_named() {
     let tree = Builder::new().build(&mesh).expect("a valid mesh");
     let fit =
         |frames: Vec<Vec<Vec3>>| ModalFit::new(&mesh, &Motion { frames, ..Motion::default() });
-    assert!(matches!(fit(vec![]), Err(ModesError::Frames { frames: 0 })));
+    assert!(matches!(fit(vec![]), Err(FitError::Frames { frames: 0 })));
     let still = fit(vec![mesh.positions.clone(); 3]);
-    assert!(matches!(still, Err(ModesError::Still)));
+    assert!(matches!(still, Err(FitError::Still)));
     let short = fit(vec![mesh.positions[1..].to_vec()]);
-    assert!(matches!(short, Err(ModesError::Mismatch(_))));
+    assert!(matches!(short, Err(FitError::Mismatch(_))));
     let mut wrong = motion.frames.clone();
     wrong[3][7].y = f32::NAN;
     let wrong = fit(wrong);
-    assert!(matches!(wrong, Err(ModesError::Coordinate { frame: 3, vertex: 7 })));
+    assert!(matches!(wrong, Err(FitError::Coordinate { frame: 3, vertex: 7 })));
     let good = fit(motion.frames).expect("a motion");
     for asked in [0, 3, 100] {
         let refused = tree.with_modes(&good, asked);
-        assert!(matches!(refused, Err(ModesError::Count { available: 2, .. })), "{asked}");
+        assert!(matches!(refused, Err(FitError::Count { available: 2, .. })), "{asked}");
     }
     let bare = Builder::new().with_rest_shape(false).build(&mesh).expect("a valid mesh");
-    assert!(matches!(bare.with_modes(&good, 2), Err(ModesError::NoRestShape)));
+    assert!(matches!(bare.with_modes(&good, 2), Err(FitError::NoRestShape)));
     let other = generate::heart(322).expect("a valid size").mesh;
     let other = Builder::new().build(&other).expect("a valid mesh");
-    assert!(matches!(other.with_modes(&good, 2), Err(ModesError::OtherMesh)));
+    assert!(matches!(other.with_modes(&good, 2), Err(FitError::OtherMesh)));
     let bare = tree.tree::<u16>().expect("valid");
     assert!(matches!(Modes::of(&bare), Err(modes::ModesError::Absent)));
 }

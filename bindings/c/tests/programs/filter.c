@@ -61,7 +61,7 @@ int main(int argc, char **argv) {
     for (uint32_t tick = 0; fgets(line, sizeof line, commands) != NULL; tick++) {
         char *rest = line;
         const uint32_t number = (uint32_t)strtoul(rest, &rest, 10);
-        dibs_motion command = {.about = tools[1].end};
+        dibs_rigid_motion command = {.about = tools[1].end};
         float *values = &command.translation.x;
         for (size_t at = 0; at < 6; at++) {
             values[at] = strtof(rest, &rest);
@@ -83,13 +83,13 @@ int main(int argc, char **argv) {
         /* A larger stand-off from the vessel. */
         filter.label_count = tick % 4 == 3 ? 0 : 1;
         filter.labels[0] = (dibs_stand_off_of){.label = 2, .stand_off = 3.0f};
-        dibs_admitted admitted;
+        dibs_admitted_motion admitted;
         must(dibs_filter_admit(&filter, trackers, NULL, tools, 2, &command, 0.001f, &uncertainty, &row, rows, &admitted));
         printf("%u %u %u", admitted.reason, admitted.queries, admitted.instructions);
         print_floats(&admitted.least_separation, 1);
         print_floats(&admitted.motion.about.x, 9);
         for (size_t at = 0; at < 2; at++) {
-            must(dibs_motion_apply(&admitted.motion, &tools[at], &tools[at]));
+            must(dibs_rigid_motion_apply(&admitted.motion, &tools[at], &tools[at]));
             print_floats(&tools[at].start.x, 7);
         }
         printf("\n");

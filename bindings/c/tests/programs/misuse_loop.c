@@ -94,9 +94,9 @@ static void start(const unsigned char *bytes, size_t length) {
 
     const dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
     const dibs_filter none = dibs_filter_of(-1.0f, 200.0f);
-    const dibs_motion command = {.about = tool.start};
+    const dibs_rigid_motion command = {.about = tool.start};
     dibs_tool bad = tool;
-    dibs_admitted admitted = {.queries = 77};
+    dibs_admitted_motion admitted = {.queries = 77};
     bad.radius = -1.0f;
     EXPECT(NULL, dibs_guard_admit(NULL, &filter, &tool, &command, 1, NULL, &admitted));
     EXPECT(NULL, dibs_guard_admit(guard, NULL, &tool, &command, 1, NULL, &admitted));

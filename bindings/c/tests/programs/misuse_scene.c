@@ -130,10 +130,10 @@ static void trackers(const float *positions, uint32_t vertices) {
 
     /* The filter: bad input is a code, and nothing is admitted. */
     dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
-    dibs_motion command = {.about = tool.start, .translation = {0.1f, 0.0f, 0.0f}};
+    dibs_rigid_motion command = {.about = tool.start, .translation = {0.1f, 0.0f, 0.0f}};
     dibs_uncertainty still = {0.0f, 0.0f};
     dibs_motion_row rows[DIBS_FILTER_ROWS + 1] = {0};
-    dibs_admitted admitted = {.queries = 77};
+    dibs_admitted_motion admitted = {.queries = 77};
 #define ADMIT(code, trackers, frame, tools, count, period, row, row_count)                                                 \
     expect(DIBS_CODE_##code,                                                                                               \
            dibs_filter_admit(&filter, trackers, frame, tools, count, &command, period, &still, row, row_count, &admitted), \
@@ -154,7 +154,7 @@ static void trackers(const float *positions, uint32_t vertices) {
     ADMIT(FILTER, both, NULL, tools, 2, NAN, NULL, 0);
     rows[0].least = NAN;
     ADMIT(NOT_FINITE, both, NULL, tools, 2, 0.001f, rows, 1);
-    const struct { dibs_filter filter; dibs_motion command; dibs_uncertainty still; dibs_code code; } wrong[] = {
+    const struct { dibs_filter filter; dibs_rigid_motion command; dibs_uncertainty still; dibs_code code; } wrong[] = {
         {dibs_filter_of(-1.0f, 200.0f), command, still, DIBS_CODE_FILTER},
         {dibs_filter_of(NAN, 200.0f), command, still, DIBS_CODE_FILTER},
         {dibs_filter_of(1.0f, 0.0f), command, still, DIBS_CODE_FILTER},
@@ -191,8 +191,8 @@ static void trackers(const float *positions, uint32_t vertices) {
     EXPECT(OK, dibs_uncertainty_stand_off(&still, 0.001f, &distance));
     EXPECT_THAT(distance >= 0.6f && distance < 0.6001f);
     dibs_tool moved;
-    EXPECT(NULL, dibs_motion_apply(NULL, &tool, &moved));
-    EXPECT(OK, dibs_motion_apply(&command, &tool, &moved));
+    EXPECT(NULL, dibs_rigid_motion_apply(NULL, &tool, &moved));
+    EXPECT(OK, dibs_rigid_motion_apply(&command, &tool, &moved));
     EXPECT_THAT(moved.start.x == tool.start.x + 0.1f && moved.radius == tool.radius);
 }
 

@@ -124,7 +124,7 @@ static unsigned send_poses(dibs_tree *tree, const char *target, const unsigned c
                            const dibs_guard_limits *limits, float *positions, uint32_t vertices) {
     dibs_bus *mirror;
     dibs_guard *mirrored;
-    dibs_sent sent;
+    dibs_sent_frame sent;
     char sentence[512];
     unsigned received = 0;
     dibs_sender_settings settings = dibs_sender_settings_of();
@@ -172,7 +172,7 @@ int main(int argc, char **argv) {
     char target[64], sentence[512];
     dibs_tree *tree = NULL;
     dibs_tree_facts of_tree;
-    dibs_sent sent;
+    dibs_sent_frame sent;
     dibs_sender_settings settings = dibs_sender_settings_of();
     unsigned received = 0, allocated = 0;
     if (argc != 4) {

@@ -150,12 +150,12 @@ int main(int argc, char **argv) {
         const dibs_uncertainty still = {0.0f, 0.0f};
         dibs_tracker *one[] = {tracker};
         dibs_tool at = tool;
-        dibs_admitted admitted;
+        dibs_admitted_motion admitted;
         for (int tick = 0; tick < 200; tick++) {
-            const dibs_motion command = {at.start, {-0.5f, 0.0f, 0.0f}, {}};
+            const dibs_rigid_motion command = {at.start, {-0.5f, 0.0f, 0.0f}, {}};
             MUST(filter.admit(one, dibs::Tools(&at, 1), command, 0.001f, still, admitted, {}, frame));
             EXPECT(true, admitted.least_separation > 0.98f && admitted.reason != DIBS_REASON_NO_SAFE_MOTION);
-            MUST(dibs_motion_apply(&admitted.motion, &at, &at));
+            MUST(dibs_rigid_motion_apply(&admitted.motion, &at, &at));
         }
         EXPECT(true, admitted.reason != DIBS_REASON_COMMANDED && at.start.x < 99.0f);
         MUST(query.closest(frame, at, on_bus));
@@ -312,7 +312,7 @@ int main(int argc, char **argv) {
     EXPECT(true, at.x == positions[3 * 501]);
     EXPECT(DIBS_CODE_ARGUMENT, dibs_bus_position(bus, 502, &at));
     EXPECT(true, answer.trust.state == DIBS_STATE_SAFE && answer.outcome != DIBS_CODE_OK);
-    dibs_admitted admitted;
+    dibs_admitted_motion admitted;
     const auto cause = guard.admit(dibs::Filter(1.0f, 200.0f), tool, {tool.start, {}, {}}, 2, admitted, &answer);
     EXPECT(true, cause != DIBS_CODE_OK && cause == answer.trust.cause && answer.age.epoch == 2);
     EXPECT(DIBS_CODE_ACKNOWLEDGE, guard.acknowledge());

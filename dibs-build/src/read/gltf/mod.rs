@@ -74,7 +74,7 @@ pub(super) fn read(bytes: &[u8], folder: &Path) -> Result<Raw> {
     if document.nodes.is_empty() {
         // A library of meshes without a scene: each mesh untransformed.
         for (number, mesh) in document.meshes.iter().enumerate() {
-            surface.mesh(mesh, number, &Placed::At(DMat4::IDENTITY), &mesh.weights)?;
+            surface.mesh(mesh, number, &Placement::At(DMat4::IDENTITY), &mesh.weights)?;
         }
     }
     let is_elsewhere = |(node, seen): &(&Node, &bool)| node.mesh.is_some() && !**seen;
@@ -212,7 +212,7 @@ struct LeftOut {
 }
 
 /// What transforms a mesh.
-enum Placed {
+enum Placement {
     /// Its node.
     At(DMat4),
     /// The joints of its skin, and not its node.
@@ -240,18 +240,30 @@ impl Surface<'_> {
             self.left_out.instanced += 1;
         }
         let placed = match node.skin {
-            None => Placed::At(*place),
+            None => Placement::At(*place),
             Some(skin) => {
                 self.left_out.skinned += 1;
                 let skin = get(&self.document.skins, skin, "skin")?;
                 let (document, most) = (self.document, self.most);
-                Placed::Posed(skin::joints(document, &mut self.buffers, &self.worlds, skin, most)?)
+                Placement::Posed(skin::joints(
+                    document,
+                    &mut self.buffers,
+                    &self.worlds,
+                    skin,
+                    most,
+                )?)
             }
         };
         self.mesh(mesh, number, &placed, node.weights.as_ref().unwrap_or(&mesh.weights))
     }
 
-    fn mesh(&mut self, mesh: &Mesh, node: usize, placed: &Placed, weights: &[f64]) -> Result<()> {
+    fn mesh(
+        &mut self,
+        mesh: &Mesh,
+        node: usize,
+        placed: &Placement,
+        weights: &[f64],
+    ) -> Result<()> {
         let is_morphed = mesh.primitives.iter().any(|primitive| !primitive.targets.is_empty());
         self.left_out.morphed += usize::from(is_morphed);
         for primitive in &mesh.primitives {
@@ -267,7 +279,7 @@ impl Surface<'_> {
         &mut self,
         primitive: &Primitive,
         node: usize,
-        placed: &Placed,
+        placed: &Placement,
         weights: &[f64],
     ) -> Result<()> {
         let mode = primitive.mode.unwrap_or(4);
@@ -297,10 +309,10 @@ impl Surface<'_> {
                 let first = self.raw.positions.len() as u32;
                 let mut points = self.points(primitive, positions, weights)?;
                 match placed {
-                    Placed::At(place) => {
+                    Placement::At(place) => {
                         points.iter_mut().for_each(|point| *point = place.transform_point3(*point));
                     }
-                    Placed::Posed(joints) => {
+                    Placement::Posed(joints) => {
                         let (document, most) = (self.document, self.most);
                         skin::pose(
                             document,
@@ -330,8 +342,10 @@ impl Surface<'_> {
         };
         // A mirror turns triangles inside out: reversing their order keeps their outer side outside.
         let is_mirrored = match placed {
-            Placed::At(place) => place.determinant() < 0.0,
-            Placed::Posed(joints) => joints.first().is_some_and(|joint| joint.determinant() < 0.0),
+            Placement::At(place) => place.determinant() < 0.0,
+            Placement::Posed(joints) => {
+                joints.first().is_some_and(|joint| joint.determinant() < 0.0)
+            }
         };
         self.left_out.corners += match (mode, corners.len()) {
             (4, count) => count % 3,

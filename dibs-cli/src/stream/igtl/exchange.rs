@@ -1,7 +1,7 @@
 //! The state shared by two threads: one reads a peer, the other sends to the receiver.
 
 use super::message;
-use super::tool::Sent;
+use super::tool::SentSurface;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -89,7 +89,7 @@ struct State {
     report: Option<Report>,
     /// The code of the last status, and its time.
     reported: Option<(u16, Instant)>,
-    sent: Option<Arc<Sent>>,
+    sent: Option<Arc<SentSurface>>,
 }
 
 impl Exchange {
@@ -212,11 +212,11 @@ impl Exchange {
     }
 
     /// Keeps the frame that was sent last, for answers about a tool.
-    pub fn keep(&self, sent: Sent) {
+    pub fn keep(&self, sent: SentSurface) {
         self.state().sent = Some(Arc::new(sent));
     }
 
-    pub fn sent(&self) -> Option<Arc<Sent>> {
+    pub fn sent(&self) -> Option<Arc<SentSurface>> {
         self.state().sent.clone()
     }
 

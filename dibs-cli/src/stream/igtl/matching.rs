@@ -11,7 +11,7 @@ const ROUNDS: usize = 64;
 
 /// The result of comparing two lists of triangles.
 #[derive(Debug, PartialEq)]
-pub enum Matched {
+pub enum MatchResult {
     /// Isomorphic in one way: pairs of a vertex of the first list and the corresponding vertex of the second.
     One(Vec<[u32; 2]>),
     /// Isomorphic in several ways, or in one that the colours do not distinguish.
@@ -20,41 +20,41 @@ pub enum Matched {
 }
 
 /// Compares with the triangles' winding, and if that fails without it: a builder may have flipped triangles outwards.
-pub fn matched(ours: &[[u32; 3]], theirs: &[[u32; 3]]) -> Matched {
+pub fn matched(ours: &[[u32; 3]], theirs: &[[u32; 3]]) -> MatchResult {
     if ours.len() != theirs.len() {
-        return Matched::None;
+        return MatchResult::None;
     }
     let any = turned(ours, theirs, false);
     match turned(ours, theirs, true) {
         // A mesh that is its own mirror image, from a source that may flip all triangles.
-        Matched::One(_) if any == Matched::Several => Matched::Several,
-        Matched::None => any,
+        MatchResult::One(_) if any == MatchResult::Several => MatchResult::Several,
+        MatchResult::None => any,
         found => found,
     }
 }
 
-fn turned(ours: &[[u32; 3]], theirs: &[[u32; 3]], is_oriented: bool) -> Matched {
+fn turned(ours: &[[u32; 3]], theirs: &[[u32; 3]], is_oriented: bool) -> MatchResult {
     let mut both = [Colours::new(ours, is_oriented), Colours::new(theirs, is_oriented)];
     let mut last = 0;
     for _ in 0..ROUNDS {
         let [first, second] = both.each_ref().map(Colours::sorted);
         if !first.iter().map(|one| one.0).eq(second.iter().map(|one| one.0)) {
-            return Matched::None;
+            return MatchResult::None;
         }
         let colours = first.chunk_by(|one, next| one.0 == next.0).count();
         if colours == first.len() {
             let pairs: Vec<[u32; 2]> =
                 first.iter().zip(&second).map(|(one, other)| [one.1, other.1]).collect();
             let is_same = is_same(ours, theirs, &pairs, is_oriented);
-            return if is_same { Matched::One(pairs) } else { Matched::None };
+            return if is_same { MatchResult::One(pairs) } else { MatchResult::None };
         }
         if colours == last {
-            return Matched::Several;
+            return MatchResult::Several;
         }
         last = colours;
         both.iter_mut().for_each(Colours::refine);
     }
-    Matched::Several
+    MatchResult::Several
 }
 
 struct Colours<'a> {

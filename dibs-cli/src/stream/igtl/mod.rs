@@ -17,10 +17,10 @@ mod topology;
 
 pub use exchange::{Exchange, Report};
 pub use peer::Address;
-pub use tool::{Sent, Tracked};
+pub use tool::{SentSurface, TrackedTool};
 
 use super::coordinates::SourceCoordinates;
-use super::live::Parsed;
+use super::live::ParsedFrame;
 use super::part::Part;
 use anyhow::Result;
 use content::{Content, Kind};
@@ -29,7 +29,7 @@ use dibs_build::glam::Vec3;
 use dibs_nostd::RigidPose;
 use exchange::Cause;
 use message::{BodyError, Header};
-use peer::{Door, Ended, Peer};
+use peer::{ConnectionEnd, Door, Peer};
 use pose::Pose;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -46,7 +46,7 @@ pub struct Igtl {
     /// If given, the device whose pose every frame gets.
     pose_device: Option<String>,
     /// If given, the tool whose messages are answered.
-    tool: Option<Tracked>,
+    tool: Option<TrackedTool>,
     /// Why the last message of the surface was refused.
     surface_refused: Option<Cause>,
     /// The last pose and positions.
@@ -79,7 +79,7 @@ impl Igtl {
     pub fn new(
         address: &Address,
         [device, pose_device]: [Option<String>; 2],
-        tool: Option<Tracked>,
+        tool: Option<TrackedTool>,
         patience: Duration,
         place: SourceCoordinates,
         exchange: Arc<Exchange>,
@@ -113,7 +113,7 @@ impl Igtl {
     ///
     /// # Errors
     /// If the server cannot be reached, or sends no message, within the time that the user allows.
-    pub fn next(&mut self) -> Result<Option<Parsed>> {
+    pub fn next(&mut self) -> Result<Option<ParsedFrame>> {
         loop {
             let mut peer = match self.peer.take() {
                 Some(peer) => peer,
@@ -135,9 +135,11 @@ impl Igtl {
                     }
                     continue;
                 }
-                Err(Ended::Closed) => (),
-                Err(Ended::Broken(why)) => self.exchange.broken(format!("{}: {why}", self.name)),
-                Err(Ended::Replaced) => {
+                Err(ConnectionEnd::Closed) => (),
+                Err(ConnectionEnd::Broken(why)) => {
+                    self.exchange.broken(format!("{}: {why}", self.name));
+                }
+                Err(ConnectionEnd::Replaced) => {
                     let why = "a peer that was silent gives way to another";
                     self.exchange.tell(format!("{}: {why}", self.name));
                     continue;
@@ -153,7 +155,7 @@ impl Igtl {
     }
 
     /// Reads one message. `None` if it contains no frame that fits.
-    fn message(&mut self, peer: &mut Peer) -> Result<Option<Parsed>, Ended> {
+    fn message(&mut self, peer: &mut Peer) -> Result<Option<ParsedFrame>, ConnectionEnd> {
         let header = peer.header(&mut self.door, &self.exchange)?;
         let kind = pose::Kind::of(&header.kind);
         let wanted = |device: Option<&str>| {
@@ -205,7 +207,7 @@ impl Igtl {
         most: u64,
         what: &str,
         read: impl FnOnce(&mut Self, &[u8]) -> Result<T, Refusal>,
-    ) -> Result<Result<T, Refusal>, Ended> {
+    ) -> Result<Result<T, Refusal>, ConnectionEnd> {
         if header.size > most {
             peer.skip(header.size)?;
             let why = format!("has {} bytes, and {what} needs at most {most}", header.size);
@@ -235,7 +237,7 @@ impl Igtl {
         peer: &mut Peer,
         header: &Header,
         (kind, wanted): (pose::Kind, [bool; 2]),
-    ) -> Result<(), Ended> {
+    ) -> Result<(), ConnectionEnd> {
         let read = self.body(peer, header, MOST_POSES, "a message with poses", |igtl, body| {
             let content = content(header, body)?;
             let of = |device: Option<&str>| match device {
@@ -311,7 +313,7 @@ impl Igtl {
         kind: Kind,
         body: &[u8],
         came: Instant,
-    ) -> Result<Parsed, Refusal> {
+    ) -> Result<ParsedFrame, Refusal> {
         let content = content(header, body)?;
         let layout = match kind {
             Kind::Array => "is no array of N times 3 numbers, float32 or float64",
@@ -335,7 +337,7 @@ impl Igtl {
         let part = Part { value: positions.clone(), time: header.time, came, delay };
         let age = Part::replace(&mut self.positions, part).age(came);
         let Some(device) = &self.pose_device else {
-            return Ok(Parsed { positions, pose: None, came, age });
+            return Ok(ParsedFrame { positions, pose: None, came, age });
         };
         let Some(pose) = &self.pose else {
             let why = format!("no pose of device \"{device}\" has come before it");
@@ -343,7 +345,7 @@ impl Igtl {
         };
         // A frame is as old as its older part.
         let age = age.max(pose.age(came));
-        Ok(Parsed { positions, pose: Some(pose.value), came, age })
+        Ok(ParsedFrame { positions, pose: Some(pose.value), came, age })
     }
 }
 

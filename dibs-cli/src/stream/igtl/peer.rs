@@ -171,7 +171,7 @@ fn connect(at: impl ToSocketAddrs) -> std::io::Result<TcpStream> {
 
 /// How a connection ended.
 #[derive(Debug, PartialEq)]
-pub enum Ended {
+pub enum ConnectionEnd {
     /// Between two messages.
     Closed,
     /// Within a message, or at bytes that are not a message.
@@ -197,40 +197,44 @@ impl Peer {
     }
 
     /// Waits for a header, and sends statuses in the meantime.
-    pub fn header(&mut self, door: &mut Door, exchange: &Exchange) -> Result<Header, Ended> {
+    pub fn header(
+        &mut self,
+        door: &mut Door,
+        exchange: &Exchange,
+    ) -> Result<Header, ConnectionEnd> {
         let mut header = [0; HEADER];
         let start = Instant::now();
         let first = loop {
             self.report(exchange);
             match self.socket.read(&mut header) {
-                Ok(0) => return Err(Ended::Closed),
+                Ok(0) => return Err(ConnectionEnd::Closed),
                 Ok(bytes) => break bytes,
-                Err(error) if !is_patience(&error) => return Err(Ended::Closed),
+                Err(error) if !is_patience(&error) => return Err(ConnectionEnd::Closed),
                 Err(_) => (),
             }
             if start.elapsed() >= IDLE && door.is_wanted() {
-                return Err(Ended::Replaced);
+                return Err(ConnectionEnd::Replaced);
             }
         };
         self.fill(&mut header[first..], Instant::now() + STALLED)?;
         let parsed = Header::parse(&header);
-        parsed.ok_or(Ended::Broken("no message begins where the one before it ends"))
+        parsed.ok_or(ConnectionEnd::Broken("no message begins where the one before it ends"))
     }
 
     /// Reads a body. Memory grows with the received bytes, because the size in a header is only a claim.
-    pub fn body(&mut self, size: u64, body: &mut Vec<u8>) -> Result<(), Ended> {
+    pub fn body(&mut self, size: u64, body: &mut Vec<u8>) -> Result<(), ConnectionEnd> {
         body.clear();
         self.chunks(size, |chunk| body.extend_from_slice(chunk))
     }
 
     /// Skips a body.
-    pub fn skip(&mut self, size: u64) -> Result<(), Ended> {
+    pub fn skip(&mut self, size: u64) -> Result<(), ConnectionEnd> {
         self.chunks(size, |_| ())
     }
 
-    fn chunks(&mut self, size: u64, mut take: impl FnMut(&[u8])) -> Result<(), Ended> {
+    fn chunks(&mut self, size: u64, mut take: impl FnMut(&[u8])) -> Result<(), ConnectionEnd> {
         if size > LARGEST {
-            return Err(Ended::Broken("a message states a body of more than a gibibyte"));
+            return Err(ConnectionEnd::Broken("a message states a body of more than a gibibyte"));
         }
         let (mut chunk, mut left) = ([0; CHUNK], size);
         let end = Instant::now() + STALLED + Duration::from_micros(size);
@@ -244,18 +248,20 @@ impl Peer {
     }
 
     /// Reads exactly these bytes, until `end` at the latest.
-    fn fill(&mut self, mut bytes: &mut [u8], end: Instant) -> Result<(), Ended> {
+    fn fill(&mut self, mut bytes: &mut [u8], end: Instant) -> Result<(), ConnectionEnd> {
         while !bytes.is_empty() {
             match self.socket.read(bytes) {
-                Ok(0) => return Err(Ended::Broken("a message was cut short")),
+                Ok(0) => return Err(ConnectionEnd::Broken("a message was cut short")),
                 Ok(read) => bytes = bytes.get_mut(read..).unwrap_or_default(),
                 Err(error) if !is_patience(&error) => {
-                    return Err(Ended::Broken("a message was cut short"));
+                    return Err(ConnectionEnd::Broken("a message was cut short"));
                 }
                 Err(_) => (),
             }
             if !bytes.is_empty() && Instant::now() >= end {
-                return Err(Ended::Broken("a message stopped in the middle, or comes too slowly"));
+                return Err(ConnectionEnd::Broken(
+                    "a message stopped in the middle, or comes too slowly",
+                ));
             }
         }
         Ok(())
@@ -290,7 +296,7 @@ fn is_patience(error: &std::io::Error) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Ended, Peer, connect};
+    use super::{ConnectionEnd, Peer, connect};
     use std::io::Write;
     use std::net::{SocketAddr, TcpListener, TcpStream};
     use std::thread;
@@ -320,7 +326,7 @@ mod tests {
             let start = Instant::now();
             let end = peer.fill(&mut [0; 1000], start + Duration::from_millis(limit));
             assert!(
-                matches!(end, Err(Ended::Broken(why)) if why.contains("too slowly")),
+                matches!(end, Err(ConnectionEnd::Broken(why)) if why.contains("too slowly")),
                 "{end:?}"
             );
             start.elapsed()

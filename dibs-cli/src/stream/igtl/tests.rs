@@ -4,7 +4,7 @@
 // Requirement: B-10
 
 use super::content::Kind;
-use super::matching::{Matched, matched};
+use super::matching::{MatchResult, matched};
 use super::message::{HEADER, Header, pack};
 use super::topology::{FEW, Topology};
 use dibs_build::generate::{brain, heart};
@@ -204,10 +204,10 @@ fn symmetric_meshes_are_not_guessed() {
     // Two equal parts.
     let one = [[0, 1, 2], [0, 2, 3], [0, 3, 4]];
     let two = [&one[..], &one.map(|corners| corners.map(|corner| corner + 5))].concat();
-    assert_eq!(matched(&two, &two), Matched::Several);
+    assert_eq!(matched(&two, &two), MatchResult::Several);
     // A strip that is its own mirror image: only the winding tells its sides apart, and a source may flip that.
-    assert_eq!(matched(&one[..2], &[[4, 5, 6], [4, 6, 7]]), Matched::Several);
-    assert!(matches!(matched(&one[..2], &one[..1]), Matched::None));
+    assert_eq!(matched(&one[..2], &[[4, 5, 6], [4, 6, 7]]), MatchResult::Several);
+    assert!(matches!(matched(&one[..2], &one[..1]), MatchResult::None));
 }
 
 /// A quad covers two triangles of the tree. A polygon of all points has room for half of them, and its mesh is refused.
@@ -265,6 +265,6 @@ fn turned_triangles_are_the_same() {
     let mesh = heart(1000).expect("a size").mesh;
     let mut theirs = mesh.triangles.clone();
     theirs.iter_mut().step_by(3).for_each(|corners| corners.swap(0, 1));
-    let Matched::One(pairs) = matched(&mesh.triangles, &theirs) else { panic!("not the same") };
+    let MatchResult::One(pairs) = matched(&mesh.triangles, &theirs) else { panic!("not the same") };
     assert!(pairs.iter().all(|[one, other]| one == other));
 }

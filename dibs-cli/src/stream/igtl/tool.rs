@@ -21,7 +21,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A frame that was sent.
-pub struct Sent {
+pub struct SentSurface {
     /// In the mesh's order.
     pub positions: Vec<Vec3>,
     pub pose: Option<RigidPose>,
@@ -31,7 +31,7 @@ pub struct Sent {
 }
 
 /// A tracked tool.
-pub struct Tracked {
+pub struct TrackedTool {
     pub device: String,
     /// In its own frame.
     tool: ToolSpec,
@@ -41,7 +41,7 @@ pub struct Tracked {
     name: String,
     pose: Option<Part<Pose>>,
     /// The frame of the last answer, and its surface, or why that cannot be searched.
-    surface: Option<(Arc<Sent>, Result<Surface<'static>, String>)>,
+    surface: Option<(Arc<SentSurface>, Result<Surface<'static>, String>)>,
 }
 
 /// The message of a tool, as far as it could be read.
@@ -67,17 +67,17 @@ struct Line<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     refused: Option<&'static str>,
     #[serde(flatten)]
-    found: Found<'a>,
+    found: ToolAnswer<'a>,
 }
 
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Found<'a> {
+enum ToolAnswer<'a> {
     Pair(Box<Record<'a>>),
     None { separation: Option<f64>, reason: String },
 }
 
-impl Tracked {
+impl TrackedTool {
     /// A tool for the tree of this file, whose bytes are kept for as long as the program runs.
     pub fn new(
         tool: ToolSpec,
@@ -93,7 +93,7 @@ impl Tracked {
     pub fn answer(
         &mut self,
         reading: Reading<'_>,
-        sent: Option<Arc<Sent>>,
+        sent: Option<Arc<SentSurface>>,
         place: &SourceCoordinates,
     ) -> Vec<u8> {
         let Reading { header, came, delay, pose, refused } = reading;
@@ -120,8 +120,8 @@ impl Tracked {
             Err(reason) => reason.clone(),
         };
         let found = match &found {
-            Ok(found) => Found::Pair(Box::new(found.record(None))),
-            Err(reason) => Found::None { separation: None, reason: reason.clone() },
+            Ok(found) => ToolAnswer::Pair(Box::new(found.record(None))),
+            Err(reason) => ToolAnswer::None { separation: None, reason: reason.clone() },
         };
         let (tool_age_ms, age_ms) = (tool_age.map(ms), age.map(ms));
         let (time, refused) = (header.time, refused.map(Cause::name));
@@ -148,7 +148,7 @@ impl Tracked {
     fn closest(
         &mut self,
         pose: &Pose,
-        sent: &Arc<Sent>,
+        sent: &Arc<SentSurface>,
         place: &SourceCoordinates,
     ) -> Result<Answer<'_>, String> {
         if !self.surface.as_ref().is_some_and(|(last, _)| Arc::ptr_eq(last, sent)) {

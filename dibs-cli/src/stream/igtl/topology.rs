@@ -1,7 +1,7 @@
 //! Finds which vertex of the mesh each point of a POLYDATA is: by the triangles alone, once for each numbering.
 
 use super::content::Cells;
-use super::matching::{Matched, matched};
+use super::matching::{MatchResult, matched};
 use dibs_stream::SurfaceOrder;
 use std::collections::VecDeque;
 use std::hash::{BuildHasher, RandomState};
@@ -107,7 +107,7 @@ impl Topology {
         }
         let theirs: Vec<[u32; 3]> = faces.iter().flat_map(|face| fan(face)).collect();
         match matched(ours, &theirs) {
-            Matched::One(pairs) => {
+            MatchResult::One(pairs) => {
                 let mut point_of = vec![None; self.order.positions()];
                 for [vertex, point] in pairs {
                     if let Some(of) = point_of.get_mut(vertex as usize) {
@@ -116,12 +116,12 @@ impl Topology {
                 }
                 Ok(Numbering::Other(point_of))
             }
-            Matched::None => Err(format!(
+            MatchResult::None => Err(format!(
                 "its {} triangles of {points} points are not the {} that the tree has: it is of another mesh",
                 theirs.len(),
                 ours.len()
             )),
-            Matched::Several => Err(
+            MatchResult::Several => Err(
                 "it is the tree's mesh with its points in another order, which the triangles do not tell, as they are \
                  symmetric: send the points in the order of the mesh's file"
                     .to_owned(),

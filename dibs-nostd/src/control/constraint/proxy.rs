@@ -87,7 +87,7 @@ const SHALLOW: f32 = 16.0;
 
 /// A contact within the margin.
 #[derive(Clone, Copy)]
-struct Held {
+struct ProxyContact {
     wall: Wall,
     lever: Vec3,
     /// Speed of the tool out of the surface (mm/s).
@@ -96,7 +96,7 @@ struct Held {
     push: f32,
 }
 
-impl Held {
+impl ProxyContact {
     const NONE: Self = Self { wall: Wall::NONE, lever: Vec3::ZERO, speed: 0.0, push: 0.0 };
 
     /// The moment of the push.
@@ -135,7 +135,7 @@ impl Proxy {
             Ok(contacts) => contacts,
             Err(reason) => return self.hold(velocity, reason),
         };
-        let mut held = [Held::NONE; MOST];
+        let mut held = [ProxyContact::NONE; MOST];
         let (mut is_in, mut deepest) = (false, 0.0);
         let mut free = held.iter_mut();
         for contact in contacts {
@@ -159,7 +159,7 @@ impl Proxy {
             let relative = velocity + angular.cross(lever) - contact.velocity;
             let normal = contact.normal;
             let wall = Wall::new(normal, depth, activation);
-            *slot = Held { wall, lever, speed: normal.dot(relative), push: 0.0 };
+            *slot = ProxyContact { wall, lever, speed: normal.dot(relative), push: 0.0 };
         }
         if !is_in {
             return Wrench::NONE;
@@ -171,7 +171,7 @@ impl Proxy {
         self.push(&held, moved, velocity)
     }
 
-    fn push(&self, held: &[Held; MOST], moved: Vec3, velocity: Vec3) -> Wrench {
+    fn push(&self, held: &[ProxyContact; MOST], moved: Vec3, velocity: Vec3) -> Wrench {
         let turned = held.iter().fold(Vec3::ZERO, |sum, held| sum + held.turned());
         let (mut pushes, mut leaving) = (0.0, 0.0);
         for held in held {

@@ -20,16 +20,16 @@ const LONGEST: u32 = i32::MAX as u32;
 
 /// The type of a quantity limited by a [`Watch`].
 #[doc(hidden)]
-pub trait Watched: Copy + PartialOrd + sealed::Sealed {
+pub trait Quantity: Copy + PartialOrd + sealed::Sealed {
     /// Its largest value.
     const MOST: Self;
 }
 
-impl Watched for Millis {
+impl Quantity for Millis {
     const MOST: Self = Self::MAX;
 }
 
-impl Watched for u32 {
+impl Quantity for u32 {
     const MOST: Self = Self::MAX;
 }
 
@@ -41,7 +41,7 @@ mod sealed {
     impl Sealed for u32 {}
 }
 
-impl<T: Watched> Watch<T> {
+impl<T: Quantity> Watch<T> {
     /// An input that is not watched.
     pub const OFF: Self = Self { degraded: T::MOST, safe: T::MOST };
 

@@ -60,7 +60,7 @@ use crate::query::Proximity;
 use crate::surface::{FrameAge, Millis};
 use crate::unavailable::Unavailable;
 
-pub use limits::{LimitError, Limits, Watch, Watched};
+pub use limits::{LimitError, Limits, Quantity, Watch};
 pub use link::Link;
 #[cfg(feature = "bus")]
 pub use status::LinkStatus;

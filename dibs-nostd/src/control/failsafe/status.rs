@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::Link;
 use crate::receive::BusHealth;
-use crate::surface::{Ageing, Millis};
+use crate::surface::{Millis, StampAge};
 
 /// Passes the bus's health from the bus interrupt to the control tick. Meant for a `static`.
 ///
@@ -74,11 +74,11 @@ impl Stamp {
         if self.came.load(Ordering::Acquire) == 0 {
             return Millis::MAX;
         }
-        let before = Ageing {
+        let before = StampAge {
             stamp: Millis(self.aged.load(Ordering::Relaxed)),
             oldest: Millis(self.oldest.load(Ordering::Relaxed)),
         };
-        let Ageing { stamp, oldest } = before.at(now, Millis(self.at.load(Ordering::Relaxed)));
+        let StampAge { stamp, oldest } = before.at(now, Millis(self.at.load(Ordering::Relaxed)));
         self.aged.store(stamp.0, Ordering::Relaxed);
         self.oldest.store(oldest.0, Ordering::Relaxed);
         oldest

@@ -14,7 +14,7 @@ use proptest::prelude::*;
 
 use super::{FailSafe, LimitError, Limits, Link, LinkStatus, Observation, State, Verdict, Watch};
 use crate::receive::BusHealth;
-use crate::surface::{Ageing, FrameAge, Millis};
+use crate::surface::{FrameAge, Millis, StampAge};
 use crate::unavailable::{QueryError, Unavailable};
 
 const QUERY: Unavailable = Unavailable::Query(QueryError::Corrupt { row: 7 });
@@ -335,7 +335,7 @@ fn the_margin_covers_the_way_unless_that_is_left_out() {
 fn a_slow_second_core_is_not_an_old_surface() {
     let mut machine = FailSafe::new(Limits::new(AGE, SPEED).unwrap().dwell(0).automatic());
     // The receiver's clock is ahead by one.
-    let age = Ageing::default().at(Millis(1000), Millis(1001)).oldest;
+    let age = StampAge::default().at(Millis(1000), Millis(1001)).oldest;
     let verdict = machine.step(&seen(1000, 1, age.0));
     assert_eq!((verdict.state, verdict.margin), (State::Nominal, 0.0));
 }

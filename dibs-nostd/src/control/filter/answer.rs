@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use super::Motion;
+use super::RigidMotion;
 use crate::unavailable::{QueryError, Unavailable};
 
 /// The motion that a filter admits.
@@ -10,9 +10,9 @@ use crate::unavailable::{QueryError, Unavailable};
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
-pub struct Admitted {
+pub struct AdmittedMotion {
     /// The motion to execute.
-    pub motion: Motion,
+    pub motion: RigidMotion,
     /// Lower bound (mm) on the separation of every tool during the whole period, for any tissue position within its
     /// uncertainty.
     pub least_separation: f32,

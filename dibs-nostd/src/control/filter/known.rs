@@ -6,14 +6,14 @@ use crate::math::sqrt::sqrt;
 
 /// A pair's distance at a pose.
 #[derive(Clone, Copy)]
-pub(super) struct Known {
+pub(super) struct PoseDistance {
     /// Ends of the axis.
     pub ends: [Vec3; 2],
     /// Lower bound on the axis' distance from the surface; negative inside.
     pub distance: f32,
 }
 
-impl Known {
+impl PoseDistance {
     /// Upper bound on the motion of the axis to other ends, rounded up.
     pub fn moved(&self, ends: &[Vec3; 2]) -> f32 {
         let mut most = 0.0;
@@ -34,10 +34,10 @@ impl Known {
 
 /// A pair in this tick, or a part of its surface.
 #[derive(Clone, Copy)]
-pub(super) struct State {
-    pub start: Known,
+pub(super) struct PairState {
+    pub start: PoseDistance,
     /// The last pose searched after the start.
-    pub end: Option<Known>,
+    pub end: Option<PoseDistance>,
     /// The distance minus this is a lower bound on the separation at the start.
     pub reach: f32,
     /// The least distance allowed during the motion.
@@ -46,7 +46,7 @@ pub(super) struct State {
     pub axis_distance: f32,
 }
 
-impl State {
+impl PairState {
     /// What both poses say of the distance at other ends.
     pub fn distance_at(&self, ends: &[Vec3; 2]) -> f32 {
         let at = self.start.distance_at(ends);

@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use dibs_build::{Builder, generate};
-//! use dibs_nostd::filter::{Filter, Motion, Reason, Uncertainty};
+//! use dibs_nostd::filter::{Filter, Reason, RigidMotion, Uncertainty};
 //! use dibs_nostd::{Capsule, Odometer, Tracker, Tree, glam::Vec3};
 //!
 //! let heart = generate::heart(1_000)?.mesh;
@@ -19,7 +19,7 @@
 //!
 //! let filter = Filter::new(1.0, 200.0)?; // a stand-off of 1 mm; the robot moves with at most 200 mm/s
 //! let period = 0.001; // s
-//! let push = Motion::translation(Vec3::new(0.1, 0.0, 0.0)); // mm, in a period
+//! let push = RigidMotion::translation(Vec3::new(0.1, 0.0, 0.0)); // mm, in a period
 //! let (mut tip, mut pushed) = (Vec3::new(-80.0, 0.0, 20.0), 0);
 //! for _ in 0..1_000 {
 //!     let tool = Capsule::new(tip, tip - Vec3::X * 60.0, 2.5)?;
@@ -36,8 +36,8 @@
 //! # Promise
 //!
 //! Unless the reason is [`Reason::NoSafeMotion`], no separation is below the stand-off, nor one from a label's triangles
-//! below theirs, less 0.01 mm at any instant of the period, and none is below [`Admitted::least_separation`]; to the
-//! accuracy of a query. This requires that
+//! below theirs, less 0.01 mm at any instant of the period, and none is below [`AdmittedMotion::least_separation`]; to
+//! the accuracy of a query. This requires that
 //!
 //! - the robot executes the admitted motion: its points move in straight lines, or turn about the reference point;
 //! - at the start the tissue is within the surface's position error and the [`Uncertainty`] of the searched surface,
@@ -82,8 +82,8 @@ mod uncertainty;
 
 use crate::math::sqrt::sqrt;
 use crate::{Cost, Index, MovingSurface, Options, Tool, Tracker};
-pub use answer::{Admitted, FilterError, Reason};
-pub use motion::Motion;
+pub use answer::{AdmittedMotion, FilterError, Reason};
+pub use motion::RigidMotion;
 use part::Part;
 pub use row::MotionRow;
 use session::Session;
@@ -232,11 +232,11 @@ impl<const LABELS: usize> Filter<LABELS> {
     pub fn admit<I, S, T, const STACK: usize, const OPENED: usize, const RANGE: usize>(
         &self,
         pairs: &mut [(&mut Tracker<'_, I, STACK, OPENED, RANGE>, &S, &T)],
-        command: &Motion,
+        command: &RigidMotion,
         period: f32,
         uncertainty: &Uncertainty,
         rows: &[MotionRow],
-    ) -> Result<Admitted, FilterError>
+    ) -> Result<AdmittedMotion, FilterError>
     where
         I: Index,
         S: MovingSurface + ?Sized,
@@ -269,7 +269,7 @@ impl<const LABELS: usize> Filter<LABELS> {
     fn lever_of<'a, T: Tool + 'a>(
         &self,
         tools: impl Iterator<Item = &'a T>,
-        motion: &Motion,
+        motion: &RigidMotion,
     ) -> f32 {
         self.lever.unwrap_or_else(|| {
             let mut longest = LEAST_LEVER;
@@ -285,7 +285,7 @@ impl<const LABELS: usize> Filter<LABELS> {
 
     /// Upper bounds on the motion of the reference point (mm) and on the rotation (rad) in a period.
     #[cfg(feature = "bus")]
-    pub(crate) fn most<T: Tool>(&self, tool: &T, motion: &Motion, period: f32) -> (f32, f32) {
+    pub(crate) fn most<T: Tool>(&self, tool: &T, motion: &RigidMotion, period: f32) -> (f32, f32) {
         let most = self.speed * period;
         let lever = self.lever_of(core::iter::once(tool), motion);
         (most, motion::most_turn(most, lever))

@@ -11,7 +11,7 @@ use crate::math::sqrt::sqrt;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Motion {
+pub struct RigidMotion {
     /// The reference point before the motion (mm).
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub about: Vec3,
@@ -26,7 +26,7 @@ pub struct Motion {
 /// Largest angle (rad) of a period.
 const MOST_TURN: f32 = 0.5;
 
-impl Motion {
+impl RigidMotion {
     /// A translation. Its reference point is the origin, about which a filter may turn the instrument: use
     /// [`new`](Self::new) for a point of the instrument.
     #[must_use]
@@ -134,7 +134,7 @@ mod tests {
             axis in prop::array::uniform3(-1.0_f32..1.0), angle in 0.0_f32..0.5, point in prop::array::uniform3(-90.0_f32..90.0),
         ) {
             let axis = Vec3::from(axis).normalize_or_zero();
-            let motion = Motion::new(about.into(), by.into(), axis * angle);
+            let motion = RigidMotion::new(about.into(), by.into(), axis * angle);
             let point = Vec3::from(point);
             let at = |s: f64| {
                 let turn = DQuat::from_scaled_axis(motion.rotation.as_dvec3() * s);

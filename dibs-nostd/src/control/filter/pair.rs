@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::math::round::sum_down;
 use crate::math::sqrt::sqrt;
-use crate::query::{NoSide, OfLabel, Proximity, Side};
+use crate::query::{LabelDistance, NoSide, Proximity, Side};
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Options, Tool, Tracker};
 
@@ -27,7 +27,7 @@ pub(super) trait Pair {
         ends: [Vec3; 2],
         within: (u8, f32),
         options: &Options,
-    ) -> Result<OfLabel, QueryError>;
+    ) -> Result<LabelDistance, QueryError>;
 }
 
 impl<I: Index, S, T: Tool, const STACK: usize, const OPENED: usize, const RANGE: usize> Pair
@@ -58,7 +58,7 @@ where
         ends: [Vec3; 2],
         within: (u8, f32),
         options: &Options,
-    ) -> Result<OfLabel, QueryError> {
+    ) -> Result<LabelDistance, QueryError> {
         let (tracker, surface, tool) = self;
         tracker.closest_of_label(*surface, &tool.with_axis(ends), within, options)
     }
@@ -66,7 +66,7 @@ where
 
 /// The closest pair of a tool and a surface, or a label's part of it.
 #[derive(Clone, Copy)]
-pub(super) struct Found {
+pub(super) struct ClosestPair {
     /// A lower bound on the axis' distance; negative inside, and negative infinity where nothing is certain.
     pub distance: f32,
     /// The pair's distance, without a sign.
@@ -78,7 +78,7 @@ pub(super) struct Found {
     pub triangle_tests: u32,
 }
 
-impl Found {
+impl ClosestPair {
     /// Of a whole surface. A tool that `is_outside` at the start of its path needs no side later.
     #[inline(always)]
     pub fn of(found: &Proximity, radius: f32, is_outside: bool) -> Self {
@@ -89,8 +89,8 @@ impl Found {
     }
 
     /// Of a label's part.
-    pub fn of_label(found: &OfLabel) -> Self {
-        let &OfLabel { distance, pair, node_tests, triangle_tests } = found;
+    pub fn of_label(found: &LabelDistance) -> Self {
+        let &LabelDistance { distance, pair, node_tests, triangle_tests } = found;
         let (axis_parameter, direction) = pair.map_or((0.0, Vec3::ZERO), |pair| {
             let towards = pair.on_axis - pair.on_surface;
             (pair.axis_parameter, towards / sqrt(towards.length_squared()))

@@ -6,7 +6,7 @@ use glam::Vec3;
 use heapless::Vec;
 
 use super::FilterError;
-use super::motion::Motion;
+use super::motion::RigidMotion;
 use super::nearest::{HalfSpace, Nearest, Vector, dot, nearest};
 use crate::constraint::VelocityRow;
 use crate::math::sqrt::sqrt;
@@ -108,7 +108,7 @@ impl Rows {
         on_axis: Vec3,
         normal: Vec3,
         distance: f32,
-        at: &Motion,
+        at: &RigidMotion,
     ) {
         let arm = on_axis - (at.about + at.translation);
         let angular = arm.cross(normal);

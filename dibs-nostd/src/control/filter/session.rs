@@ -5,16 +5,16 @@
 use glam::Vec3;
 use heapless::Vec;
 
-use super::known::{Known, State, larger, smaller};
+use super::known::{PairState, PoseDistance, larger, smaller};
 use super::motion::{inside, most_turn, shortened};
 use super::nearest::{Vector, add};
-use super::pair::{Found, Pair};
+use super::pair::{ClosestPair, Pair};
 use super::part::Part;
 use super::proposal::{Extent, Proposal};
 use super::row::Rows;
 use super::{
-    Admitted, EPSILON, Filter, FilterError, MOST_PAIRS, Motion, MotionRow, Reason, Uncertainty,
-    path,
+    AdmittedMotion, EPSILON, Filter, FilterError, MOST_PAIRS, MotionRow, Reason, RigidMotion,
+    Uncertainty, path,
 };
 use crate::math::sqrt::sqrt;
 use crate::{Budget, Cost};
@@ -39,7 +39,7 @@ const NEAR: f32 = 4.0;
 /// A motion, and its distances from the tissue.
 #[derive(Clone, Copy)]
 struct Candidate {
-    motion: Motion,
+    motion: RigidMotion,
     /// Least separation from the whole surface during the motion.
     separation: f32,
     /// The same, or that from a label's part less what its stand-off is larger, during the motion and at its end.
@@ -60,7 +60,7 @@ pub(super) struct Session<'f, const LABELS: usize> {
     lever: f32,
     rows: Rows,
     /// Of each pair, then of each pair with one label's part after another.
-    states: Vec<State, MOST_PAIRS>,
+    states: Vec<PairState, MOST_PAIRS>,
     /// Of each of these, the distance at the end that its rows require.
     wanted: Vec<f32, MOST_PAIRS>,
     /// Limit (mm) on the motion of the reference point, and on that of the lever's end by rotation.
@@ -79,13 +79,13 @@ pub(super) struct Session<'f, const LABELS: usize> {
 impl<'f, const LABELS: usize> Session<'f, LABELS> {
     pub fn new(
         filter: &'f Filter<LABELS>,
-        command: &Motion,
+        command: &RigidMotion,
         period: f32,
         uncertainty: &Uncertainty,
         (rows, lever, cost): (&[MotionRow], f32, Cost),
     ) -> Result<Self, FilterError> {
         let most = filter.speed * period;
-        let within = Motion {
+        let within = RigidMotion {
             translation: shortened(command.translation, most),
             rotation: shortened(command.rotation, most_turn(most, lever)),
             ..*command
@@ -109,8 +109,8 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         })
     }
 
-    pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<Admitted, FilterError> {
-        let rest = Motion { about: self.about, ..Motion::translation(Vec3::ZERO) };
+    pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<AdmittedMotion, FilterError> {
+        let rest = RigidMotion { about: self.about, ..RigidMotion::translation(Vec3::ZERO) };
         for part in self.filter.layers() {
             let mut to_come = pairs.len() as u32;
             for (number, pair) in pairs.iter_mut().enumerate() {
@@ -133,7 +133,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
                 break;
             }
             let point = proposal.at(extent);
-            let motion = Motion::from_vector(self.about, &point, self.lever);
+            let motion = RigidMotion::from_vector(self.about, &point, self.lever);
             if !motion.is_finite() || !self.rows.allow(&point) {
                 continue;
             }
@@ -165,10 +165,10 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         Ok(self.admitted(&best, reason))
     }
 
-    fn admitted(&self, found: &Candidate, reason: Reason) -> Admitted {
+    fn admitted(&self, found: &Candidate, reason: Reason) -> AdmittedMotion {
         // A tool that starts nearer than the stand-off may leave, but has not kept it.
         let is_kept = found.least >= self.filter.stand_off - EPSILON;
-        Admitted {
+        AdmittedMotion {
             motion: found.motion,
             least_separation: found.separation,
             reason: if is_kept { reason } else { Reason::NoSafeMotion },
@@ -184,7 +184,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         pair: &mut P,
         (number, part): (usize, Option<Part>),
         to_come: u32,
-        rest: &Motion,
+        rest: &RigidMotion,
     ) -> Result<(), FilterError> {
         let (ends, radius) = (pair.ends(), pair.radius());
         let mut size = radius;
@@ -232,18 +232,18 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         }
         // `wanted` has as many slots as there are pairs.
         let _ = self.wanted.push(wanted);
-        let start = Known { ends, distance };
+        let start = PoseDistance { ends, distance };
         let axis_distance = found.map_or(f32::INFINITY, |found| found.axis_distance);
-        let _ = self.states.push(State { start, end: None, reach, least, axis_distance });
+        let _ = self.states.push(PairState { start, end: None, reach, least, axis_distance });
         Ok(())
     }
 
     fn add_wall(
         &mut self,
         number: usize,
-        found: &Found,
+        found: &ClosestPair,
         ([start, end], distance): ([Vec3; 2], f32),
-        at: &Motion,
+        at: &RigidMotion,
     ) {
         let on_axis = start + (end - start) * found.axis_parameter;
         self.rows.add_wall(number, on_axis, found.direction, distance, at);
@@ -285,9 +285,9 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     /// The motion, limited to the robot's speed.
     fn within_speed(&self, point: &Vector) -> Vector {
-        let motion = Motion::from_vector(self.about, point, self.lever);
+        let motion = RigidMotion::from_vector(self.about, point, self.lever);
         let (translation, rotation) = (motion.translation, motion.rotation);
-        let within = Motion {
+        let within = RigidMotion {
             translation: shortened(translation, self.most),
             rotation: shortened(rotation, most_turn(self.most, self.lever)),
             ..motion
@@ -300,7 +300,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     fn verify<P: Pair>(
         &mut self,
         pairs: &mut [P],
-        motion: &Motion,
+        motion: &RigidMotion,
     ) -> Result<Candidate, FilterError> {
         let mut found = Candidate {
             motion: *motion,
@@ -327,7 +327,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         found: &mut Candidate,
     ) -> Result<(), FilterError> {
         let Some(&state) = self.states.get(at) else { return Ok(()) };
-        let State { start, reach, least, .. } = state;
+        let PairState { start, reach, least, .. } = state;
         let motion = found.motion;
         let (ends, moved, arc) = self.path(&start, &motion);
         found.moved = larger(found.moved, moved);
@@ -351,7 +351,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             let searched = self.search(pair, ends, start.distance > 0.0, near, left)?;
             last = larger(last, searched.distance);
             nearest = on_path(last);
-            let known = Known { ends, distance: last };
+            let known = PoseDistance { ends, distance: last };
             if let Some(state) = self.states.get_mut(at) {
                 state.end = Some(known);
             }
@@ -377,7 +377,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     /// Whether the budget left probably covers the searches at a motion's end.
     fn covers<P: Pair>(&self, pairs: &[P], point: &Vector) -> bool {
-        let motion = Motion::from_vector(self.about, point, self.lever);
+        let motion = RigidMotion::from_vector(self.about, point, self.lever);
         let mut needed = u64::from(self.instructions);
         for (pair, state) in pairs.iter().zip(&self.states) {
             let (ends, moved, arc) = self.path(&state.start, &motion);
@@ -395,7 +395,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     }
 
     /// An axis' ends after a motion, an upper bound (mm) on the motion of its points, and the height of their arcs.
-    fn path(&self, start: &Known, motion: &Motion) -> ([Vec3; 2], f32, f32) {
+    fn path(&self, start: &PoseDistance, motion: &RigidMotion) -> ([Vec3; 2], f32, f32) {
         let ends = start.ends.map(|end| motion.apply(end));
         let mut arc = 0.0;
         for end in start.ends {
@@ -429,16 +429,16 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         is_outside: bool,
         near: Option<(u8, f32)>,
         left: Budget,
-    ) -> Result<Found, FilterError> {
+    ) -> Result<ClosestPair, FilterError> {
         let options = self.filter.options.signed().budget(left);
         let found = match near {
             // Without labels that is not compiled.
             Some(near) if LABELS > 0 => {
-                Found::of_label(&pair.closest_of_label(ends, near, &options)?)
+                ClosestPair::of_label(&pair.closest_of_label(ends, near, &options)?)
             }
-            _ => Found::of(&pair.closest(ends, &options)?, pair.radius(), is_outside),
+            _ => ClosestPair::of(&pair.closest(ends, &options)?, pair.radius(), is_outside),
         };
-        let Found { node_tests, triangle_tests, .. } = found;
+        let ClosestPair { node_tests, triangle_tests, .. } = found;
         // The root's test is included in the base cost.
         let spent = self.cost.instructions(node_tests.saturating_sub(1), triangle_tests);
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);

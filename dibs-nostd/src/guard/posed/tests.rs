@@ -10,8 +10,8 @@ use std::println;
 use fastrand::Rng;
 use glam::{DQuat, DVec3, Quat, Vec3};
 
-use super::Placed;
-use crate::filter::{Filter, Motion};
+use super::TickPose;
+use crate::filter::{Filter, RigidMotion};
 use crate::surface::PoseStep;
 use crate::{Capsule, RigidPose, Tool};
 
@@ -71,17 +71,17 @@ impl Case {
         next
     }
 
-    fn placed(&self) -> Placed {
+    fn placed(&self) -> TickPose {
         let turned = |turn: Vec3| Quat::from_scaled_axis(turn).normalize();
         let after = RigidPose::new(turned(self.turn), self.shift).expect("a rotation");
         let rotation = (turned(-self.spin) * turned(self.turn)).normalize();
         let before = RigidPose::new(rotation, self.shift - self.flow).expect("a rotation");
         let step = PoseStep::between(&before, &after, Vec3::ZERO).expect("a small step");
         let pose = step.beyond(self.part);
-        Placed { pose, step: Some((step, self.part, 30.0)), error: 0.0, shown: 0.0 }
+        TickPose { pose, step: Some((step, self.part, 30.0)), error: 0.0, residual: 0.0 }
     }
 
-    fn tool(&self, placed: &Placed) -> Option<Capsule> {
+    fn tool(&self, placed: &TickPose) -> Option<Capsule> {
         let [start, end] = self.ends.map(|end| placed.pose.apply(end));
         Capsule::new(start, end, 0.0).ok()
     }
@@ -127,7 +127,7 @@ fn climbed(seed: u64, starts: usize, steps: usize, value: impl Fn(&Case) -> Opti
 #[test]
 fn a_moved_tool_is_off_by_no_more_than_its_error() {
     let most = climbed(1, 4_000, 100, |case| {
-        let placed = Placed { step: None, ..Case { part: 0.0, ..*case }.placed() };
+        let placed = TickPose { step: None, ..Case { part: 0.0, ..*case }.placed() };
         let tool = case.tool(&placed)?;
         let moved = placed.tool(&tool);
         let (found, truth) = (ends(&moved), ends(&tool).map(|end| inverse(&placed.pose, end)));
@@ -145,12 +145,12 @@ fn a_motion_on_the_mesh_is_that_in_the_world() {
     let filter = Filter::new(0.0, 400.0).expect("in range");
     let most = climbed(2, 4_000, 100, |case| {
         // The pose is exact here: its error counts with the tool's.
-        let placed = Placed { step: None, ..Case { part: 0.0, ..*case }.placed() };
+        let placed = TickPose { step: None, ..Case { part: 0.0, ..*case }.placed() };
         let tool = case.tool(&placed)?;
         let filter = filter.lever(case.lever).expect("in range");
-        let within = Motion::new(placed.pose.apply(case.about), Vec3::ZERO, Vec3::ZERO);
+        let within = RigidMotion::new(placed.pose.apply(case.about), Vec3::ZERO, Vec3::ZERO);
         let (shift, turn) = filter.most(&tool, &within, 1e-3);
-        let command = Motion {
+        let command = RigidMotion {
             translation: case.translation.clamp_length_max(shift),
             rotation: case.rotation.clamp_length_max(turn),
             ..within
@@ -158,8 +158,8 @@ fn a_motion_on_the_mesh_is_that_in_the_world() {
         let on_mesh = placed.motion(&command);
         let moved = placed.tool(&tool);
         let error = placed.error(&tool) + placed.error_of_motion(&moved, &on_mesh, (&filter, 1e-3));
-        // As `Motion::apply`, exactly.
-        let apply = |motion: &Motion, point: DVec3| {
+        // As `RigidMotion::apply`, exactly.
+        let apply = |motion: &RigidMotion, point: DVec3| {
             let about = motion.about.as_dvec3();
             let turn = DQuat::from_scaled_axis(motion.rotation.as_dvec3());
             about + turn * (point - about) + motion.translation.as_dvec3()

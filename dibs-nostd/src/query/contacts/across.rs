@@ -140,12 +140,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         let on_axis = tool.axis_point(own.axis_parameter);
         let before = own.axis_parameter * length;
         let growth = -own.normal.dot(direction);
-        let (way, mut end) =
+        let (inward, mut end) =
             if growth > 0.0 { (direction, length - before) } else { (-direction, before) };
         let depth = -closest.separation - tool.radius();
         let first = ProfilePoint { along: 0.0, depth, slope: growth.abs() };
-        let has_way = first.slope * end > accuracy && depth > NO_DIRECTION * accuracy;
-        if !has_way {
+        let has_inward = first.slope * end > accuracy && depth > NO_DIRECTION * accuracy;
+        if !has_inward {
             return Ok((Across::NONE, look.spent));
         }
         // Upper bound on the depth of any point of the axis.
@@ -169,10 +169,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
             if far.as_ref().is_some_and(|(far, _)| is_known(far)) {
                 break;
             }
-            let point = on_axis + way * along;
+            let point = on_axis + inward * along;
             let Some(found) = look.at(stack, point)? else { break };
             // From the point inside to the surface.
-            let slope = found.direction.dot(way);
+            let slope = found.direction.dot(inward);
             let place = ProfilePoint { along, depth: found.axis_distance, slope };
             if far.is_some() && place.depth >= expected - accuracy {
                 break;
@@ -192,13 +192,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         }
         let Some((far, other)) = far else { return Ok((Across::NONE, look.spent)) };
         let (along, _) = near.meeting(&far);
-        let point = on_axis + way * along;
+        let point = on_axis + inward * along;
         let corners = positions(vertices, other.corners)?;
         let pair = AxisPoint(point).closest_on_triangle(&corners, f32::INFINITY);
         let Some(pair) = pair else { return Ok((Across::NONE, look.spent)) };
         let outward = pair.on_surface - point;
         let normal = outward / sqrt(outward.length_squared());
-        let fall = normal.dot(way);
+        let fall = normal.dot(inward);
         let weight = first.slope / (first.slope + fall);
         if !(fall > 0.0 && weight < 1.0) {
             return Ok((Across::NONE, look.spent));

@@ -12,7 +12,7 @@
 // Requirement: C-04
 
 use super::add::Pair;
-use super::basins::{Basins, Near};
+use super::basins::{Basins, NearTriangle};
 use crate::math::sqrt::sqrt;
 use crate::query::made::Tests;
 use crate::query::prices::ACTIVATION;
@@ -41,7 +41,7 @@ struct Path {
 }
 
 /// Tests triangles as long as the budget lasts.
-pub(super) struct Looking<'p, 'a, I, V: ?Sized, T> {
+pub(super) struct TriangleTester<'p, 'a, I, V: ?Sized, T> {
     pub pair: &'p Pair<'a, I, V, T>,
     /// Heights beyond this do not matter.
     pub limit: f32,
@@ -53,7 +53,7 @@ pub(super) struct Looking<'p, 'a, I, V: ?Sized, T> {
     pub is_priced: bool,
 }
 
-impl<I: Index, V: VertexTable + ?Sized, T: Tool> Looking<'_, '_, I, V, T> {
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> TriangleTester<'_, '_, I, V, T> {
     /// Pays for a triangle's test; `None` if the budget ran out.
     fn pay(&mut self) -> Option<()> {
         self.left = self.left.checked_sub(Budget::TRIANGLE)?;
@@ -72,7 +72,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Looking<'_, '_, I, V, T> {
     }
 
     /// A triangle; `None` if the budget ran out.
-    pub fn triangle(&mut self, row: u32) -> Result<Option<Near>, QueryError> {
+    pub fn triangle(&mut self, row: u32) -> Result<Option<NearTriangle>, QueryError> {
         let Some(()) = self.pay() else { return Ok(None) };
         self.pair.near(row, self.limit, self.accuracy).map(Some)
     }
@@ -95,7 +95,7 @@ impl<const N: usize> Basins<N> {
         row: u32,
         ridges: (f32, f32),
         is_left_out: impl Fn(u32) -> bool,
-        look: &mut Looking<'_, '_, I, V, T>,
+        tester: &mut TriangleTester<'_, '_, I, V, T>,
     ) -> Result<f32, QueryError> {
         self.forget();
         let Some((entry, own)) =
@@ -103,7 +103,7 @@ impl<const N: usize> Basins<N> {
         else {
             return Ok(1.0);
         };
-        let Some(()) = look.pay_for(ACTIVATION) else { return Ok(1.0) };
+        let Some(()) = tester.pay_for(ACTIVATION) else { return Ok(1.0) };
         let none = least_ridge(own, ridges);
         let full = 2.0 * none;
         let mut least = full;
@@ -119,7 +119,7 @@ impl<const N: usize> Basins<N> {
                 continue;
             }
             self.mark(entry);
-            let (Some(near), Some(())) = (self.at(entry), look.pay()) else { return Ok(1.0) };
+            let (Some(near), Some(())) = (self.at(entry), tester.pay()) else { return Ok(1.0) };
             // Next to a point that is hardly lower, the ridge does not matter.
             let tied = full - (own - sqrt(near.square));
             let parted = if tied > ridge { tied } else { ridge };
@@ -131,7 +131,7 @@ impl<const N: usize> Basins<N> {
                 if is_left_out(across) {
                     continue;
                 }
-                let Some(next) = self.entry(across, &mut |row| look.triangle(row))? else {
+                let Some(next) = self.entry(across, &mut |row| tester.triangle(row))? else {
                     return Ok(1.0);
                 };
                 let beyond = self.height(next).unwrap_or(f32::INFINITY);
@@ -140,7 +140,7 @@ impl<const N: usize> Basins<N> {
                     continue;
                 }
                 if !near.place.is_on(edge) {
-                    let Some(edge) = look.edge(near.row, edge)? else { return Ok(1.0) };
+                    let Some(edge) = tester.edge(near.row, edge)? else { return Ok(1.0) };
                     over = if edge > over { edge } else { over };
                 }
                 if over - own < least {

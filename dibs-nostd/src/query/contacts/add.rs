@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::activation::Looking;
-use super::basins::{Basins, ClosestPoint, Near};
-use super::low::Found;
+use super::activation::TriangleTester;
+use super::basins::{Basins, ClosestPoint, NearTriangle};
+use super::low::SearchExtent;
 use super::{Contact, Contacts};
 use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
@@ -86,7 +86,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             &Options,
             f32,
             f32,
-        ) -> Result<Found, QueryError>,
+        ) -> Result<SearchExtent, QueryError>,
     ) -> Result<Tests, QueryError> {
         let Self { found, basins } = self;
         let &Pair { tree, vertices, tool, closest, .. } = pair;
@@ -116,7 +116,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let options = &options.after(spent);
         let ridge = (margin * RIDGE) + 2.0 * accuracy;
         let limit = tool.radius() + margin + ridge;
-        let Found { complete, beyond, tests: mut made } =
+        let SearchExtent { complete, beyond, tests: mut made } =
             find(basins, stack, options, limit, ridge)?;
         let is_crossing = matches!(closest.side, Side::Crossing | Side::Either);
         let has_crossing = is_crossing && own.is_some();
@@ -125,12 +125,18 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
         let left = options.after(made).budget.tests();
         let (limit_above, is_priced) = (limit + ridge, options.is_priced);
-        let mut look =
-            Looking { pair, limit: limit_above, accuracy, left, made: Tests::NONE, is_priced };
+        let mut tester = TriangleTester {
+            pair,
+            limit: limit_above,
+            accuracy,
+            left,
+            made: Tests::NONE,
+            is_priced,
+        };
         let (mut least, mut meets) = (f32::INFINITY, 0_u32);
         let is_left_out = |row| !is_of(TriangleRow(row));
         let ridges = (0.5 * RIDGE * margin, 2.0 * accuracy);
-        let visit = |near: Near| {
+        let visit = |near: NearTriangle| {
             let is_on = sqrt(near.square) <= accuracy;
             meets += u32::from(is_on);
             // The crossing pair, inserted above, represents these triangles.
@@ -156,7 +162,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         };
         // A search that was not begun has left an earlier one's triangles.
         let missing = if options.covers(LIST) {
-            basins.each_valley(tree, ridges, is_left_out, &mut look, visit)?
+            basins.each_valley(tree, ridges, is_left_out, &mut tester, visit)?
         } else {
             None
         };
@@ -167,10 +173,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             if is_own && contact.separation > deepest {
                 let row = contact.triangle.0;
                 contact.activation =
-                    basins.activation(tree, row, ridges, is_left_out, &mut look)?;
+                    basins.activation(tree, row, ridges, is_left_out, &mut tester)?;
             }
         }
-        made = made.and(look.made);
+        made = made.and(tester.made);
         let is_met = is_crossing || closest.is_at_surface();
         let is_known = is_side_searched && (is_met || !closest.is_cut_short());
         // The closest pair is certain then, even if the search was cut short.
@@ -204,13 +210,18 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
     /// A triangle, and the square of its distance from the axis; infinite if beyond the limit.
-    pub(super) fn near(&self, row: u32, limit: f32, accuracy: f32) -> Result<Near, QueryError> {
+    pub(super) fn near(
+        &self,
+        row: u32,
+        limit: f32,
+        accuracy: f32,
+    ) -> Result<NearTriangle, QueryError> {
         let (rows, corners) = corners(self.tree, self.vertices, row)?;
         match self.tool.closest_on_triangle(&corners, limit * limit) {
             Some(found) => Ok(near(row, &found, accuracy)),
             None => match rows.into_iter().zip(corners).find(|(_, corner)| !corner.is_finite()) {
                 Some((vertex, _)) => Err(QueryError::Position { vertex }),
-                None => Ok(Near { square: f32::INFINITY, row, place: ClosestPoint::NONE }),
+                None => Ok(NearTriangle { square: f32::INFINITY, row, place: ClosestPoint::NONE }),
             },
         }
     }
@@ -268,9 +279,9 @@ fn may_be_inside(closest: &Proximity) -> bool {
 }
 
 /// A triangle at this pair. Within some accuracies it has no direction.
-pub(super) fn near(row: u32, pair: &AxisPair, accuracy: f32) -> Near {
+pub(super) fn near(row: u32, pair: &AxisPair, accuracy: f32) -> NearTriangle {
     let place = ClosestPoint::of(pair, NO_DIRECTION * accuracy);
-    Near { square: pair.distance_squared, row, place }
+    NearTriangle { square: pair.distance_squared, row, place }
 }
 
 /// The pair of a tool and the lowest triangle of a valley.
@@ -278,7 +289,7 @@ fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
     vertices: &V,
     tool: &T,
-    near: Near,
+    near: NearTriangle,
     accuracy: f32,
 ) -> Result<Proximity, QueryError> {
     let row = near.row;

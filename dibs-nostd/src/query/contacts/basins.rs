@@ -19,7 +19,7 @@
 
 use glam::Vec3;
 
-use super::activation::{self, Looking};
+use super::activation::{self, TriangleTester};
 use crate::math::sqrt::sqrt;
 use crate::query::prices::{EDGE, ENTRY, VALLEY};
 use crate::tool::AxisPair;
@@ -28,7 +28,7 @@ use crate::{Index, Tool, Tree, VertexTable};
 
 /// A triangle, the square of its distance, and its closest point.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Near {
+pub(super) struct NearTriangle {
     pub square: f32,
     pub row: u32,
     pub place: ClosestPoint,
@@ -78,7 +78,7 @@ impl ClosestPoint {
     }
 }
 
-/// A `Near` as integers that sort by distance, then by row: bits of positive floats sort as integers.
+/// A `NearTriangle` as integers that sort by distance, then by row: bits of positive floats sort as integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Key {
     square: u32,
@@ -89,7 +89,7 @@ struct Key {
 impl Key {
     const NONE: Self = Self { square: 0, row: 0, place: ClosestPoint::NONE };
 
-    fn of(near: Near) -> Self {
+    fn of(near: NearTriangle) -> Self {
         Self { square: near.square.to_bits(), row: near.row, place: near.place }
     }
 
@@ -97,8 +97,8 @@ impl Key {
         f32::from_bits(self.square)
     }
 
-    fn near(self) -> Near {
-        Near { square: self.square(), row: self.row, place: self.place }
+    fn near(self) -> NearTriangle {
+        NearTriangle { square: self.square(), row: self.row, place: self.place }
     }
 }
 
@@ -124,7 +124,7 @@ pub(super) struct Basins<const N: usize> {
 enum Flood {
     /// It has reached everything below its level; the lowest triangle. If that is beyond a ridge and in another
     /// direction, also the lowest before the ridge.
-    Ended(Near, Option<Near>),
+    Ended(NearTriangle, Option<NearTriangle>),
     /// It has met the flood of a lower triangle in nearly the same direction.
     Joined,
     /// Memory or budget ran out; a neighbour may be lower.
@@ -149,7 +149,7 @@ impl<const N: usize> Basins<N> {
     }
 
     /// Keeps a low triangle, and drops the farthest if there is no room. Returns the largest square kept, once full.
-    pub fn push(&mut self, near: Near) -> Option<f32> {
+    pub fn push(&mut self, near: NearTriangle) -> Option<f32> {
         let key = Key::of(near);
         let low = self.near.get_mut(..N.div_ceil(2))?;
         if let Some(place) = low.get_mut(self.count) {
@@ -178,8 +178,8 @@ impl<const N: usize> Basins<N> {
         tree: &Tree<'_, I>,
         ridges: (f32, f32),
         is_left_out: impl Fn(u32) -> bool,
-        look: &mut Looking<'_, '_, I, V, T>,
-        mut visit: impl FnMut(Near) -> Result<(), QueryError>,
+        tester: &mut TriangleTester<'_, '_, I, V, T>,
+        mut visit: impl FnMut(NearTriangle) -> Result<(), QueryError>,
     ) -> Result<Option<f32>, QueryError> {
         sort(self.near.get_mut(..self.count).unwrap_or_default(), self.is_heap);
         self.is_heap = false;
@@ -195,10 +195,10 @@ impl<const N: usize> Basins<N> {
             }
         };
         for entry in 0..low {
-            match self.flood(tree, entry as u16, ridges, &is_left_out, look)? {
+            match self.flood(tree, entry as u16, ridges, &is_left_out, tester)? {
                 Flood::Ended(lowest, beside) => {
                     for valley in [Some(lowest), beside].into_iter().flatten() {
-                        match look.pay_for(VALLEY) {
+                        match tester.pay_for(VALLEY) {
                             Some(()) => visit(valley)?,
                             None => miss(valley.square),
                         }
@@ -222,7 +222,7 @@ impl<const N: usize> Basins<N> {
         low: u16,
         ridges: (f32, f32),
         is_left_out: &impl Fn(u32) -> bool,
-        look: &mut Looking<'_, '_, I, V, T>,
+        tester: &mut TriangleTester<'_, '_, I, V, T>,
     ) -> Result<Flood, QueryError> {
         let Some(&(mut lowest)) = self.near.get(usize::from(low)) else {
             return Ok(Flood::Joined);
@@ -246,7 +246,7 @@ impl<const N: usize> Basins<N> {
             let Some(&entry) = self.reached.get(*at).filter(|_| *at < count) else { break };
             *at += 1;
             let Some(&from) = self.near.get(usize::from(entry)) else { break };
-            let Some(()) = look.pay_for(ENTRY) else {
+            let Some(()) = tester.pay_for(ENTRY) else {
                 if rises {
                     break;
                 }
@@ -258,7 +258,7 @@ impl<const N: usize> Basins<N> {
                 if !(rises || is_level) {
                     continue;
                 }
-                let Some(()) = look.pay_for(EDGE) else {
+                let Some(()) = tester.pay_for(EDGE) else {
                     if is_level {
                         return Ok(Flood::CutShort);
                     }
@@ -268,7 +268,7 @@ impl<const N: usize> Basins<N> {
                 if is_left_out(across) {
                     continue;
                 }
-                let Some(next) = self.entry(across, &mut |row| look.triangle(row))? else {
+                let Some(next) = self.entry(across, &mut |row| tester.triangle(row))? else {
                     if is_level {
                         return Ok(Flood::CutShort);
                     }
@@ -284,7 +284,7 @@ impl<const N: usize> Basins<N> {
                     continue;
                 }
                 // Both may be low with a high edge between them. If the budget runs out, the flood does not rise.
-                if !is_over && !look.edge(from.row, edge)?.is_some_and(|over| over <= top) {
+                if !is_over && !tester.edge(from.row, edge)?.is_some_and(|over| over <= top) {
                     continue;
                 }
                 if !self.reach(next, low, &mut count) {
@@ -341,21 +341,21 @@ impl<const N: usize> Basins<N> {
     pub(super) fn entry(
         &mut self,
         row: u32,
-        look: &mut impl FnMut(u32) -> Result<Option<Near>, QueryError>,
+        test: &mut impl FnMut(u32) -> Result<Option<NearTriangle>, QueryError>,
     ) -> Result<Option<u16>, QueryError> {
         let known = self.find(row);
         if known.is_some() {
             return Ok(known);
         }
         let Some(place) = self.near.get_mut(self.count) else { return Ok(None) };
-        let Some(near) = look(row)? else { return Ok(None) };
+        let Some(near) = test(row)? else { return Ok(None) };
         *place = Key::of(near);
         self.enter(self.count);
         self.count += 1;
         Ok(Some((self.count - 1) as u16))
     }
 
-    pub(super) fn at(&self, entry: u16) -> Option<Near> {
+    pub(super) fn at(&self, entry: u16) -> Option<NearTriangle> {
         self.near.get(usize::from(entry)).map(|key| key.near())
     }
 

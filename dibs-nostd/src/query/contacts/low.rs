@@ -15,7 +15,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tool, VertexTable};
 
 /// The result of a search for low triangles. All that are closer than both distances were collected.
-pub(super) struct Found {
+pub(super) struct SearchExtent {
     /// From here on there was no room for more triangles.
     pub complete: f32,
     /// From here on triangles were not visited.
@@ -24,7 +24,8 @@ pub(super) struct Found {
 }
 
 /// The result of a search that a tick's budget does not cover: nothing was visited.
-const NOT_BEGUN: Found = Found { complete: f32::INFINITY, beyond: 0.0, tests: Tests::NONE };
+const NOT_BEGUN: SearchExtent =
+    SearchExtent { complete: f32::INFINITY, beyond: 0.0, tests: Tests::NONE };
 
 impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// Adds the contacts of a pair. Returns the tests made.
@@ -42,7 +43,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             let search = over_range(pair, stack, options)?;
             let visit = |row, at: &AxisPair| low.add(row, at);
             let (beyond, tests) = search.each_low(limit, (ridge, options), visit)?;
-            Ok(Found { complete: low.complete, beyond, tests })
+            Ok(SearchExtent { complete: low.complete, beyond, tests })
         })
     }
 
@@ -67,7 +68,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
                 let (beyond, tests) =
                     search.each_low_from(&mut front, limit, (ridge, options), visit)?;
                 front.keep(beyond == f32::INFINITY);
-                Ok(Found { complete: low.complete, beyond, tests })
+                Ok(SearchExtent { complete: low.complete, beyond, tests })
             })?;
         // Beyond the margin, inside, or without a budget nothing was searched: the front is as it was.
         if !is_begun {

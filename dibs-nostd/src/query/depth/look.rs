@@ -92,9 +92,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let mut limit = enough;
         if let Some(Remembered { leaves: [best, other], waiting, .. }) = remembered {
             for leaves in [&mut *best, &mut *other] {
-                let way = leaves.way_to(parameter, length);
-                if search.is_among(leaves, way) {
-                    return search.among(leaves, way, is_priced).map(Some);
+                let distance = leaves.distance_to(parameter, length);
+                if search.is_among(leaves, distance) {
+                    return search.among(leaves, distance, is_priced).map(Some);
                 }
             }
             let gathered = match (best.are_around(parameter), other.are_around(parameter)) {
@@ -150,7 +150,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             }
         }
         let (tree, vertices, roots) = (self.tree, self.vertices, self.roots);
-        let is_many = self.ties.are_lost() && !found.is_cut_short();
+        let is_many = self.ties.are_missing() && !found.is_cut_short();
         let many = is_many
             .then(|| {
                 side::of_many(roots, tree, self.stack, vertices, &mut found, on_axis, &options)

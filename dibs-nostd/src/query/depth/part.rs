@@ -65,12 +65,12 @@ impl Sample {
 
     /// A bound on the depth from here to the end of a free length that is outside, if it is at most `enough`. It takes up
     /// to two distances.
-    fn passes(&self, way: &Free, point: impl Fn(f32) -> Vec3, enough: f32) -> Option<f32> {
-        if way.from == self.along {
+    fn passes(&self, free: &Free, point: impl Fn(f32) -> Vec3, enough: f32) -> Option<f32> {
+        if free.from == self.along {
             return Some(0.0);
         }
         // The distance to a triangle is convex.
-        let square = larger(self.square(self.on_axis), self.square(point(way.from)));
+        let square = larger(self.square(self.on_axis), self.square(point(free.from)));
         (square <= enough * enough).then(|| sqrt(square))
     }
 }

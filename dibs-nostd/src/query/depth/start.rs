@@ -94,8 +94,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         }
         let along = parameter * self.tool.axis_length();
         let touches = &self.touches;
-        let way = if parameter > 0.0 { touches.behind(along) } else { touches.ahead(along) };
-        if way.is_outside && way.from == along {
+        let free = if parameter > 0.0 { touches.behind(along) } else { touches.ahead(along) };
+        if free.is_outside && free.from == along {
             return Ok(self.at(parameter, 0.0, near));
         }
         let most = near.depth + (along - near.along).abs();

@@ -32,13 +32,13 @@ pub(in crate::query) struct Point {
 
 #[derive(Clone, Debug)]
 pub(in crate::query) struct KnownDepth<const STACK: usize> {
-    state: State,
+    state: DepthState,
     /// Subtrees still to be searched for the leaves around one of the two points.
     waiting: Vec<Waiting, STACK>,
 }
 
 #[derive(Clone, Debug)]
-struct State {
+struct DepthState {
     points: Points,
     /// The leaves around the deepest point, and around one that may be deeper.
     leaves: [Leaves; 2],
@@ -50,7 +50,7 @@ struct State {
 
 /// The last depth, in a tick.
 pub(in crate::query) struct KnownDepthMut<'m> {
-    state: &'m mut State,
+    state: &'m mut DepthState,
     waiting: &'m mut VecView<Waiting>,
     clock: MotionClock,
     past: Option<Certain>,
@@ -79,7 +79,7 @@ impl<const STACK: usize> KnownDepth<STACK> {
     pub const fn new() -> Self {
         let points = Points { points: Vec::new(), deepest: f32::NAN };
         let leaves = [Leaves::new(), Leaves::new()];
-        let state = State { points, leaves, shells: RootSet::ALL.key(), at: Reading::START };
+        let state = DepthState { points, leaves, shells: RootSet::ALL.key(), at: Reading::START };
         Self { state, waiting: Vec::new() }
     }
 
@@ -99,7 +99,7 @@ impl<const STACK: usize> KnownDepth<STACK> {
     }
 }
 
-impl State {
+impl DepthState {
     fn forget(&mut self) {
         self.points.forget();
         self.leaves.iter_mut().for_each(Leaves::forget);
@@ -130,7 +130,7 @@ impl<'m> KnownDepthMut<'m> {
             state.forget();
             waiting.clear();
         }
-        let State { points, leaves, at, .. } = state;
+        let DepthState { points, leaves, at, .. } = state;
         let moved = moved.unwrap_or(0.0);
         if moved > 0.0 {
             for point in &mut points.points {

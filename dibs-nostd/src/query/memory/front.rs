@@ -7,7 +7,7 @@ use crate::tree::format::{Link, MAX_CHILDREN};
 
 /// A node whose children (or, for a leaf, whose triangles) have separate bounds.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::query) struct Opened {
+pub(in crate::query) struct FrontNode {
     /// The node's children or triangles, as a link; [`UNUSED`] in a free slot.
     pub link: u32,
     /// Slot of the parent node; in a free slot, the next free one, counted from 1.
@@ -27,7 +27,7 @@ pub(in crate::query) const NOWHERE: u16 = u16::MAX;
 /// No free slot. Free slots are counted from 1, so that this is zero.
 const NO_FREE: u16 = 0;
 
-impl Opened {
+impl FrontNode {
     const FREE: Self = Self {
         link: UNUSED,
         parent: NO_FREE,
@@ -80,7 +80,7 @@ impl ChildSlot {
 pub(in crate::query) struct Front<const OPENED: usize> {
     /// The earliest of each node's deadlines. (A separate table, since each tick reads all of it.)
     due: [Deadline; OPENED],
-    nodes: [Opened; OPENED],
+    nodes: [FrontNode; OPENED],
     /// Slots from here on are unused since the last clear.
     end: usize,
     /// The first free slot, counted from 1; [`NO_FREE`] if there is none.
@@ -99,7 +99,7 @@ impl<const OPENED: usize> Front<OPENED> {
         assert!(OPENED > 0 && OPENED < NOWHERE as usize);
         Self {
             due: [Deadline::UNUSED; OPENED],
-            nodes: [Opened::NEVER_USED; OPENED],
+            nodes: [FrontNode::NEVER_USED; OPENED],
             end: 0,
             free: NO_FREE,
             resume: 0,
@@ -113,7 +113,7 @@ impl<const OPENED: usize> Front<OPENED> {
 #[derive(Debug)]
 pub(in crate::query) struct FrontMut<'f> {
     due: &'f mut [Deadline],
-    nodes: &'f mut [Opened],
+    nodes: &'f mut [FrontNode],
     end: &'f mut usize,
     free: &'f mut u16,
     pub resume: &'f mut u16,
@@ -182,7 +182,7 @@ impl FrontMut<'_> {
     }
 
     #[inline(always)]
-    pub fn node(&mut self, at: u16) -> Option<&mut Opened> {
+    pub fn node(&mut self, at: u16) -> Option<&mut FrontNode> {
         self.nodes.get_mut(usize::from(at))
     }
 
@@ -225,7 +225,7 @@ impl FrontMut<'_> {
         }
         *self.due.get_mut(at)? = deadline;
         let deadlines = [deadline; MAX_CHILDREN as usize];
-        *node = Opened { link, parent: parent.node, slot: parent.slot, apart: 0, deadlines };
+        *node = FrontNode { link, parent: parent.node, slot: parent.slot, apart: 0, deadlines };
         Some(at as u16)
     }
 
@@ -234,7 +234,7 @@ impl FrontMut<'_> {
         let free = *self.free;
         let node = self.node(at)?;
         let place = ChildSlot { node: node.parent, slot: node.slot };
-        *node = Opened { parent: free, ..Opened::FREE };
+        *node = FrontNode { parent: free, ..FrontNode::FREE };
         *self.free = at.wrapping_add(1);
         *self.due.get_mut(usize::from(at))? = clock.never();
         *self.node(place.node)?.deadlines.get_mut(usize::from(place.slot))? = deadline;

@@ -98,13 +98,13 @@ impl Leaves {
     }
 
     /// The distance (mm) from the point to another one of its axis of this `length`.
-    pub fn way_to(&self, parameter: f32, length: f32) -> f32 {
+    pub fn distance_to(&self, parameter: f32, length: f32) -> f32 {
         (parameter - self.parameter).abs() * length * (1.0 + 4.0 * f32::EPSILON)
     }
 
     /// Moves the point to another one of its axis.
     pub fn move_to(&mut self, parameter: f32, length: f32) {
-        self.moved = sum(self.moved, self.way_to(parameter, length));
+        self.moved = sum(self.moved, self.distance_to(parameter, length));
         self.parameter = parameter;
     }
 
@@ -113,9 +113,9 @@ impl Leaves {
         self.step
     }
 
-    /// The motion since the leaves were collected, for a point `way` (mm) farther on.
-    pub fn moved(&self, way: f32) -> f32 {
-        sum(self.moved, way)
+    /// The motion since the leaves were collected, for a point `distance` (mm) farther on.
+    pub fn moved(&self, distance: f32) -> f32 {
+        sum(self.moved, distance)
     }
 
     /// The leaves, and the motion since they were collected.

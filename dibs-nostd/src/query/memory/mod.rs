@@ -51,7 +51,7 @@ pub(super) struct Memory<const STACK: usize, const OPENED: usize, const RANGE: u
 
 /// Why a motion cannot be applied to the bounds.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Lost {
+pub(super) enum Loss {
     /// There was no last tick.
     Start,
     /// The surface's motion was not measured over the whole time.
@@ -76,19 +76,19 @@ impl<const STACK: usize, const OPENED: usize, const RANGE: usize> Memory<STACK, 
 
     /// The motion of tool and surface since the last tick, in units.
     #[inline(always)]
-    pub fn moved(&self, tool: &impl Tool, motion: Option<MotionReading>) -> Result<u32, Lost> {
-        let (axis, before) = self.last.ok_or(Lost::Start)?;
-        let surface = motion.and_then(|motion| motion.since(&before)).ok_or(Lost::Surface)?;
+    pub fn moved(&self, tool: &impl Tool, motion: Option<MotionReading>) -> Result<u32, Loss> {
+        let (axis, before) = self.last.ok_or(Loss::Start)?;
+        let surface = motion.and_then(|motion| motion.since(&before)).ok_or(Loss::Surface)?;
         let moved = surface.saturating_add(u64::from(axis.step(tool, self.clock.unit())));
         if moved > u64::from(LONGEST_WAIT.saturating_sub(self.clock.since(self.complete))) {
-            return Err(Lost::Jump);
+            return Err(Loss::Jump);
         }
         Ok(moved as u32)
     }
 
     /// Begins a tick after a motion. Unless the tick is [kept](Self::keep), the next one has no last tick.
     #[inline(always)]
-    pub fn begin(&mut self, moved: Result<u32, Lost>) {
+    pub fn begin(&mut self, moved: Result<u32, Loss>) {
         self.last = None;
         match moved {
             Ok(units) => self.clock.advance(units),

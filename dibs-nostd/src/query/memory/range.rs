@@ -12,7 +12,7 @@ const JUMP: u32 = 1 << 20;
 
 /// A node whose children are handled separately.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::query) struct Opened {
+pub(in crate::query) struct RangeNode {
     /// Its children, as a link.
     pub link: u32,
     /// Deadline of the least bound of the farther children.
@@ -27,12 +27,12 @@ pub(in crate::query) struct Opened {
 #[derive(Clone, Debug)]
 pub(in crate::query) struct RangeFront<const M: usize> {
     /// No vector: `Tracker::opened_in_range` is a constant function, and a vector's length is not constant.
-    nodes: [Opened; M],
-    state: State,
+    nodes: [RangeNode; M],
+    state: RangeState,
 }
 
 #[derive(Clone, Debug)]
-struct State {
+struct RangeState {
     count: usize,
     /// When every node was last visited, at most [`JUMP`] before the last search; none after an error.
     searched: Option<Reading>,
@@ -42,8 +42,8 @@ struct State {
 
 /// The front without its size, in a tick.
 pub(in crate::query) struct RangeFrontMut<'f> {
-    nodes: &'f mut [Opened],
-    state: &'f mut State,
+    nodes: &'f mut [RangeNode],
+    state: &'f mut RangeState,
     searched: Reading,
     pub clock: MotionClock,
 }
@@ -51,8 +51,8 @@ pub(in crate::query) struct RangeFrontMut<'f> {
 impl<const M: usize> RangeFront<M> {
     /// All zeros, as [`Front::EMPTY`](super::front::Front::EMPTY).
     pub const EMPTY: Self = {
-        let none = Opened { link: 0, deadline: Deadline::UNUSED, opened: 0, near: 0 };
-        Self { nodes: [none; M], state: State { count: 0, searched: None, part: None } }
+        let none = RangeNode { link: 0, deadline: Deadline::UNUSED, opened: 0, near: 0 };
+        Self { nodes: [none; M], state: RangeState { count: 0, searched: None, part: None } }
     };
 
     /// Number of opened nodes.
@@ -95,7 +95,7 @@ impl RangeFrontMut<'_> {
 
     /// Opens a node; `None` if there is no free slot.
     pub fn open(&mut self, link: u32, deadline: Deadline) -> Option<()> {
-        let opened = Opened { link, deadline, opened: 0, near: 0 };
+        let opened = RangeNode { link, deadline, opened: 0, near: 0 };
         *self.nodes.get_mut(self.state.count)? = opened;
         self.state.count += 1;
         Some(())
@@ -113,17 +113,17 @@ impl RangeFrontMut<'_> {
     }
 
     #[inline(always)]
-    pub fn node(&self, at: usize) -> Option<Opened> {
+    pub fn node(&self, at: usize) -> Option<RangeNode> {
         if at < self.state.count { self.nodes.get(at).copied() } else { None }
     }
 
     #[inline(always)]
-    pub fn node_mut(&mut self, at: usize) -> Option<&mut Opened> {
+    pub fn node_mut(&mut self, at: usize) -> Option<&mut RangeNode> {
         self.nodes.get_mut(at)
     }
 
     /// The opened nodes from an index on.
-    pub fn rest(&self, from: usize) -> &[Opened] {
+    pub fn rest(&self, from: usize) -> &[RangeNode] {
         self.nodes.get(from..self.state.count).unwrap_or_default()
     }
 }

@@ -97,12 +97,12 @@ pub(super) struct Heights {
     pub is_priced: bool,
     places: [Vertex; SLOTS],
     /// Vertices evicted while a triangle represented them: at most one for each corner of a triangle.
-    lost: Vec<Vertex, 3>,
+    evicted: Vec<Vertex, 3>,
 }
 
 impl Heights {
     pub const fn new(&Options { part, is_priced, .. }: &Options) -> Self {
-        Self { part, is_priced, places: [Vertex::UNSEEN; SLOTS], lost: Vec::new() }
+        Self { part, is_priced, places: [Vertex::UNSEEN; SLOTS], evicted: Vec::new() }
     }
 
     /// The price of a leaf's triangles, in node tests.
@@ -145,19 +145,19 @@ impl Heights {
 
     /// The last evicted vertex.
     #[inline(always)]
-    pub fn lost(&self) -> Option<&Vertex> {
-        self.lost.last()
+    pub fn evicted(&self) -> Option<&Vertex> {
+        self.evicted.last()
     }
 
     /// Removes the last evicted vertex.
-    pub fn found(&mut self) {
-        self.lost.pop();
+    pub fn drop_evicted(&mut self) {
+        self.evicted.pop();
     }
 
     /// The least squared distance of a vertex that a triangle represents.
     pub fn least_standing(&self) -> f32 {
         let standing =
-            self.places.iter().chain(&self.lost).filter(|vertex| vertex.standing().is_some());
+            self.places.iter().chain(&self.evicted).filter(|vertex| vertex.standing().is_some());
         standing.fold(
             f32::INFINITY,
             |least, vertex| {
@@ -195,7 +195,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             return Ok(());
         }
         if vertex.standing().is_some() {
-            let _ = heights.lost.push(*vertex);
+            let _ = heights.evicted.push(*vertex);
         }
         let position = self.position(row)?;
         let towards = self.tool.axis_to(position);

@@ -25,20 +25,20 @@ use crate::{Index, Proximity, Tool, VertexTable};
 const TICKS: f32 = 60.0;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Whether the leaves contain the closest triangle. The search's point is `way` (mm) from the leaves' point.
-    pub fn is_among(&self, leaves: &Leaves, way: f32) -> bool {
-        leaves.has_all(self.cutoff + self.coordinate_slack, leaves.moved(way))
+    /// Whether the leaves contain the closest triangle. The search's point is `distance` (mm) from the leaves' point.
+    pub fn is_among(&self, leaves: &Leaves, distance: f32) -> bool {
+        leaves.has_all(self.cutoff + self.coordinate_slack, leaves.moved(distance))
     }
 
     /// Searches only these leaves.
     pub fn among(
         mut self,
         leaves: &mut Leaves,
-        way: f32,
+        distance: f32,
         is_priced: bool,
     ) -> Result<Proximity, QueryError> {
         let price = if is_priced { 1 + LEAF_PLANE } else { 1 };
-        let moved = leaves.moved(way);
+        let moved = leaves.moved(distance);
         let slack = self.slack + self.coordinate_slack;
         let (leaves, moved_before) = leaves.each();
         for leaf in leaves {
@@ -51,7 +51,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let Some(bound) = self.leaf_bound(first, count, price)? else {
                 return self.finish(0.0);
             };
-            let bound = (bound - slack - way + moved_before) * (1.0 - f32::EPSILON);
+            let bound = (bound - slack - distance + moved_before) * (1.0 - f32::EPSILON);
             if bound > leaf.bound {
                 leaf.bound = bound;
             }

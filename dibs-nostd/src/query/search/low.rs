@@ -28,7 +28,7 @@ pub(super) const MAX_RING: u32 = 256;
 const FLAT: f32 = 1.0 / 256.0;
 
 /// A triangle as seen from the axis.
-struct Seen {
+struct TriangleHeight {
     lowest: CacheSlot,
     /// Lower bound on the square of its distance.
     low: f32,
@@ -89,11 +89,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if is_low && !self.visit_triangle(triangle, visit)? {
                 return Ok(None);
             }
-            while let Some(&vertex) = heights.lost() {
+            while let Some(&vertex) = heights.evicted() {
                 if !self.visit_standing(&vertex, heights, visit)? {
                     return Ok(None);
                 }
-                heights.found();
+                heights.drop_evicted();
             }
         }
         Ok(Some(least))
@@ -138,7 +138,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     /// Compares a triangle's corners.
     #[inline(always)]
-    fn see(&self, rows: [u32; 3], ridge: f32, heights: &mut Heights) -> Result<Seen, QueryError> {
+    fn see(
+        &self,
+        rows: [u32; 3],
+        ridge: f32,
+        heights: &mut Heights,
+    ) -> Result<TriangleHeight, QueryError> {
         let [a, b, c] = self.places(heights, rows)?;
         let is_below = |one: CacheSlot, other: CacheSlot| {
             let (one, other) = (heights.at(one), heights.at(other));
@@ -158,7 +163,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let (along, across) = (rise(next), rise(last));
         let least = if along < across { along } else { across };
         if least >= self.tilt_slack {
-            return Ok(Seen { lowest, low: square - self.tilt_slack, dip: Dip::Nowhere });
+            return Ok(TriangleHeight { lowest, low: square - self.tilt_slack, dip: Dip::Nowhere });
         }
         // The slack of the tilt covers the rounding of a rise and of the square.
         let fall = (if least < 0.0 { -2.0 * least } else { 0.0 }) + 3.0 * self.tilt_slack;
@@ -174,7 +179,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         } else {
             Dip::Anywhere
         };
-        Ok(Seen { lowest, low: square - fall, dip })
+        Ok(TriangleHeight { lowest, low: square - fall, dip })
     }
 
     /// Whether a triangle of a closed surface is seen from outside, as far as known. `None` if the budget ran out.

@@ -18,7 +18,7 @@ use crate::{Budget, Index, Options, VertexTable};
 /// How far a label's triangles are from a tool's axis.
 #[cfg(feature = "control")]
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct OfLabel {
+pub(crate) struct LabelDistance {
     /// None of them is nearer.
     pub distance: f32,
     /// The closest one that was tested, if one was within the limit.
@@ -70,7 +70,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// The closest of a label's triangles within `limit`.
     #[cfg(feature = "control")]
     #[cold]
-    pub fn closest_of_label(self, label: u8, limit: f32) -> Result<OfLabel, QueryError> {
+    pub fn closest_of_label(self, label: u8, limit: f32) -> Result<LabelDistance, QueryError> {
         let (accuracy, tilt) = (self.accuracy(), self.tilt_slack);
         let limit = limit + 2.0 * accuracy;
         let (mut nearest, mut closest) = (limit, None);
@@ -89,7 +89,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let beyond = if beyond > 0.0 && square > 0.0 { sqrt(square) } else { 0.0 };
         let nearest = if beyond < nearest { beyond } else { nearest };
         let Tests { node_tests, triangle_tests } = tests;
-        Ok(OfLabel { distance: nearest - accuracy, pair: closest, node_tests, triangle_tests })
+        Ok(LabelDistance {
+            distance: nearest - accuracy,
+            pair: closest,
+            node_tests,
+            triangle_tests,
+        })
     }
 
     /// Visits the triangles of the waiting subtrees. If the budget runs out, returns a lower bound on the distance of

@@ -12,7 +12,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::Options;
 use crate::query::made::Tests;
 use crate::query::memory::clock::Deadline;
-use crate::query::memory::range::{Opened, RangeFrontMut};
+use crate::query::memory::range::{RangeFrontMut, RangeNode};
 use crate::query::prices::{CHILD_PLANE, LIST, PASSED, VISIT};
 use crate::tool::{AxisPair, Tool};
 use crate::tree::format::Link;
@@ -71,13 +71,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         &mut self,
         front: &mut RangeFrontMut<'_>,
         at: usize,
-        node: Opened,
+        node: RangeNode,
         is_priced: bool,
     ) -> Result<bool, QueryError> {
         let (clock, tree) = (front.clock, self.tree);
         let margin = self.slack + self.coordinate_slack;
         let later = |bound: f32| node.deadline.or_later(clock.deadline(bound - margin));
-        let Opened { link, mut opened, mut near, .. } = node;
+        let RangeNode { link, mut opened, mut near, .. } = node;
         let Link::Children { first, count } = Link::decode(link) else {
             return Err(QueryError::Corrupt { row: 0 });
         };
@@ -94,7 +94,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if self.meter.node().is_none() {
                 // The remaining children stay due.
                 let deadline = node.deadline;
-                *front.node_mut(at).ok_or(corrupt)? = Opened { link, deadline, opened, near };
+                *front.node_mut(at).ok_or(corrupt)? = RangeNode { link, deadline, opened, near };
                 return Ok(false);
             }
             let position = self.position(child.pin)?;
@@ -135,7 +135,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             }
         }
         let deadline = first_due;
-        *front.node_mut(at).ok_or(corrupt)? = Opened { link, deadline, opened, near };
+        *front.node_mut(at).ok_or(corrupt)? = RangeNode { link, deadline, opened, near };
         Ok(true)
     }
 

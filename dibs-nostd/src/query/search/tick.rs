@@ -13,7 +13,7 @@ mod facing;
 
 use glam::Vec3;
 
-use facing::Facing;
+use facing::FacingPlane;
 
 use super::{Expansion, Search, Waiting};
 use crate::math::sqrt::sqrt;
@@ -46,7 +46,7 @@ pub(in crate::query) struct Tick<'s, 't, 'f, I, V: ?Sized, T> {
     margin: f32,
     /// Distance from the axis beyond which the search does not go.
     limit: f32,
-    facing: Facing,
+    facing: FacingPlane,
     /// Whether its [work besides tests](crate::query::prices) counts.
     is_priced: bool,
 }
@@ -69,7 +69,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let margin = search.slack + search.coordinate_slack;
         let limit =
             if separation < f32::INFINITY { search.limit_to(separation) } else { f32::INFINITY };
-        let facing = Facing::new(&search);
+        let facing = FacingPlane::new(&search);
         Self { search, front, clock, margin, limit, facing, is_priced }
     }
 
@@ -340,7 +340,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         if !is_closest {
             return Ok(Some(bound));
         }
-        self.facing = Facing::new(&self.search);
+        self.facing = FacingPlane::new(&self.search);
         let corrupt = QueryError::Corrupt { row: triangle };
         if let Some(place) = self.front.best.replace(place) {
             // It was the closest in this tick, too: its bound is not older than that.

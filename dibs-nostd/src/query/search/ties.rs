@@ -39,7 +39,7 @@ pub(in crate::query) struct Ties {
     /// Square of the distance up to which the axis may touch a triangle; negative if not needed.
     touching: f32,
     /// There were too many, or the search did not collect all.
-    are_lost: bool,
+    are_missing: bool,
     /// They are all the triangles that meet in one feature.
     are_star: bool,
 }
@@ -47,13 +47,13 @@ pub(in crate::query) struct Ties {
 impl Ties {
     pub const fn new() -> Self {
         let rows = Vec::new();
-        Self { rows, limit: -1.0, touching: -1.0, are_lost: true, are_star: false }
+        Self { rows, limit: -1.0, touching: -1.0, are_missing: true, are_star: false }
     }
 
     /// An empty list for the triangles that meet in a feature.
     pub const fn star() -> Self {
         let rows = Vec::new();
-        Self { rows, limit: -1.0, touching: -1.0, are_lost: false, are_star: true }
+        Self { rows, limit: -1.0, touching: -1.0, are_missing: false, are_star: true }
     }
 
     /// Adds a triangle that meets in the feature.
@@ -68,7 +68,7 @@ impl Ties {
         self.touching = if is_crossable { accuracy * accuracy } else { -1.0 };
         self.rows.clear();
         self.limit = -1.0;
-        (self.are_lost, self.are_star) = (false, false);
+        (self.are_missing, self.are_star) = (false, false);
     }
 
     /// Keeps the triangles that satisfy a condition.
@@ -86,14 +86,14 @@ impl Ties {
     }
 
     /// Whether triangles may be missing.
-    pub const fn are_lost(&self) -> bool {
-        self.are_lost
+    pub const fn are_missing(&self) -> bool {
+        self.are_missing
     }
 
     /// Notes that triangles may be missing.
     #[inline(always)]
     pub(super) const fn lose(&mut self) {
-        self.are_lost = true;
+        self.are_missing = true;
     }
 
     /// Adds a triangle, if the limit is `limit`.
@@ -101,13 +101,13 @@ impl Ties {
     pub(super) fn push(&mut self, row: u32, square: f32, limit: f32) {
         self.limit = limit;
         // Otherwise each of thousands of tied triangles would try to make room again.
-        if self.are_lost {
+        if self.are_missing {
             return;
         }
         if self.rows.is_full() {
             self.drop_farther();
         }
-        self.are_lost = self.rows.push(Tie { row, square }).is_err();
+        self.are_missing = self.rows.push(Tie { row, square }).is_err();
     }
 
     /// Makes room by dropping triangles beyond the limit.
@@ -123,19 +123,19 @@ impl Ties {
 
     /// All triangles that may be the closest, or share its closest point. `None` if unknown.
     pub fn rows(&self) -> Option<impl Iterator<Item = u32>> {
-        (!self.are_lost).then(|| self.within(self.limit))
+        (!self.are_missing).then(|| self.within(self.limit))
     }
 
     /// The triangles that decide the side in f64: all. If too many meet in one feature, the first, since each
     /// represents the feature.
     pub fn deciding(&self) -> Option<impl Iterator<Item = u32>> {
-        let most = if self.are_lost { usize::from(self.are_star) } else { MOST };
+        let most = if self.are_missing { usize::from(self.are_star) } else { MOST };
         (most > 0).then(|| self.within(self.limit).take(most))
     }
 
     /// Whether the triangles that the axis may touch are known.
     pub fn has_touched(&self) -> bool {
-        !self.are_lost && self.touching >= 0.0
+        !self.are_missing && self.touching >= 0.0
     }
 
     /// The first triangle at or after an index that the axis may touch, with its index. A loop over an iterator takes

@@ -3,7 +3,7 @@
 // Requirement: T-01
 
 use crate::query::Proximity;
-use crate::query::memory::Lost;
+use crate::query::memory::Loss;
 
 /// The answer of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,12 +47,12 @@ pub enum Fallback {
     Full,
 }
 
-impl From<Lost> for Fallback {
-    fn from(lost: Lost) -> Self {
-        match lost {
-            Lost::Start => Self::Start,
-            Lost::Surface => Self::Surface,
-            Lost::Jump => Self::Jump,
+impl From<Loss> for Fallback {
+    fn from(loss: Loss) -> Self {
+        match loss {
+            Loss::Start => Self::Start,
+            Loss::Surface => Self::Surface,
+            Loss::Jump => Self::Jump,
         }
     }
 }

@@ -87,14 +87,14 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize, const RANGE: 
     labels: LabelSet,
     stack: [Waiting; STACK],
     memory: Memory<STACK, OPENED, RANGE>,
-    last: Option<Last>,
+    last: Option<LastTick>,
     ties: Ties,
     triangle: Option<TriangleRow>,
 }
 
 /// The last tick, for queries with several trackers.
 #[derive(Clone, Copy, Debug)]
-struct Last {
+struct LastTick {
     /// A lower bound on the distance from the axis to the surface; negative infinity if the tool may be inside.
     clear: f32,
     /// Whether the side was asked for.
@@ -279,7 +279,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let memory = &mut self.memory;
         memory.keep(tool, motion, is_complete);
         let (is_closed, now) = (self.tree.is_closed(), memory.clock.now());
-        self.last = motion.map(|_| Last::new(tool, &closest, is_closed, now));
+        self.last = motion.map(|_| LastTick::new(tool, &closest, is_closed, now));
         let opened = memory.front.borrow().used() as u32;
         let moved = moved_by;
         let (pair, searched) = (0, 1);
@@ -331,7 +331,7 @@ fn share_of_pair(budget: Budget, past: &Certain, is_depth_known: bool) -> Budget
     }
 }
 
-impl Last {
+impl LastTick {
     fn new(tool: &impl Tool, closest: &Proximity, is_closed: bool, searched: Reading) -> Self {
         let clear = closest.lower + tool.radius() - closest.accuracy;
         let (clear, is_signed) = match closest.side {

@@ -5,7 +5,7 @@
 use super::Tracker;
 use crate::math::round::sum_down;
 use crate::query::Options;
-use crate::query::search::{OfLabel, Search};
+use crate::query::search::{LabelDistance, Search};
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, MovingSurface, Tool};
@@ -22,7 +22,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         (label, limit): (u8, f32),
         options: &Options,
-    ) -> Result<OfLabel, QueryError> {
+    ) -> Result<LabelDistance, QueryError> {
         let (tree, stack) = (&self.tree, &mut self.stack);
         let all = RootSet::ALL;
         let search = Search::start(all, tree, stack, surface, tool, options, None, None)?;

@@ -5,7 +5,7 @@
 
 // Requirement: T-01
 
-use super::{Last, Purpose, Tracker, TrackerAnswer};
+use super::{LastTick, Purpose, Tracker, TrackerAnswer};
 use crate::query::made::Tests;
 use crate::query::{Budget, NoSide, Options, Side};
 use crate::unavailable::QueryError;
@@ -139,7 +139,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         if let Some(last) = &mut self.last {
             last.is_signed |= keeps_side;
             if last.clear < clear {
-                *last = Last { clear, ..before };
+                *last = LastTick { clear, ..before };
             }
         }
         Ok(found.tests())

@@ -5,7 +5,7 @@
 
 use glam::Vec4;
 
-use super::{Before, Measure, MetricBits, Table};
+use super::{Measure, MetricBits, PreviousTriangle, Table};
 use crate::math::vec3x4::Vec3x4;
 use crate::stretch::kernel::Worst;
 use crate::surface::VertexTable;
@@ -14,7 +14,7 @@ use crate::tree::format::{self, Join, Metric};
 
 /// The edge from a triangle's centre to its third corner: their rows, and its square at rest.
 #[derive(Clone, Copy)]
-struct Last {
+struct LastEdge {
     centre: u32,
     third: u32,
     rest: f32,
@@ -31,7 +31,7 @@ struct Four {
     second: [f32; 4],
 }
 
-impl Last {
+impl LastEdge {
     /// The edge before the first triangle of a range: see [`Table::before`].
     #[inline(always)]
     fn before<I: Index>(metric: &impl MetricBits, corners: &I::Corners) -> Option<Self> {
@@ -106,7 +106,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         metrics: &[R],
         triangles: &[I::Corners],
         largest: f32,
-        last: &mut Last,
+        last: &mut LastEdge,
         sum: &mut f32,
     ) -> usize {
         let ((metrics, _), (triangles, _)) = (metrics.as_chunks::<4>(), triangles.as_chunks::<4>());
@@ -126,12 +126,12 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
 
     /// The state of the row-by-row check after a triangle that passed.
     #[inline(always)]
-    fn after(&self, last: Last, largest: f32) -> Option<Before> {
+    fn after(&self, last: LastEdge, largest: f32) -> Option<PreviousTriangle> {
         let centre = self.surface.position(last.centre)?;
         let third = self.surface.position(last.third)?;
         let edge = third - centre;
         let left = largest * last.rest - edge.length_squared();
-        Some(Before { centre, third, edge, left, square: 0.0 })
+        Some(PreviousTriangle { centre, third, edge, left, square: 0.0 })
     }
 }
 
@@ -150,7 +150,7 @@ pub(super) fn measure<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBi
     let mut row = first;
     let start = metrics.first().zip(triangles.first()).and_then(|(metric, corners)| {
         let before = table.before::<I>(metric, corners, worst.squared)?;
-        Some((before, Last::before::<I>(metric, corners)?))
+        Some((before, LastEdge::before::<I>(metric, corners)?))
     });
     let Some((before, mut last)) = start else { return (row, worst, size) };
     // The state before `row` where the row-by-row check ended; elsewhere it follows from `last`.

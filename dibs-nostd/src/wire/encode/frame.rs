@@ -130,7 +130,7 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         self
     }
 
-    /// The same frame with a pose, for a receiver of [`Posed`](crate::guard::Posed) frames: positions are in mesh
+    /// The same frame with a pose, for a receiver of [`PosedRows`](crate::guard::PosedRows): positions are in mesh
     /// coordinates. A partial frame without a pose keeps that of its base; a whole frame without one is in the
     /// coordinates of the mesh's file.
     ///

@@ -155,7 +155,7 @@ fn wide() -> Option<f32> {
 #[cfg(feature = "filter")]
 fn filtered() -> Option<f32> {
     use core::hint::black_box;
-    use dibs_nostd::filter::{Filter, Motion, MotionRow, Uncertainty};
+    use dibs_nostd::filter::{Filter, MotionRow, RigidMotion, Uncertainty};
 
     let tree = surface::TREE.validate().ok()?;
     let mut tracker = surface::Tracker::<64>::new(&tree).ok()?;
@@ -164,7 +164,7 @@ fn filtered() -> Option<f32> {
     let table = odometer.start(&rows[..]);
     let tool = controller::instrument(black_box(0)).ok()?;
     let filter = Filter::new(black_box(1.0), black_box(200.0)).ok()?;
-    let command = black_box(Motion::translation(glam::Vec3::X));
+    let command = black_box(RigidMotion::translation(glam::Vec3::X));
     let own = black_box([MotionRow::along(glam::Vec3::X, 0.0); 2]);
     let mut pairs = [(&mut tracker, &table, &tool)];
     let admitted =

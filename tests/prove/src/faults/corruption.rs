@@ -5,7 +5,7 @@ use std::mem::take;
 
 use anyhow::{Result, anyhow};
 use dibs_nostd::Frames;
-use dibs_nostd::guard::{Poses, Shared};
+use dibs_nostd::guard::{Poses, SharedState};
 use dibs_nostd::wire::NoMac;
 use dibs_stream::faults::{Fault, Injector};
 use fastrand::Rng;

@@ -17,7 +17,7 @@ use dibs_nostd::wire::{
 };
 use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, RigidPose, Tree};
 use dibs_stream::transport::Transport;
-use dibs_stream::{Prepared, Sender, Settings, SurfaceOrder};
+use dibs_stream::{PreparedFrame, Sender, Settings, SurfaceOrder};
 pub use probe::bus::MTU;
 use probe::bus::{KEY, PoseCheck, RECEIVER, VERTICES, WORK, pose_numbers, published_words};
 
@@ -89,7 +89,7 @@ pub struct Case {
 
 impl Case {
     /// Makes the frame of a moment.
-    pub fn prepare<M: Mac>(self, source: &mut Source<M>, moment: u32) -> Prepared {
+    pub fn prepare<M: Mac>(self, source: &mut Source<M>, moment: u32) -> PreparedFrame {
         let surface = surface(moment);
         let frame = if self.posed {
             source.prepare_at(&surface, pose(moment), Duration::ZERO)

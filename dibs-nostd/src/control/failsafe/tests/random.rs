@@ -44,14 +44,14 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Verdict>, Vec<bool>) {
     let mut machine = FailSafe::new(limits);
     let (mut now, mut epoch, mut stamp) = (Millis(start), 0_u32, None);
-    let mut ageing = Ageing::default();
+    let mut ageing = StampAge::default();
     let (mut observations, mut verdicts, mut acknowledged) = (Vec::new(), Vec::new(), Vec::new());
     for step in steps {
         now = now.after(Millis(step.wait));
         if step.new_frame {
             epoch = epoch.wrapping_add(1);
             stamp = Some(now.before(Millis(step.delay)));
-            ageing = Ageing::default();
+            ageing = StampAge::default();
         }
         let frame = stamp.map(|received| {
             ageing = ageing.at(now, received);

@@ -10,7 +10,7 @@ use crate::{Index, Tool, VertexTable};
 
 /// The plane perpendicular to the closest pair. Most triangles around the pair are beyond it, and triangles that share
 /// the closest point are not nearer; neither kind needs an exact test.
-pub(super) struct Facing {
+pub(super) struct FacingPlane {
     start: Vec3,
     /// Unit vector from the axis to the closest triangle; zero if there is none, or they touch.
     normal: Vec3,
@@ -20,7 +20,7 @@ pub(super) struct Facing {
     pub within: f32,
 }
 
-impl Facing {
+impl FacingPlane {
     /// The plane of the closest pair so far.
     #[inline(always)]
     pub fn new<I: Index, V: VertexTable + ?Sized, T: Tool>(

@@ -20,7 +20,7 @@ use core::ptr::{read_volatile, with_exposed_provenance_mut, write_volatile};
 
 use cortex_m_rt::entry;
 use dibs_nostd::format::CRC;
-use dibs_nostd::guard::{Poses, Shared};
+use dibs_nostd::guard::{Poses, SharedState};
 use dibs_nostd::wire::{AesCmac, Deframer, Mac, NoMac, encode_status, enframe, framed_bytes};
 use dibs_nostd::{Advance, Assembler, FrameReader, FrameWriter, Frames, Millis, Tree};
 use exit::exit;
