@@ -47,7 +47,8 @@ const DOT: f32 = 3.0 * U;
 /// Error of the axis' point through which a plane goes, in units of `C`.
 const ON_AXIS: f32 = 2.0 * U;
 
-/// Slack of a plane's comparison in units of `C`, since it uses positions unshifted. Half of this would suffice.
+/// Slack of a plane's comparison in units of `C`, since it uses positions unshifted: two dot products, the axis' point,
+/// and 2 `u` of the two sums.
 pub(super) const COORDINATES: f32 = 16.0 * U;
 
 /// An axis' deviation from perpendicular to the shortest vector to a point, in units of `S`.
@@ -57,7 +58,7 @@ const PERPENDICULAR: f32 = 16.0 * U;
 /// most half of [`PERPENDICULAR`].
 pub(super) const TILT: f32 = 16.0 * U;
 
-const _: () = assert!(COORDINATES >= 2.0 * DOT + ON_AXIS && TILT >= 0.5 * PERPENDICULAR);
+const _: () = assert!(COORDINATES >= 2.0 * DOT + ON_AXIS + 2.0 * U && TILT >= 0.5 * PERPENDICULAR);
 
 /// A few times the length that the kernels treat as zero: slack and accuracy if tool and surface are one point.
 pub(super) const FLOOR: f32 = 1e-14;
