@@ -1,5 +1,6 @@
 #include "control.h"
 
+#include <float.h>
 #include <stdalign.h>
 
 #include "bus.h"
@@ -78,6 +79,8 @@ void control_tick(tick_record *record) {
         .triangle = DIBS_NO_TRIANGLE,
         .force = force.force,
         .query_counts = took,
+        /* This controller lists no contacts. */
+        .contacts_bound = -FLT_MAX,
     };
     write_tool(&tool, record);
     write_bus(record);

@@ -48,6 +48,8 @@ typedef struct {
     float blend;
     float residual;
     dibs_vec3 surface_velocity;
+    uint32_t contacts;
+    float contacts_bound;
 } tick_record;
 
 #define TICK_KIND 1u
