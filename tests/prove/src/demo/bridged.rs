@@ -33,12 +33,13 @@ impl Bridged<'_> {
             broken
                 .push(format!("of {sent} frames {published} were published and {refused} refused"));
         }
-        // A refused begin, and nothing else, leaves the other packets of its frame. So a stale packet that begins no frame
-        // is not taken for a refused one.
+        // A refused begin leaves the other packets of its frame; a frame that is found too fast while it arrives leaves those
+        // that were to come. So a stale packet that begins no frame is not taken for a refused one.
         let total = |name: &str| self.totals[name].as_u64().unwrap_or(0);
         let others = (total("packets") / total("frames").max(1)).saturating_sub(1);
         let (left, expected) = (of(Event::Unexpected), u64::from(begins) * others);
-        if u64::from(left).abs_diff(expected) > others {
+        let unknown = (1 + u64::from(of(Event::TooFast))) * others;
+        if u64::from(left).abs_diff(expected) > unknown {
             broken.push(format!(
                 "{left} packets of no frame, where {begins} refused begins leave {expected}"
             ));
