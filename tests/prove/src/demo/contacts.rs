@@ -41,8 +41,9 @@ pub struct Touches {
     /// Contacts in the controller's list, and ticks whose list was complete within the margin.
     controller_contacts_mean: f64,
     controller_contacts_complete: usize,
-    /// Ticks in which the controller's list has fewer contacts than there are below the list's bound.
-    pub ticks_contacts_missing: usize,
+    /// Ticks in which the controller's list has fewer contacts than the host's, which has another margin and so parts
+    /// other ridges, below the bound of the former.
+    ticks_contacts_fewer: usize,
     proxy_force_max_n: f32,
     /// Largest change in a force's magnitude between two ticks on the same frame: the controller's, and the proxy's.
     force_step_max_n: f32,
@@ -122,8 +123,8 @@ impl Touches {
         // A tool that crosses has a list of other points wherever a budget ended the search for its depth.
         let is_certain = |contact: &&Contact| contact.separation < tick.contacts_bound;
         let certain = list.iter().filter(is_certain).count();
-        let is_missing = tick.lower > 0.0 && (tick.contacts as usize) < certain;
-        self.ticks_contacts_missing += usize::from(is_missing);
+        let has_fewer = tick.lower > 0.0 && (tick.contacts as usize) < certain;
+        self.ticks_contacts_fewer += usize::from(has_fewer);
         self.proxy_force_max_n = self.proxy_force_max_n.max(touch.force);
         if let Some(last) = self.all.last()
             && last.tick + 1 == tick.tick
