@@ -2,13 +2,19 @@
 
 // Requirements: S-01, S-04
 
-use dibs_build::{Builder, Mesh};
+use dibs_build::{Builder, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Budget, Contact, Contacts, Cost, NoSide, Odometer, Options, Query, Side, Sphere, Tracker,
+    Budget, Capsule, Contact, Contacts, Cost, NoSide, Odometer, Options, Query, Side, Sphere,
+    Tracker,
 };
-use dibs_tests::surfaces::{ball, joined, moved};
+use dibs_tests::deform::unit;
+use dibs_tests::sample;
+use dibs_tests::surfaces::{Inexact, ball, joined, moved};
+use fastrand::Rng;
 use glam::Vec3;
+
+type Tracked<'t> = Tracker<'t, u16, MAX_STACK, 256>;
 
 /// A list says how far it is complete: no contact nearer than that is missing.
 #[test]
@@ -40,6 +46,48 @@ fn no_contact_below_the_bound_is_missing() {
         all.iter().map(|contact| contact.separation).filter(|&apart| apart < bound).collect();
     assert_eq!(kept, below);
     assert!(bound > kept[2] && bound <= all[3].separation, "{bound} {kept:?}");
+}
+
+/// An error of the positions widens the answer. It removes no contact, and moves none: it would hide a wall in another
+/// direction wherever it is as large as the distance.
+#[test]
+fn contacts_do_not_depend_on_the_positions_error() {
+    let heart = generate::heart(2_000).expect("a valid size").mesh;
+    let surfaces = [heart, generate::brain(2_000).expect("a valid size")];
+    let (mut near, mut several) = (0, 0);
+    for (seed, mesh) in (1..).zip(surfaces) {
+        let mut rng = Rng::with_seed(seed);
+        let built = Builder::new().build(&mesh).expect("a valid mesh");
+        let tree = built.tree::<u16>().expect("valid");
+        let rows = built.to_rows(&mesh.positions);
+        let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+        let mut lists = [const { Contacts::<32, 1024>::new() }; 2];
+        for trial in 0..sample(3_200) {
+            let from = rows[rng.usize(..rows.len())] + unit(&mut rng) * 6.0;
+            let tool = Capsule::new(from, from + unit(&mut rng) * 20.0, 1.5).expect("finite");
+            let error = 3.0 * rng.f32();
+            for (list, error) in lists.iter_mut().zip([0.0, error]) {
+                let table = Inexact(&rows, error);
+                let options = Options::cold();
+                if trial % 2 == 0 {
+                    query.contacts(&table, &tool, 4.0, &options, list).expect("an answer");
+                } else {
+                    let mut tracker = Tracked::new(&tree).expect("deep enough");
+                    let surface = Odometer::new(&tree).start(&table);
+                    tracker.contacts(&surface, &tool, 4.0, &options, list).expect("an answer");
+                }
+                assert!(list.accuracy() >= error, "{}", list.accuracy());
+            }
+            let [exact, inexact] = lists.each_ref().map(|list| {
+                let place = |at: &Contact| (at.separation, at.normal, at.point_on_surface);
+                list.iter().map(place).collect::<Vec<_>>()
+            });
+            assert_eq!(exact, inexact, "{error}");
+            near += exact.len();
+            several += usize::from(exact.len() > 1);
+        }
+    }
+    assert!(near > 200 && several > 30, "{near} contacts, {several} lists of several");
 }
 
 /// A tool whose axis meets the surface has no side of its own, but the side of the tick before.

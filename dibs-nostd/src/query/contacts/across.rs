@@ -133,8 +133,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
             options: options.warm_start(Some(own.triangle)),
             spent: Tests::NONE,
         };
-        // The searches treat the positions as exact.
-        let accuracy = closest.accuracy - vertices.position_error();
+        let accuracy = self.search_accuracy();
         let length = tool.axis_length();
         let direction = tool.axis_span() / length;
         let on_axis = tool.axis_point(own.axis_parameter);

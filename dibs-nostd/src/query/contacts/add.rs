@@ -94,8 +94,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if closest.accuracy > found.accuracy {
             found.accuracy = closest.accuracy;
         }
-        // The search below treats the positions as exact; the answer's accuracy includes their error already.
-        let accuracy = closest.accuracy - vertices.position_error();
+        let accuracy = pair.search_accuracy();
         let is_side_searched = closest.side != Side::Undefined(NoSide::CutShort);
         found.has_no_side |= may_be_inside(closest);
         let is_of = |row| options.part.is_none() || tree.label(row) == options.part;
@@ -183,7 +182,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if is_known
             && !is_crossing
             && let Some(contact) = own
-            && !(least <= contact.separation + 2.0 * closest.accuracy)
+            && !(least <= contact.separation + 2.0 * accuracy)
         {
             found.insert(contact);
         }
@@ -205,6 +204,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             found.lower_bound(from - ridge - tool.radius());
         }
         Ok(made.and(spent))
+    }
+}
+
+impl<I, V: VertexTable + ?Sized, T> Pair<'_, I, V, T> {
+    /// Accuracy (mm) of a search that treats the positions as exact: the answer's accuracy includes their error.
+    pub(super) fn search_accuracy(&self) -> f32 {
+        self.closest.accuracy - self.vertices.position_error()
     }
 }
 

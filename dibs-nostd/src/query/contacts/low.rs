@@ -94,17 +94,18 @@ struct Low<'b, const NEAR: usize> {
     basins: &'b mut Basins<NEAR>,
     /// All closer triangles are collected.
     complete: f32,
+    /// That of distances from the given positions: their error does not change how the triangles lie to each other.
     accuracy: f32,
 }
 
 impl<'b, const NEAR: usize> Low<'b, NEAR> {
-    fn new<I, V: ?Sized, T>(
+    fn new<I, V: VertexTable + ?Sized, T>(
         basins: &'b mut Basins<NEAR>,
         limit: f32,
         pair: &Pair<'_, I, V, T>,
     ) -> Self {
         basins.clear();
-        Self { basins, complete: limit, accuracy: pair.closest.accuracy }
+        Self { basins, complete: limit, accuracy: pair.search_accuracy() }
     }
 
     /// Collects a triangle. Returns the distance beyond which there is no room for more.

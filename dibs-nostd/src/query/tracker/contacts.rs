@@ -67,10 +67,10 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             let nearest = closest.lower;
             *is_kept = self.keep_certain(surface, tool, options, closest, nearest)?;
         }
-        tracked.closest.add_position_error(surface);
         if tracked.is_kept && !is_cut {
             contacts.resolve_side(&tracked.closest);
         }
+        tracked.closest.add_position_error(surface);
         contacts.raise_bound(tracked.closest.interval().lower);
         Ok(tracked)
     }

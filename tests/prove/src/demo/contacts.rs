@@ -8,6 +8,7 @@ use dibs_nostd::constraint::Proxy;
 use dibs_nostd::failsafe::State;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Contact, Contacts, Index, Options, Query, Tree, Unavailable};
+use dibs_tests::surfaces::Inexact;
 use glam::Vec3;
 use serde::Serialize;
 
@@ -41,9 +42,8 @@ pub struct Touches {
     /// Contacts in the controller's list, and ticks whose list was complete within the margin.
     controller_contacts_mean: f64,
     controller_contacts_complete: usize,
-    /// Ticks in which the controller's list has fewer contacts than the host's, which has another margin and so parts
-    /// other ridges, below the bound of the former.
-    ticks_contacts_fewer: usize,
+    /// Ticks in which the controller's list has fewer contacts than there are below the list's bound.
+    pub ticks_contacts_missing: usize,
     proxy_force_max_n: f32,
     /// Largest change in a force's magnitude between two ticks on the same frame: the controller's, and the proxy's.
     force_step_max_n: f32,
@@ -85,15 +85,16 @@ impl Touches {
             let rows = rows(link, tick)?;
             let rows = scene.vertices(&rows);
             let (was, now) = (tool(before)?, tool(tick)?);
-            let off = tick.margin + tick.position_error;
-            let margin = MARGIN + off + tick.accuracy;
-            query.contacts(&*rows, &now, margin, &Options::new(), &mut list)?;
+            // As the controller searched it: another margin parts other ridges.
+            let searched = Inexact(&rows, tick.position_error);
+            let margin = MARGIN + (tick.position_error + tick.margin);
+            query.contacts(&searched, &now, margin, &Options::new(), &mut list)?;
             let velocity = (now.start() - was.start()) * TICK_RATE as f32;
             let axis = (now.end() - now.start(), was.end() - was.start());
             let angular = axis.1.cross(axis.0) / axis.0.length_squared() * TICK_RATE as f32;
             let wrench = proxy.wrench(
                 Ok::<_, Unavailable>(list.iter()),
-                list.accuracy() + off,
+                list.accuracy() + tick.margin,
                 now.start(),
                 velocity,
                 angular,
@@ -123,8 +124,8 @@ impl Touches {
         // A tool that crosses has a list of other points wherever a budget ended the search for its depth.
         let is_certain = |contact: &&Contact| contact.separation < tick.contacts_bound;
         let certain = list.iter().filter(is_certain).count();
-        let has_fewer = tick.lower > 0.0 && (tick.contacts as usize) < certain;
-        self.ticks_contacts_fewer += usize::from(has_fewer);
+        let is_missing = tick.lower > 0.0 && (tick.contacts as usize) < certain;
+        self.ticks_contacts_missing += usize::from(is_missing);
         self.proxy_force_max_n = self.proxy_force_max_n.max(touch.force);
         if let Some(last) = self.all.last()
             && last.tick + 1 == tick.tick

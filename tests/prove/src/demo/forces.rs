@@ -51,6 +51,10 @@ impl Forces {
             ));
         }
         let Touches { ticks_too_weak, ticks_proxy_too_weak, ticks_proxy_inward, .. } = self.touches;
+        let missing = self.touches.ticks_contacts_missing;
+        if missing > 0 {
+            broken.push(format!("contacts below the list's bound are missing at {missing} ticks"));
+        }
         if ticks_too_weak + ticks_proxy_too_weak + ticks_proxy_inward > 0 {
             broken.push(format!(
                 "inside, the force is too weak at {ticks_too_weak} ticks and the proxy's at {ticks_proxy_too_weak}, which \
