@@ -32,6 +32,8 @@ struct Subject {
     name: String,
     kind: &'static str,
     contents: Vec<Vec<u8>>,
+    /// Size of its tree, in MB.
+    tree: f64,
 }
 
 /// Vertices, each frame with its triangles. Leaves the tree in the folder.
@@ -41,7 +43,20 @@ fn vertices(folder: &Path) -> Subject {
     run(folder, "build heart.ply -o heart.dibs");
     let contents = heart.motion.frames.iter();
     let contents = contents.map(|frame| poly_data(frame, &heart.mesh.triangles)).collect();
-    Subject { name: format!("{} vertices", heart.mesh.positions.len()), kind: "POLYDATA", contents }
+    let name = format!("{} vertices", heart.mesh.positions.len());
+    Subject { name, kind: "POLYDATA", contents, tree: megabytes(folder) }
+}
+
+/// The size of the folder's tree.
+fn megabytes(folder: &Path) -> f64 {
+    fs::metadata(folder.join("heart.dibs")).unwrap().len() as f64 / 1e6
+}
+
+/// What memory.x gives the board's code and tree, as it is written there.
+fn flash() -> String {
+    let script = fs::read_to_string(workspace::root().join("memory.x")).unwrap();
+    let row = script.lines().find(|line| line.trim_start().starts_with("FLASH"));
+    row.and_then(|row| row.split("LENGTH = ").nth(1)).unwrap().to_owned()
 }
 
 /// The nodes of a lattice.
@@ -54,7 +69,7 @@ fn nodes(folder: &Path) -> Subject {
     let nodes: Vec<Vec3> = volume.nodes().iter().map(|node| node.as_vec3()).collect();
     let contents = generate::beat(&nodes).frames.iter().map(|frame| array(frame)).collect();
     let name = format!("{} nodes of {} triangles", nodes.len(), mesh.triangles.len());
-    Subject { name, kind: "NDARRAY", contents }
+    Subject { name, kind: "NDARRAY", contents, tree: megabytes(folder) }
 }
 
 /// Runs a bridge to a receiver that takes all and says nothing. Returns a row of the table.
@@ -153,15 +168,25 @@ fn the_bridge_is_recorded() {
         processor.unwrap_or("a computer that does not say its processor")
     )
     .unwrap();
+    let mut largest = 0.0_f64;
     for subject in [vertices, nodes] {
         let folder = tempfile::tempdir().unwrap();
         let subject = subject(folder.path());
+        largest = largest.max(subject.tree);
         for (transport, option) in [("udp", ""), ("udp", "--at-once"), ("tcp", "")] {
             page += &timed(folder.path(), &subject, transport, option);
             page.push('\n');
         }
     }
-    page += "\n`cargo xtask demo --bridge` is the same to the emulated board: a [run](demo/bridge/report.json).\n";
+    let [x, y, z] = CELLS;
+    write!(
+        page,
+        "\n`cargo xtask demo --bridge` is the same to the emulated board: a [run](demo/bridge/report.json), and with \
+         `--nodes lattice:{x},{y},{z}` a [run](demo/bridge-nodes/report.json) of as many nodes, but of 50,000 triangles: \
+         the tree of {TRIANGLES} has {largest:.1} MB, and the board {} for code and tree.\n",
+        flash()
+    )
+    .unwrap();
     println!("{page}");
     if env::var_os("DIBS_WRITE").is_some() {
         let at = workspace::evidence().join("bridge.md");
