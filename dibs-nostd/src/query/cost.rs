@@ -24,9 +24,8 @@ use crate::{Index, Tree};
 /// A tick whose front is full ([`Fallback::Full`](crate::Fallback::Full)) pays as a query; its instructions were not
 /// measured. No cost is fitted for the ticks on a surface of [modes](crate::modes).
 ///
-/// Other constants may take the place of these: measured on another processor, or proven. The repository's
-/// `docs/evidence/bound.md` has those proven of one linked program; `base` then includes the price of a root, for each
-/// besides the first.
+/// Other constants may take the place of these: measured on another processor, or proven, as for one linked program
+/// in the repository's `docs/evidence/bound.md`; `base` then includes the price of a root, for each besides the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
