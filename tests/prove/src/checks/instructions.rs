@@ -38,7 +38,7 @@ pub const CHECK: Check = Check {
     ],
 };
 
-/// Counts the instructions of every function in `tests/benches/instructions.rs`.
+/// Counts the instructions of every function in `tests/callgrind/instructions.rs`.
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     valgrind::install_runner()?;
     let mut cargo = Command::new("cargo");

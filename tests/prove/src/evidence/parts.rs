@@ -52,8 +52,8 @@ pub fn all() -> Result<Vec<Part>> {
     let mut parts: Vec<Part> = CHECKS.iter().map(|check| of_check(check, &program)).collect();
     parts.push(real_heart(program));
     parts.push(Part::new("compile time", Place::Beside, |folder| {
-        let mut cargo = cargo(&["bench", "--quiet", "--bench", "compile_time", "--", "--write"]);
-        cargo.env("DIBS_FOLDER", workspace::target().join("compile-time"));
+        let mut cargo = cargo(&["bench", "--quiet", "-p", "dibs-bench", "--bench", "compile_time"]);
+        cargo.args(["--", "--write"]).env("DIBS_FOLDER", workspace::target().join("compile-time"));
         logged(&mut cargo, folder)
     }));
     for (name, place) in BENCHMARKS {

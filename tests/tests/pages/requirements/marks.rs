@@ -109,10 +109,6 @@ fn proofs() -> BTreeMap<String, Vec<String>> {
         let links = line.split("](../").skip(1).filter_map(|rest| rest.split(')').next());
         let is_source = |link: &&str| link.ends_with(".rs") || link.ends_with(".mjs");
         for (at, link) in links.filter(is_source).enumerate() {
-            // A measurement without a bound proves nothing.
-            if link.contains("/benches/") {
-                continue;
-            }
             let checks = files.entry(link.to_owned()).or_default();
             if is_check && at == 0 {
                 checks.extend(line.split('|').nth(1).map(|name| name.trim().to_owned()));

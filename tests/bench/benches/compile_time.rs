@@ -1,6 +1,6 @@
 //! How much longer a crate takes to compile for the tree that it includes, and how long a build script takes to build it.
 //!
-//! `cargo bench -p dibs-tests --bench compile_time -- --write` writes `docs/evidence/compile-time.md`. The times are those of
+//! `cargo bench -p dibs-bench --bench compile_time -- --write` writes `docs/evidence/compile-time.md`. The times are those of
 //! the machine that runs it; nothing asserts them. `DIBS_FOLDER` keeps the compiled dependencies for the next run,
 //! `DIBS_TRIANGLES` takes other sizes. The program `dibs` comes from `cargo build --release`.
 
@@ -11,6 +11,7 @@ use std::{env, fs};
 
 use anyhow::{Context, Result, ensure};
 use dibs_build::{Builder, BuiltTree, generate};
+use xtask::workspace;
 
 const REPEATS: usize = 5;
 
@@ -45,9 +46,7 @@ fn main() -> Result<()> {
     let page = page(&rows, &scripts);
     print!("{page}");
     if env::args().any(|argument| argument == "--write") {
-        let evidence = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/evidence").into();
-        let evidence = env::var_os("DIBS_EVIDENCE").unwrap_or(evidence);
-        fs::write(Path::new(&evidence).join("compile-time.md"), page)?;
+        fs::write(workspace::evidence().join("compile-time.md"), page)?;
     }
     Ok(())
 }
@@ -69,7 +68,7 @@ fn page(rows: &str, scripts: &str) -> String {
     let compiler = compiler.unwrap_or_default();
     format!(
         "# Compile time\n\n\
-         Written by `cargo bench -p dibs-tests --bench compile_time -- --write`, with {compiler}. Seconds of processor \
+         Written by `cargo bench -p dibs-bench --bench compile_time -- --write`, with {compiler}. Seconds of processor \
          time of\nthe machine that ran it: other load does not count, another machine has other figures.\n\n\
          ## A crate that includes a tree\n\n\
          After an edit of its source, `cargo check` and `cargo build --release`, cargo's own time included: the least \
@@ -90,7 +89,7 @@ const LINES: &str = "[profile.dev.package.dibs-build]\nopt-level = 3\n";
 fn script_time(folder: &Path, name: &str, lines: &str, mesh: &Path) -> Result<f64> {
     let root = folder.join(name);
     fs::create_dir_all(root.join("src"))?;
-    let builder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../dibs-build").canonicalize()?;
+    let builder = workspace::root().join("dibs-build");
     let manifest = format!(
         "[package]\nname = {name:?}\nedition = \"2024\"\n[workspace]\n[build-dependencies]\n\
          dibs-build = {{ path = {builder:?} }}\n{lines}"
@@ -139,7 +138,7 @@ impl Crate {
     fn new(folder: &Path, name: &str, tree: Option<&BuiltTree>) -> Result<Self> {
         let root = folder.join(name);
         fs::create_dir_all(root.join("src"))?;
-        let core = Path::new(env!("CARGO_MANIFEST_DIR")).join("../dibs-nostd").canonicalize()?;
+        let core = workspace::root().join("dibs-nostd");
         let manifest = format!(
             "[package]\nname = {name:?}\nedition = \"2024\"\n[workspace]\n[dependencies]\ndibs-nostd = {{ path = {core:?} }}\n"
         );
