@@ -36,7 +36,6 @@ pub use report::report;
 use tape::Tape;
 
 /// Constants as shipped.
-#[allow(dead_code)]
 mod constants {
     include!(concat!(env!("OUT_DIR"), "/constants.rs"));
 }

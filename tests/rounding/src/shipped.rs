@@ -2,7 +2,8 @@
 //!
 //! A stand-in has the name of what it replaces, and only as much as the functions use.
 
-#![allow(non_camel_case_types, unused_variables, clippy::all)]
+// The shipped text names fields and variants that a stand-in has no use for, and is linted where it is shipped.
+#![allow(dead_code, non_camel_case_types, unused_variables, clippy::all)]
 
 use crate::constants::{AROUND, CLOSEST, RANGE, ROUNDING};
 use crate::tape::Traced as f32;
@@ -65,13 +66,11 @@ impl<T> Search<T> {
 #[derive(Clone, Copy)]
 struct Waiting {
     lower: f32,
-    #[allow(dead_code)]
     link: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub enum QueryError {
-    #[allow(dead_code)]
     Corrupt { row: u32 },
 }
 
@@ -103,7 +102,6 @@ pub struct Node {
     pub link: u32,
 }
 
-#[allow(dead_code)]
 enum Link {
     Children,
     Leaf { first: u32, count: u32 },

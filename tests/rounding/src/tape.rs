@@ -1,4 +1,7 @@
 //! The recording scalar, and the walk over a kernel's paths.
+//!
+//! What a kernel makes of literals alone also has its value, so that a test can compare the order of its operations with
+//! the processor's results.
 
 use std::cell::RefCell;
 use std::cmp::Ordering;
@@ -16,6 +19,8 @@ struct Node {
     /// What the script calls it.
     name: String,
     sum: Sum,
+    /// If it follows from literals. In binary64, that of binary32 operands rounds again to what binary32 rounds to at once.
+    value: Option<f64>,
 }
 
 /// A square root whose argument is a sum of squares.
@@ -85,9 +90,9 @@ pub fn branches() -> Vec<Branch> {
     TAPE.with_borrow(|tape| tape.branches.clone())
 }
 
-fn add(name: String, sum: Sum) -> Traced {
+fn add(name: String, sum: Sum, value: Option<f64>) -> Traced {
     TAPE.with_borrow_mut(|tape| {
-        tape.nodes.push(Node { name, sum });
+        tape.nodes.push(Node { name, sum, value });
         Traced(tape.nodes.len() - 1)
     })
 }
@@ -105,7 +110,7 @@ pub fn input(name: &str, low: &str, high: &str) -> Traced {
     TAPE.with_borrow_mut(|tape| {
         tape.inputs.push((name.to_owned(), low.to_owned(), high.to_owned()));
     });
-    add(name.to_owned(), Sum::input(name))
+    add(name.to_owned(), Sum::input(name), None)
 }
 
 /// A coordinate or a difference of coordinates: of either sign.
@@ -123,14 +128,14 @@ pub fn near_one(error: &str, most: &str) -> Traced {
     TAPE.with_borrow_mut(|tape| {
         tape.inputs.push((error.to_owned(), format!("-{most}"), most.to_owned()));
     });
-    let small = add(error.to_owned(), Sum::number(1.0).factor(error));
+    let small = add(error.to_owned(), Sum::number(1.0).factor(error), None);
     Traced::exact(1.0).plus(small)
 }
 
 /// The exact value of the root of this number, counted from 1.
 pub fn root(number: usize) -> Traced {
     let name = format!("root{number}");
-    add(name.clone(), Sum::input(&name))
+    add(name.clone(), Sum::input(&name), None)
 }
 
 impl Traced {
@@ -151,6 +156,12 @@ impl Traced {
         self.node().sum
     }
 
+    /// What a kernel computes, if it follows from literals.
+    #[cfg(test)]
+    pub fn value(self) -> Option<f32> {
+        self.node().value.map(|value| value as f32)
+    }
+
     /// A literal of a kernel.
     #[must_use]
     pub fn literal(value: f32) -> Self {
@@ -166,15 +177,15 @@ impl Traced {
     /// A number as it is.
     #[must_use]
     pub fn exact(value: f64) -> Self {
-        add(crate::term::number(value), Sum::number(value))
+        add(crate::term::number(value), Sum::number(value), Some(value))
     }
 
-    fn rounded(text: &str, sum: Sum, has_underflow: bool) -> Self {
+    fn rounded(exact: Node, has_underflow: bool) -> Self {
         let at = next();
         let (name, delta, eta) = (format!("v{at}"), format!("delta{at}"), format!("eta{at}"));
         let factor = format!("(1 + {delta})");
-        let mut sum = sum.factor(&factor);
-        let mut text = format!("{text} * {factor}");
+        let mut sum = exact.sum.factor(&factor);
+        let mut text = format!("{} * {factor}", exact.name);
         if has_underflow {
             sum = sum.plus(&Sum::number(1.0).factor(&eta));
             text = format!("{text} + {eta}");
@@ -184,12 +195,12 @@ impl Traced {
             tape.deltas.push(delta);
             tape.etas.extend(has_underflow.then_some(eta));
         });
-        add(name, sum)
+        add(name, sum, exact.value.map(|value| f64::from(value as f32)))
     }
 
     /// The square root, correctly rounded, of a sum of squares.
     pub(crate) fn sqrt(self) -> Self {
-        let Node { name, sum } = self.node();
+        let Node { name, sum, value } = self.node();
         let at = TAPE.with_borrow_mut(|tape| {
             tape.roots.push(Root { of: name.clone(), sum: sum.clone() });
             tape.roots.len()
@@ -199,14 +210,16 @@ impl Traced {
         define(&format!("computed{at}"), &format!("sqrt({name})"));
         define(&format!("ratio{at}"), &format!("computed{at} / root{at}"));
         let root = Sum::input(&format!("root{at}")).factor(&format!("ratio{at}"));
-        Self::rounded(&format!("computed{at}"), root, true)
+        let name = format!("computed{at}");
+        Self::rounded(Node { name, sum: root, value: value.map(f64::sqrt) }, true)
     }
 
     /// The exact sum.
     #[must_use]
     pub fn plus(self, other: Self) -> Self {
         let (a, b) = (self.node(), other.node());
-        add(format!("({} + {})", a.name, b.name), a.sum.plus(&b.sum))
+        let value = a.value.zip(b.value).map(|(a, b)| a + b);
+        add(format!("({} + {})", a.name, b.name), a.sum.plus(&b.sum), value)
     }
 
     /// The exact difference.
@@ -214,17 +227,23 @@ impl Traced {
     pub fn minus(self, other: Self) -> Self {
         let (a, b) = (self.node(), other.node());
         let sum = a.sum.plus(&b.sum.times(&Sum::number(-1.0)));
-        add(format!("({} - {})", a.name, b.name), sum)
+        let value = a.value.zip(b.value).map(|(a, b)| a - b);
+        add(format!("({} - {})", a.name, b.name), sum, value)
     }
 
     /// The exact product.
     #[must_use]
     pub fn times(self, other: Self) -> Self {
         let (a, b) = (self.node(), other.node());
-        add(format!("({} * {})", a.name, b.name), a.sum.times(&b.sum))
+        let value = a.value.zip(b.value).map(|(a, b)| a * b);
+        add(format!("({} * {})", a.name, b.name), a.sum.times(&b.sum), value)
     }
 
-    fn branch(self, other: Self) -> bool {
+    /// Whether this is greater: a choice, unless both have a value.
+    fn branch(self, other: Self, or_equal: bool) -> bool {
+        if let Some((value, other)) = self.node().value.zip(other.node().value) {
+            return if or_equal { value >= other } else { value > other };
+        }
         TAPE.with_borrow_mut(|tape| {
             let at = tape.branches.len();
             if at == tape.script.len() {
@@ -242,8 +261,7 @@ impl Add for Traced {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
-        let exact = self.plus(other).node();
-        Self::rounded(&exact.name, exact.sum, false)
+        Self::rounded(self.plus(other).node(), false)
     }
 }
 
@@ -251,8 +269,7 @@ impl Sub for Traced {
     type Output = Self;
 
     fn sub(self, other: Self) -> Self {
-        let exact = self.minus(other).node();
-        Self::rounded(&exact.name, exact.sum, false)
+        Self::rounded(self.minus(other).node(), false)
     }
 }
 
@@ -260,8 +277,7 @@ impl Mul for Traced {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
-        let exact = self.times(other).node();
-        Self::rounded(&exact.name, exact.sum, true)
+        Self::rounded(self.times(other).node(), true)
     }
 }
 
@@ -286,18 +302,18 @@ impl PartialOrd for Traced {
     }
 
     fn gt(&self, other: &Self) -> bool {
-        self.branch(*other)
+        self.branch(*other, false)
     }
 
     fn lt(&self, other: &Self) -> bool {
-        other.branch(*self)
+        other.branch(*self, false)
     }
 
     fn ge(&self, other: &Self) -> bool {
-        self.branch(*other)
+        self.branch(*other, true)
     }
 
     fn le(&self, other: &Self) -> bool {
-        other.branch(*self)
+        other.branch(*self, true)
     }
 }
