@@ -128,10 +128,11 @@ impl Feature {
                     let weight = angle(area, (from - centre).dot(to - centre));
                     sum.vector += weight * unit;
                     sum.weight += weight;
-                    (row, corner) = tree.next_around(row, corner).ok_or(NoNormal::Open)?;
-                    if row == triangle {
+                    let next = tree.next_around(row, corner).ok_or(NoNormal::Open)?;
+                    if next.0 == triangle {
                         return Ok(sum);
                     }
+                    (row, corner) = next;
                 }
                 Err(NoNormal::Unclear)
             }

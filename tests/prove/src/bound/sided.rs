@@ -80,8 +80,7 @@ pub(super) const ACROSS_F32: Count = Count::Passes(&[Of("add", "f32>"), OTHER]);
 pub(super) const ACROSS_F64: Count = Count::Passes(&[Of("add", "f64>"), OTHER]);
 pub(super) const ADDED_F32: Count = Count::Calls(&[Of("add", "f32>")], "::closest");
 pub(super) const ADDED_F64: Count = Count::Calls(&[Of("add", "f64>")], "::closest");
-pub(super) const NORMALS: &[Within] =
-    &[Line(NORMAL, "let [centre, from, to] = turned(at(row)?, corner);")];
+pub(super) const NORMALS: &[Within] = &[Line(NORMAL, "for _ in 0..MAX_RING {")];
 const PLANES: &[Within] = &[Line(SIDE, "for row in rows {")];
 pub(super) const OUTWARD: Count = Count::Calls(&[Function("outward")], "pseudonormal");
 pub(super) const ROUGH: &[Within] = &[Line(SIDE, "let above = rough.of(rows)?;")];
