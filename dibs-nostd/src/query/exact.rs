@@ -18,10 +18,11 @@
 // Requirement: S-01
 
 use super::NoSide;
-use super::normal::{Feature, MAX_RING, NORMAL, after, turned};
+use super::normal::{Feature, NORMAL, turned};
 use super::precision::Precision;
 use super::side::OnAxis;
 use crate::math::sqrt::sqrt;
+use crate::tree::{MAX_RING, after};
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, VertexTable};
 
@@ -218,13 +219,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
     fn first_around(&self, row: u32, corner: u32) -> Result<u32, NoSide> {
         let (mut first, mut at, mut corner) = (row, row, corner);
         for _ in 0..MAX_RING {
-            let (next, back) = self.tree.across(at, corner).ok_or(NoSide::OpenBoundary)?;
-            if next == row {
+            (at, corner) = self.tree.next_around(at, corner).ok_or(NoSide::OpenBoundary)?;
+            if at == row {
                 return Ok(first);
             }
-            (at, corner) = (next, after(back));
-            if next < first {
-                first = next;
+            if at < first {
+                first = at;
             }
         }
         Err(NoSide::Degenerate)
@@ -242,7 +242,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
         let mut largest = P::from(f32::NEG_INFINITY);
         let mut above = Err(NoSide::Degenerate);
         for _ in 0..MAX_RING {
-            let Some((next, back)) = self.tree.across(row, corner) else {
+            let Some((next, next_corner)) = self.tree.next_around(row, corner) else {
                 return Ok(Err(NoSide::OpenBoundary));
             };
             if !self.spend(P::RING_COST) {
@@ -272,7 +272,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V
             if next == first {
                 return Ok(above);
             }
-            (row, corner, seen) = (next, after(back), other);
+            (row, corner, seen) = (next, next_corner, other);
         }
         Ok(Err(NoSide::Degenerate))
     }

@@ -12,10 +12,8 @@ use glam::Vec3;
 
 use super::precision::Precision;
 use crate::math::sqrt::sqrt;
+use crate::tree::MAX_RING;
 use crate::{Index, Tree, VertexTable};
-
-/// Most triangles around a vertex.
-pub(super) const MAX_RING: u32 = 256;
 
 /// Square of the sine below which two edges span no plane in f32.
 const FLAT: f32 = 1.0 / 1_048_576.0;
@@ -94,8 +92,8 @@ impl Feature {
         };
         let mut row = triangle;
         for _ in 0..most {
-            match tree.across(row, corner) {
-                Some((next, back)) if next != triangle => (row, corner) = (next, after(back)),
+            match tree.next_around(row, corner) {
+                Some(next) if next.0 != triangle => (row, corner) = next,
                 _ => return,
             }
             visit(row);
@@ -130,11 +128,11 @@ impl Feature {
                     let weight = angle(area, (from - centre).dot(to - centre));
                     sum.vector += weight * unit;
                     sum.weight += weight;
-                    let (next, back) = tree.across(row, corner).ok_or(NoNormal::Open)?;
-                    if next == triangle {
+                    let next = tree.next_around(row, corner).ok_or(NoNormal::Open)?;
+                    if next.0 == triangle {
                         return Ok(sum);
                     }
-                    (row, corner) = (next, after(back));
+                    (row, corner) = next;
                 }
                 Err(NoNormal::Unclear)
             }
@@ -151,10 +149,6 @@ pub(super) fn corners<I: Index, V: VertexTable + ?Sized>(
     let [a, b, c] = tree.triangle(row).ok_or(NoNormal::Corrupt(row))?;
     let position = |vertex| vertices.position(vertex).ok_or(NoNormal::Corrupt(vertex));
     Ok([position(a)?, position(b)?, position(c)?])
-}
-
-pub(super) const fn after(corner: u32) -> u32 {
-    if corner == 2 { 0 } else { corner + 1 }
 }
 
 /// The corners rotated so that `first` comes first.

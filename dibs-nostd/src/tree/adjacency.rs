@@ -9,6 +9,9 @@
 use super::{FormatError, Tree, TriangleRow, format};
 use crate::Index;
 
+/// Most triangles visited around a vertex.
+pub(crate) const MAX_RING: u32 = 256;
+
 impl<I: Index> Tree<'_, I> {
     /// Whether the tree has adjacency, so that its surface has sides.
     #[must_use]
@@ -70,6 +73,25 @@ impl<I: Index> Tree<'_, I> {
         }
         None
     }
+
+    /// The next triangle around the vertex at a corner, and the vertex's corner there: across the edge that begins at
+    /// the corner. A walk ends where it is back at its first triangle, or after [`MAX_RING`] triangles.
+    #[inline]
+    pub(crate) const fn next_around(&self, triangle: u32, corner: u32) -> Option<(u32, u32)> {
+        match self.across(triangle, corner) {
+            Some((next, back)) => Some((next, after(back))),
+            None => None,
+        }
+    }
+}
+
+/// The corner after this one. Edge `e` leads from corner `e` to it.
+pub(crate) const fn after(corner: u32) -> u32 {
+    if corner == 2 { 0 } else { corner + 1 }
+}
+
+pub(crate) const fn before(corner: u32) -> u32 {
+    if corner == 0 { 2 } else { corner - 1 }
 }
 
 /// Both end vertices of a triangle's edge.
@@ -145,6 +167,28 @@ mod tests {
         assert_eq!(check(&tree), Ok(true));
         tree.header.triangles = triangles;
         check(&tree).expect_err("rows are missing")
+    }
+
+    #[test]
+    fn a_walk_around_a_vertex_keeps_to_it_and_closes() {
+        let mesh = generate::heart(320).expect("a valid size").mesh;
+        let built = Builder::new().build(&mesh).expect("a valid mesh");
+        let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+        let vertex = |(row, corner)| tree.triangle(row).expect("a row")[corner as usize];
+        for first in (0..320).flat_map(|row| (0..3).map(move |corner| (row, corner))) {
+            let (mut at, mut triangles) = (first, 1);
+            loop {
+                let next = tree.next_around(at.0, at.1).expect("a closed surface");
+                assert_eq!(vertex(next), vertex(first));
+                assert_eq!(tree.across(next.0, before(next.1)), Some(at), "the way back");
+                if next == first {
+                    break;
+                }
+                (at, triangles) = (next, triangles + 1);
+                assert!(next.0 != first.0 && triangles < MAX_RING);
+            }
+            assert!(triangles > 2);
+        }
     }
 
     /// More than four rows with the same low 16 bits are too many, and a row without neighbours is refused.

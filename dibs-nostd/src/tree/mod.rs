@@ -31,6 +31,7 @@ mod unit;
 mod valid;
 mod validate;
 
+pub(crate) use adjacency::{MAX_RING, after, before};
 pub use error::FormatError;
 pub use facts::SurfaceFacts;
 pub use format::PathKind;

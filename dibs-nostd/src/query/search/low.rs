@@ -18,11 +18,9 @@ use super::Search;
 use super::heights::{CacheSlot, Heights, Vertex};
 use crate::query::prices::{FACING, ON_EDGE, STANDING};
 use crate::tool::{AxisPair, SLIVER, Tool};
+use crate::tree::{MAX_RING, after, before};
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
-
-/// Most triangles visited around a vertex.
-pub(super) const MAX_RING: u32 = 256;
 
 /// A fall by less than this fraction of the squared distance is ignored: a ridge of a 512th of the distance.
 const FLAT: f32 = 1.0 / 256.0;
@@ -237,8 +235,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         };
         let (mut row, mut corner, mut is_back) = (triangle, start, false);
         for _ in 0..MAX_RING {
-            let edge = if is_back { before(corner) } else { corner };
-            let Some((next, other)) = tree.across(row, edge) else {
+            let step = if is_back {
+                tree.across(row, before(corner))
+            } else {
+                tree.next_around(row, corner)
+            };
+            let Some((next, next_corner)) = step else {
                 // At a border: from the first triangle in the other direction.
                 if is_back {
                     break;
@@ -252,7 +254,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if self.meter.node().is_none() {
                 return Ok(None);
             }
-            (row, corner) = (next, if is_back { other } else { after(other) });
+            (row, corner) = (next, next_corner);
             // Its corners may be seen again with a triangle of the part; if not, one more triangle counts as low.
             if heights.leaves_out(tree, row) {
                 continue;
@@ -325,12 +327,4 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let &vertex = rows.get(index as usize).ok_or(corrupt)?;
         Ok((vertex, self.height(heights, vertex)?))
     }
-}
-
-const fn after(corner: u32) -> u32 {
-    if corner == 2 { 0 } else { corner + 1 }
-}
-
-const fn before(corner: u32) -> u32 {
-    if corner == 0 { 2 } else { corner - 1 }
 }

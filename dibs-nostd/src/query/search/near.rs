@@ -3,7 +3,6 @@
 // Requirements: C-05, S-04
 
 use super::heights::{CacheSlot, Heights};
-use super::low::MAX_RING;
 use super::meter::Meter;
 use super::node::RANGE;
 use super::{Search, Waiting};
@@ -11,6 +10,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::made::Tests;
 use crate::query::prices::{CHILD, LIST};
 use crate::tool::{AxisPair, Tool};
+use crate::tree::MAX_RING;
 use crate::tree::format::Link;
 use crate::unavailable::QueryError;
 use crate::{Budget, Index, Options, VertexTable};

@@ -66,10 +66,12 @@ const FIRST_PUSH: &[Within] = &[Line(SEARCH, "search.push(0, subtree)"), Functio
 
 const ACROSS: &[Within] = &[Function("across")];
 const EDGE: Within = Line(EXACT, "for (edge, along, from, to) in [(0, ab, a, b)");
-const AROUND: &[Within] =
-    &[Line(EXACT, "let (next, back) = self.tree.across(at, corner).ok_or(NoSide::OpenBoundary)?;")];
+const AROUND: &[Within] = &[Line(
+    EXACT,
+    "(at, corner) = self.tree.next_around(at, corner).ok_or(NoSide::OpenBoundary)?;",
+)];
 const RING_LINE: Within =
-    Line(EXACT, "let Some((next, back)) = self.tree.across(row, corner) else {");
+    Line(EXACT, "let Some((next, next_corner)) = self.tree.next_around(row, corner) else {");
 const TURNED: Within = Line(EXACT, "let cosine = -P::dot(to_centre, edge);");
 pub(super) const TURNED_F32: Count = Count::Passes(&[Of("add", "f32>"), TURNED]);
 pub(super) const TURNED_F64: Count = Count::Passes(&[Of("add", "f64>"), TURNED]);
@@ -78,8 +80,7 @@ pub(super) const ACROSS_F32: Count = Count::Passes(&[Of("add", "f32>"), OTHER]);
 pub(super) const ACROSS_F64: Count = Count::Passes(&[Of("add", "f64>"), OTHER]);
 pub(super) const ADDED_F32: Count = Count::Calls(&[Of("add", "f32>")], "::closest");
 pub(super) const ADDED_F64: Count = Count::Calls(&[Of("add", "f64>")], "::closest");
-pub(super) const NORMALS: &[Within] =
-    &[Line(NORMAL, "let [centre, from, to] = turned(at(row)?, corner);")];
+pub(super) const NORMALS: &[Within] = &[Line(NORMAL, "for _ in 0..MAX_RING {")];
 const PLANES: &[Within] = &[Line(SIDE, "for row in rows {")];
 pub(super) const OUTWARD: Count = Count::Calls(&[Function("outward")], "pseudonormal");
 pub(super) const ROUGH: &[Within] = &[Line(SIDE, "let above = rough.of(rows)?;")];
