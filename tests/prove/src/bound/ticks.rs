@@ -17,7 +17,7 @@ use probe::track::{ANSWER_WORDS, tick};
 use super::depth::{TRACKED_DEPTH, TRACKED_DEPTH_WITHOUT_EDGES};
 use super::follow::{Asked, Fault, ROOT, Traced, planted, trace_ticks};
 use super::poses;
-use super::queries::{Counted, Kind, Proven, beside};
+use super::queries::{Counted, Kind, Proven, beside, rounds};
 use super::sided::RING;
 use super::tracked::{TRACKED, TRACKED_WITHOUT_EDGES};
 use super::walk::UNIT;
@@ -168,12 +168,14 @@ fn breathing(mesh: Mesh) -> (Mesh, Motion) {
 }
 
 /// Proves the bound, counts the instructions of many ticks, and compares each with it.
-pub fn count(proven: &Proven, probe: &Path, ticks: u32) -> Result<Counted> {
+pub fn count(proven: &Proven, probe: &Path, ticks: usize) -> Result<Counted> {
     let mut found = Counted::default();
-    for script in scripts(proven.kind.is_signed, ticks, 71)? {
-        let words = run_on_board(probe, &script.bytes, COUNTING)?;
-        for (counts, instructions, _) in script.read(&words) {
-            found.add(i128::from(instructions) * UNIT, proven.at(counts));
+    for (ticks, seed) in rounds(ticks) {
+        for script in scripts(proven.kind.is_signed, ticks as u32, seed + 71)? {
+            let words = run_on_board(probe, &script.bytes, COUNTING)?;
+            for (counts, instructions, _) in script.read(&words) {
+                found.add(i128::from(instructions) * UNIT, proven.at(counts));
+            }
         }
     }
     Ok(found.end())
