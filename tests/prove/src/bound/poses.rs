@@ -1,5 +1,5 @@
-//! Surfaces and tools for what a tick seldom does: many triangles are equally close, two planes disagree about the side, or
-//! an axis is equally deep in many places.
+//! Surfaces and tools for what a tick seldom does: many triangles are equally close, two planes disagree about the
+//! side, or an axis is equally deep in many places.
 
 // Requirement: A-06
 
@@ -16,8 +16,8 @@ const RINGS: u32 = 17;
 /// Ticks in a row with the same tool.
 const HELD: u32 = 3;
 
-/// A square bar, whose faces are flat and equally far from its axis; a string of beads, which is equally deep in each; and a
-/// diamond, at whose corners opposite faces are more than a right angle apart.
+/// A square bar, whose faces are flat and equally far from its axis; a string of beads, which is equally deep in each;
+/// and a diamond, at whose corners opposite faces are more than a right angle apart.
 pub fn surfaces() -> [Mesh; 3] {
     let mut diamond = ball(0);
     for at in &mut diamond.positions {
@@ -49,7 +49,8 @@ fn bar(radius: impl Fn(u32) -> f32) -> Mesh {
     Mesh { positions, triangles, ..Mesh::default() }
 }
 
-/// Start and span of an axis, and a budget, for the tick of this number on a surface with so many vertices, which are here.
+/// Start and span of an axis, and a budget, for the tick of this number on a surface with so many vertices, whose
+/// positions `vertex` gives.
 pub fn tool(
     number: u32,
     count: usize,

@@ -276,8 +276,8 @@ fn several(queries: usize, seed: u64) -> Script {
     Script::about_all(&subjects, true, queries, Draw::Any, seed)
 }
 
-/// Queries of a heart of so many triangles that modes, nodes and frames move, and of three hearts, complete and cut short, warm and cold. A
-/// third of those with modes have no cache of positions.
+/// Queries of a heart of so many triangles that modes, nodes and frames move, and of three hearts, complete and cut
+/// short, warm and cold. A third of those with modes have no cache of positions.
 fn moved(triangles: u32, queries: usize, seed: u64) -> Result<Vec<Script>> {
     let of_frame = (queries / 32).max(2);
     let waves = MODES.div_ceil(2);

@@ -69,8 +69,8 @@ struct Ticks {
 }
 
 impl Ticks {
-    /// Ticks on a surface between two frames. `next` gives start and span of the axis and the budget of the tick with this
-    /// number, where a row of the surface now is.
+    /// Ticks on a surface between two frames. `next` gives start and span of the axis and the budget of a tick, from its
+    /// number, the number of vertices, and their positions now.
     fn on(
         (mesh, motion): &(Mesh, Motion),
         is_signed: bool,
@@ -145,8 +145,8 @@ impl Ticks {
     }
 }
 
-/// Ticks about a heart, a coarse one, three hearts in one tree, or with side a small ball, and a large one: from the middle of
-/// a ball all is equally far, and the front is soon full. With side, half of the ticks are with the tools of [`poses`].
+/// Ticks about a heart, a coarse one, three hearts in one tree, or with side a small ball, and a large one: from the
+/// middle of a ball all is equally far, and the front is soon full. With side, half of the ticks are with the tools of [`poses`].
 fn scripts(is_signed: bool, ticks: u32, seed: u64) -> Result<Vec<Ticks>> {
     let generate::MovingMesh { mesh, motion } = generate::heart(10_272)?;
     let coarse = trembling(1_280, 4, seed);
