@@ -17,6 +17,7 @@ pub mod graph;
 pub mod image;
 pub mod lines;
 pub mod loops;
+pub mod poses;
 pub mod prices;
 pub mod queries;
 pub mod report;

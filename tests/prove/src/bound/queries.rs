@@ -217,18 +217,27 @@ pub fn counts(answer: &Answer<'_>) -> [i64; 3] {
     [roots, nodes, triangles].map(i64::from)
 }
 
+/// Most queries, or ticks, of scripts that are in memory at the same time.
+const ROUND: usize = 10_000;
+
+/// Rounds of equal size for this many queries, and what to add to their seeds.
+pub(super) fn rounds(queries: usize) -> impl Iterator<Item = (usize, u64)> {
+    let rounds = queries.div_ceil(ROUND).max(1);
+    (0..rounds as u64).map(move |round| (queries / rounds, 100 * round))
+}
+
 /// Queries whose instructions are counted: on surfaces that the constants were not fitted to, and on three surfaces in
 /// one tree; complete and cut short, warm and cold.
-fn counted(queries: usize) -> Result<Vec<Script>> {
+fn counted(queries: usize, seed: u64) -> Result<Vec<Script>> {
     let one = unseen()?;
     let draws = [(Draw::Exhausting, 51), (Draw::Any, 52), (Draw::Short, 53)];
-    let about = |(draw, seed)| Script::about_all(&one, true, queries * 3 / 10, draw, seed);
+    let about = |(draw, own)| Script::about_all(&one, true, queries * 3 / 10, draw, seed + own);
     let mut scripts: Vec<Script> = draws.into_iter().map(about).collect();
-    scripts.push(several(queries / 10, 54));
-    scripts.extend(moved(queries / 10, 57)?);
+    scripts.push(several(queries / 10, seed + 54));
+    scripts.extend(moved(10_272, queries / 10, seed + 57)?);
     let closed = closed(generate::heart(2_562)?.mesh, ball(4));
-    for (draw, seed) in [(Draw::Exhausting, 59), (Draw::Any, 60), (Draw::Short, 61)] {
-        scripts.push(Script::sided(&closed, RING, queries / 10, draw, seed)?);
+    for (draw, own) in [(Draw::Exhausting, 59), (Draw::Any, 60), (Draw::Short, 61)] {
+        scripts.push(Script::sided(&closed, RING, queries / 10, draw, seed + own)?);
     }
     Ok(scripts)
 }
@@ -242,7 +251,7 @@ pub fn to_trace(queries: usize) -> Result<Vec<Script>> {
     ];
     let script = Script::about_all(&one, false, queries * 4 / 5, Draw::Any, 55);
     let mut scripts = vec![script, several(queries / 5, 56)];
-    scripts.extend(moved(queries / 2, 58)?);
+    scripts.extend(moved(1_280, queries / 2, 58)?);
     let closed = closed(generate::heart(1_280)?.mesh, ball(3));
     scripts.push(Script::sided(&closed, RING, queries / 2, Draw::Any, 62)?);
     Ok(scripts)
@@ -267,19 +276,19 @@ fn several(queries: usize, seed: u64) -> Script {
     Script::about_all(&subjects, true, queries, Draw::Any, seed)
 }
 
-/// Queries of a heart that modes, nodes and frames move, and of three hearts, complete and cut short, warm and cold. A
-/// third of those with modes have no cache of positions.
-fn moved(queries: usize, seed: u64) -> Result<Vec<Script>> {
+/// Queries of a heart of so many triangles that modes, nodes and frames move, and of three hearts, complete and cut
+/// short, warm and cold. A third of those with modes have no cache of positions.
+fn moved(triangles: u32, queries: usize, seed: u64) -> Result<Vec<Script>> {
     let of_frame = (queries / 32).max(2);
     let waves = MODES.div_ceil(2);
-    let one = trembling(10_272, waves, seed);
+    let one = trembling(triangles, waves, seed);
     let three = beside(&trembling(1_280, waves, seed), 3);
     let mut scripts = Vec::new();
     for (mesh, motion) in [&one, &three] {
         scripts.push(Script::modal_of(mesh, motion, MODES, of_frame, Draw::Any, seed));
         scripts.push(Script::moving_of(mesh, motion, queries / 2, Draw::Any, seed));
     }
-    let heart = generate::heart(10_272)?.mesh;
+    let heart = generate::heart(triangles)?.mesh;
     scripts.push(Script::embedded_of(&heart, 7, queries, Draw::Any, seed));
     Ok(scripts)
 }
@@ -330,12 +339,14 @@ impl Counted {
 /// Counts the instructions of many queries, and compares each with its bound.
 pub fn count(proven: &[Proven], probe: &Path, queries: usize) -> Result<Vec<Counted>> {
     let mut found: Vec<Counted> = proven.iter().map(|_| Counted::default()).collect();
-    for script in counted(queries)? {
-        for answer in on_board(probe, &script, true)?.iter() {
-            let all = proven.iter().zip(&mut found);
-            for (proven, found) in all.filter(|(one, _)| one.kind.is_of(answer.record)) {
-                let took = i128::from(answer.instructions) * UNIT;
-                found.add(took, proven.at(counts(&answer)));
+    for (queries, seed) in rounds(queries) {
+        for script in counted(queries, seed)? {
+            for answer in on_board(probe, &script, true)?.iter() {
+                let all = proven.iter().zip(&mut found);
+                for (proven, found) in all.filter(|(one, _)| one.kind.is_of(answer.record)) {
+                    let took = i128::from(answer.instructions) * UNIT;
+                    found.add(took, proven.at(counts(&answer)));
+                }
             }
         }
     }

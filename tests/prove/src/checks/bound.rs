@@ -144,13 +144,9 @@ pub const CHECK: Check = Check {
     },
 };
 
-/// One in this many counted queries is traced.
-const TRACED: usize = 50;
-
 fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let [probe, tracker] = ["probe", "bound"].map(|name| build_for_board(&board()?, name));
-    let queries = effort.costs;
-    let found = findings([&probe?, &tracker?], queries, (queries / TRACED).min(2_000))?;
+    let found = findings([&probe?, &tracker?], effort.bounds, effort.bound_traces)?;
     if effort.is_record {
         write(&found, &Run::now(effort.size()))?;
     }

@@ -21,6 +21,10 @@ pub struct Effort {
     pub costs: usize,
     /// The same on the host, under callgrind.
     pub host_costs: usize,
+    /// Queries, and ticks of each kind, that are compared with the path bound; it counts 3.6 times as many in all.
+    pub bounds: usize,
+    /// Queries that are traced against it, and 8 times as many ticks of each kind; 19 times as many in all.
+    pub bound_traces: usize,
     /// Ticks of table 3's path on the board.
     pub ticks: u32,
     /// Adversarial poses on the board.
@@ -64,6 +68,8 @@ impl Effort {
         bits: 100_000,
         costs: 100_000,
         host_costs: 100_000,
+        bounds: 280_000,
+        bound_traces: 540,
         ticks: 2_000,
         poses: 10_000,
         tick_frames: 400,
@@ -90,6 +96,8 @@ impl Effort {
         bits: 10_000,
         costs: 4_000,
         host_costs: 2_500,
+        bounds: 400,
+        bound_traces: 20,
         ticks: 250,
         poses: 1_000,
         tick_frames: 40,
@@ -117,6 +125,8 @@ impl Effort {
         bits: 10_000,
         costs: 10_000,
         host_costs: 10_000,
+        bounds: 10_000,
+        bound_traces: 54,
         ticks: 250,
         poses: 1_000,
         tick_frames: 40,
@@ -148,6 +158,8 @@ impl Effort {
             bits: wide(self.bits, least.bits),
             costs: wide(self.costs, least.costs),
             host_costs: wide(self.host_costs, least.host_costs),
+            bounds: wide(self.bounds, least.bounds),
+            bound_traces: wide(self.bound_traces, least.bound_traces),
             ticks: narrow(self.ticks, least.ticks),
             poses: wide(self.poses, least.poses),
             tick_frames: wide(self.tick_frames, least.tick_frames),
