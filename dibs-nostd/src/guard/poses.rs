@@ -8,6 +8,7 @@
 use glam::{Quat, Vec3};
 
 use super::rows::SharedState;
+use crate::math::order::larger;
 use crate::surface::PoseStep;
 use crate::surface::{AtomicU32, Ordering};
 use crate::{FrameGuard, RigidPose};
@@ -58,7 +59,7 @@ impl Poses {
         let [(before, earlier), (last, residual)] = self.of_frames(published);
         let step = PoseStep::between(&before, &last, centre)?;
         // A single small residual may be by chance. False for NaN.
-        let residual = if earlier > residual { earlier } else { residual };
+        let residual = larger(residual, earlier);
         (residual >= 0.0).then_some((step, residual))
     }
 

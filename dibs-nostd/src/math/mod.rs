@@ -4,6 +4,7 @@
 
 #[cfg(feature = "serde")]
 pub(crate) mod no_limit;
+pub(crate) mod order;
 pub(crate) mod round;
 pub(crate) mod sqrt;
 pub(crate) mod vec3x4;

@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::bound::ROUNDING;
 use super::reach::Reach;
 use super::{ModalSurface, Modes};
+use crate::math::order::{larger, smaller};
 use crate::surface::motion::sealed::Sealed;
 use crate::surface::{
     FARTHEST, FrameLabel, MeasuredStretch, Millis, MotionReading, MovingSurface, Prediction,
@@ -80,8 +81,8 @@ impl<const K: usize> WeightStep<K> {
         let ends = end.values.iter_mut().zip(&mut cut.values);
         for (((end, cut), before), mode) in ends.zip(&before.values).zip(modes.modes()) {
             let far = *end + (*end - before) * FARTHEST;
-            let near = if far > mode.low { far } else { mode.low };
-            *end = if near < mode.high { near } else { mode.high };
+            let near = larger(mode.low, far);
+            *end = smaller(mode.high, near);
             *cut = (far - *end) / 4.0;
         }
         end.stretch = Some(modes.bound(&end.values));
@@ -96,7 +97,7 @@ impl<const K: usize> WeightStep<K> {
             let expected = before.towards(&last.end, t, modes);
             // For a velocity that changes at a constant rate, one time of this step later.
             let longer = 2.0 * interval.0 as f32 / (interval.0 as f32 + last.interval.0 as f32);
-            let longer = if longer > 1.0 { longer } else { 1.0 };
+            let longer = larger(1.0, longer);
             residuals =
                 [last.residuals[1], reach.between(&expected.surface(modes), &surface) * longer];
             // Weights and `t` are rounded by a few times 2^-24.
@@ -201,7 +202,7 @@ impl<'a, const K: usize> ModalFrame<'a, K> {
         let motion = motion.map(|motion| motion.on(prediction));
         // A single small residual may be by chance. False for NaN.
         let [before, now] = step.residuals;
-        let residual = if before > now { before } else { now };
+        let residual = larger(now, before);
         let end = Millis((step.interval.0 as f32 * FARTHEST) as u32);
         let lag = Millis(self.age.0.saturating_sub(end.0));
         self.moved(weights, motion, (residual, grown(residual, t * FARTHEST)), lag)

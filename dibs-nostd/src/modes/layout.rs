@@ -3,6 +3,7 @@
 // Requirements: F-06, M-01
 
 use super::{MAX_GAIN, MAX_MODES, ModesError};
+use crate::math::order::larger;
 use crate::tree::format::{range, u32_at};
 
 /// Bytes of the section's header.
@@ -123,7 +124,7 @@ const fn check_modes(records: &[u8], count: u32) -> Result<(), ModesError> {
             && is_length(mode.high)
             && is_length(mode.gain)
             && is_length(mode.growth);
-        reach += mode.gain * if -mode.low > mode.high { -mode.low } else { mode.high };
+        reach += mode.gain * larger(mode.high, -mode.low);
         // Written so that NaN is rejected.
         if !(sound && reach <= MAX_GAIN) {
             return Err(wrong);

@@ -3,6 +3,7 @@
 use glam::{Mat3, Vec3};
 
 use super::{FRACTION_BITS, ModalSurface, Modes, VERTEX_MODE_BYTES};
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 
 /// The square root of 3, rounded up by more than the rounding of a few operations.
@@ -32,7 +33,7 @@ impl<const K: usize> Reach<K> {
         for row in rows() {
             for (largest, displacement) in largest.iter_mut().zip(row) {
                 let square = vector(displacement).length_squared();
-                *largest = if square > *largest { square } else { *largest };
+                *largest = larger(*largest, square);
             }
         }
         let largest = largest.map(sqrt);
@@ -42,7 +43,7 @@ impl<const K: usize> Reach<K> {
             let quotients =
                 quotients.map(|(displacement, largest)| vector(displacement) / *largest);
             let found = fourth_power_of_norm(quotients);
-            norm = if found > norm { found } else { norm };
+            norm = larger(norm, found);
         }
         let scale = (1_u32 << FRACTION_BITS) as f32;
         Self { largest: largest.map(|length| length / scale), norm: sqrt(sqrt(norm)) }
@@ -59,7 +60,7 @@ impl<const K: usize> Reach<K> {
             squares += moved * moved;
         }
         let together = sqrt(squares) * self.norm;
-        let moved = if together < sum { together } else { sum };
+        let moved = smaller(sum, together);
         // Each axis of both displacements is rounded down, mode by mode.
         (moved * ROUNDING + DIAGONAL * K as f32) * after.modes.header.unit
     }

@@ -8,6 +8,7 @@ use super::contacts::Pair;
 use super::passed::{self, SkippedTools};
 use super::search::WITHIN;
 use super::{Contacts, NoSide, Options, Proximity, Query, Side};
+use crate::math::order::larger;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, TriangleRow, VertexTable};
 
@@ -345,7 +346,7 @@ impl Scene {
         match &self.best {
             Some(best) if self.is_entered && self.is_outside => {
                 let closest = best.proximity.separation;
-                if closest > self.margin { closest } else { self.margin }
+                larger(self.margin, closest)
             }
             _ => f32::INFINITY,
         }

@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::{NoSide, Side};
+use crate::math::order::{larger, smaller};
 use crate::math::round::{sum_down, sum_up};
 use crate::{Coverage, TriangleRow, VertexTable};
 
@@ -123,8 +124,8 @@ impl Proximity {
     pub(super) fn or_nearer(self, other: Self) -> Self {
         let nearer = if other.separation < self.separation { other } else { self };
         Self {
-            lower: if other.lower < self.lower { other.lower } else { self.lower },
-            accuracy: if other.accuracy > self.accuracy { other.accuracy } else { self.accuracy },
+            lower: smaller(self.lower, other.lower),
+            accuracy: larger(self.accuracy, other.accuracy),
             coverage: self.coverage.or_weaker(other.coverage),
             node_tests: self.node_tests.saturating_add(other.node_tests),
             triangle_tests: self.triangle_tests.saturating_add(other.triangle_tests),

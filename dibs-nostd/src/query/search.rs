@@ -32,6 +32,7 @@ use roots::Roots;
 use slack::{COORDINATES, FLOOR, SLACK, TILT};
 
 use super::{Budget, Options};
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
 use crate::tree::RootSet;
@@ -232,7 +233,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     pub fn limit_to(&mut self, separation: f32) -> f32 {
         let distance = separation + self.tool.radius();
         let rounding = self.slack + self.tree.position_error();
-        let limit = rounding + if distance < 0.0 { 0.0 } else { distance };
+        let limit = rounding + larger(distance, 0.0);
         self.lower_cutoff(limit);
         limit
     }

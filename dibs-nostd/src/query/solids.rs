@@ -11,6 +11,7 @@ use super::memory::depth::KnownDepthMut;
 use super::search::{Search, Ties, WHOLE, Waiting};
 use super::separation::Request;
 use super::side::{NoSide, Side};
+use crate::math::order::smaller;
 use crate::math::sqrt::sqrt;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
@@ -79,10 +80,10 @@ fn nearer(one: Proximity, other: Proximity, tool: &impl Tool) -> Proximity {
     let is_nearer = other.separation < one.separation;
     let (near, farther) = if is_nearer { (other, one) } else { (one, other) };
     let mut nearer = one.or_nearer(other);
-    nearer.lower = least(near.lower, least_possible(&farther, tool));
+    nearer.lower = smaller(near.lower, least_possible(&farther, tool));
     if nearer.side == Side::Outside && matches!(farther.side, Side::Undefined(_)) {
         nearer.side = farther.side;
-        nearer.lower = least(nearer.separation, farther.lower);
+        nearer.lower = smaller(nearer.separation, farther.lower);
     }
     nearer
 }
@@ -94,8 +95,4 @@ fn least_possible(answer: &Proximity, tool: &impl Tool) -> f32 {
         Side::Undefined(_) => -(answer.axis_distance + tool.axis_length()) - tool.radius(),
         _ => answer.lower,
     }
-}
-
-fn least(one: f32, other: f32) -> f32 {
-    if other < one { other } else { one }
 }

@@ -4,6 +4,7 @@
 
 use super::tracker::{Tracker, TrackerAnswer};
 use super::{Options, Proximity, Side};
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Step, Tool, VertexTable};
@@ -86,7 +87,7 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
         let start = to.axis_start() - from.axis_start();
         let end = start + (to.axis_span() - from.axis_span());
         let (start, end) = (start.length_squared(), end.length_squared());
-        let tool = sqrt(if start > end { start } else { end });
+        let tool = sqrt(larger(end, start));
         let [first, last] = self.t;
         let lengths = from.axis_length() + to.axis_length();
         (tool + (last - first).abs() * self.step.length()) * (1.0 + 16.0 * U) + 8.0 * U * lengths

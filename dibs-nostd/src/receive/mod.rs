@@ -13,6 +13,7 @@ mod packets;
 mod step;
 
 use crate::MAX_COORDINATE;
+use crate::math::order::smaller;
 use crate::stretch::{
     Admission, Gate, IncomingSurface, StretchError, StretchMonitor, SurfaceLimits,
 };
@@ -198,8 +199,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         max_coordinate: f32,
         mac: M,
     ) -> Self {
-        let max_coordinate =
-            if max_coordinate > MAX_COORDINATE { MAX_COORDINATE } else { max_coordinate };
+        let max_coordinate = smaller(max_coordinate, MAX_COORDINATE);
         Self {
             writer,
             gate,

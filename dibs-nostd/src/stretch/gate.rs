@@ -3,6 +3,7 @@
 use core::ops::Range;
 
 use super::{StretchError, measure_stretch};
+use crate::math::order::larger;
 #[cfg(feature = "bus")]
 use crate::surface::RigidPose;
 use crate::surface::{MeasuredStretch, Millis, MotionUnit, VertexTable};
@@ -62,7 +63,7 @@ impl Comparison {
     #[cfg(feature = "bus")]
     pub(crate) fn growth(&self) -> f32 {
         let growth = 2.0 * self.t / (1.0 + self.t);
-        if growth > 1.0 { growth } else { 1.0 }
+        larger(1.0, growth)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Regions: equal ranges of triangle rows, each with its own measurement.
 
 use super::kernel::{Worst, root_up};
+use crate::math::order::smaller;
 use crate::surface::{MeasuredStretch, REGIONS, region_sigma};
 use crate::tree::{Index, Tree};
 
@@ -24,7 +25,7 @@ pub(super) fn of_regions<I: Index>(
     // A square that passed at the limit is within it; only the root's rounding may exceed it.
     let within = |squared: f32| {
         let sigma = root_up(squared);
-        if sigma > tree.stretch() { tree.stretch() } else { sigma }
+        smaller(sigma, tree.stretch())
     };
     let sigma = within(worst.squared);
     let mut codes = [0; REGIONS];

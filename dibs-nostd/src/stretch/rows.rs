@@ -18,6 +18,7 @@ use super::StretchError;
 use super::kernel::{
     Edges, LongestEdge, Measure, SingularValue, Worst, root_up, squared_limit, squared_stretch,
 };
+use crate::math::order::larger;
 use crate::surface::VertexTable;
 use crate::tree::format::{Join, METRIC_BYTES, Metric, PathKind, metric_row};
 use crate::tree::{Index, Tree, TriangleRow, format};
@@ -358,7 +359,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let square = now.second.length_squared();
         let left = worst.squared * rest_second - square;
         // The triangle is now within the largest square, so a value below 0 is rounding.
-        let left = if left > 0.0 { left } else { 0.0 };
+        let left = larger(0.0, left);
         Some((PreviousTriangle { centre, third, edge: now.second, left, square }, worst))
     }
 

@@ -2,6 +2,7 @@
 
 // Requirement: F-04
 
+use crate::math::order::larger;
 use crate::tree::TriangleRow;
 
 /// Number of regions of a surface with their own measured stretch: equal ranges of triangle rows, which are patches of
@@ -78,8 +79,7 @@ impl MeasuredStretch {
     /// the largest singular value (or edge) is convex. `None` if they were measured with different trees.
     #[must_use]
     pub fn or_larger(self, other: Self) -> Option<Self> {
-        let larger = if other.sigma > self.sigma { other.sigma } else { self.sigma };
-        self.of_both(other, larger)
+        self.of_both(other, larger(self.sigma, other.sigma))
     }
 
     /// A bound for a surface computed from two measured ones; `None` if measured with different trees.

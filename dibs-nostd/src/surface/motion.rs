@@ -15,6 +15,7 @@ use glam::Vec3;
 use super::atomic::unmodelled::{AtomicU32, Ordering};
 use super::moving::Step;
 use super::prediction::Prediction;
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::{Index, MeasuredStretch, Tree, VertexTable};
 
@@ -169,8 +170,8 @@ impl Unit {
             root += 1;
         }
         // Clamped, so that no product underflows or overflows. Written so that NaN becomes a number.
-        let radius = if radius > 1e-20 { radius } else { 1e-20 };
-        let radius = if radius < 1e20 { radius } else { 1e20 };
+        let radius = larger(1e-20, radius);
+        let radius = smaller(1e20, radius);
         let power = f32::from_bits(radius.to_bits() & EXPONENT);
         Self { length: power / 16_777_216.0, inverse: 16_777_216.0 / power }
     }

@@ -11,6 +11,7 @@ use glam::Vec3;
 use super::buffer::PredictionCheck;
 use super::motion::{MotionReading, MovingSurface, MovingTable};
 use super::prediction::Prediction;
+use crate::math::order::{larger, smaller};
 use crate::{MeasuredStretch, Millis, VertexTable};
 
 /// Two frames that follow one another, as [`Odometer::step`](crate::Odometer::step) measured them.
@@ -101,8 +102,8 @@ pub(crate) fn grown(residual: f32, beyond: f32) -> f32 {
 
 /// A number clamped to 0 to `most`: 0 for NaN.
 pub(crate) fn clamped(t: f32, most: f32) -> f32 {
-    let t = if t > 0.0 { t } else { 0.0 };
-    if t < most { t } else { most }
+    let t = larger(0.0, t);
+    smaller(most, t)
 }
 
 /// A surface between two frames or beyond the second: `before + t * (after - before)`.

@@ -1,8 +1,7 @@
 //! The capsule: a segment with a radius.
 
-use super::{
-    AxisPair, Tool, ToolError, check_point, check_radius, clamp_any, larger, sealed, triangle,
-};
+use super::{AxisPair, Tool, ToolError, check_point, check_radius, clamp_any, sealed, triangle};
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::math::vec3x4::Vec3x4;
 use glam::{Vec3, Vec4};

@@ -163,11 +163,6 @@ fn check_radius(value: f32) -> Result<(), ToolError> {
     if (0.0..=MAX_COORDINATE).contains(&value) { Ok(()) } else { Err(ToolError::Radius { value }) }
 }
 
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if b > a { b } else { a }
-}
-
 /// `x` limited to `0..=high`; NaN stays NaN, so that it is never taken for a distance.
 #[inline(always)]
 fn clamp(x: f32, high: f32) -> f32 {

@@ -1,6 +1,7 @@
 //! The sphere: a point with a radius.
 
-use super::{AxisPair, Tool, ToolError, check_point, check_radius, larger, sealed, triangle};
+use super::{AxisPair, Tool, ToolError, check_point, check_radius, sealed, triangle};
+use crate::math::order::larger;
 use crate::math::vec3x4::Vec3x4;
 use glam::Vec3;
 

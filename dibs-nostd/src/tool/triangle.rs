@@ -34,6 +34,7 @@
 use super::capsule::Axis;
 use super::edge::{edge_to_point, edge_to_segment};
 use super::{AxisPair, clamp};
+use crate::math::order::larger;
 use glam::Vec3;
 
 /// Square of the sine below which two directions count as nearly parallel: 2^-16.
@@ -203,7 +204,7 @@ impl Candidate {
             on_axis,
             axis_parameter,
             on_surface: a + self.v * ab + self.w * ac,
-            barycentric: [if rest < 0.0 { 0.0 } else { rest }, self.v, self.w],
+            barycentric: [larger(rest, 0.0), self.v, self.w],
         }
     }
 }

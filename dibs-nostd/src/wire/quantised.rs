@@ -6,6 +6,7 @@ use core::fmt;
 
 use glam::Vec3;
 
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 
 /// The box of 16-bit positions: `position = origin + step * row` on each axis.
@@ -58,8 +59,8 @@ impl QuantisedBox {
         }
         let (mut low, mut high) = (first.to_array(), first.to_array());
         for position in rest {
-            low = zip(low, position.to_array(), |a, b| if b < a { b } else { a });
-            high = zip(high, position.to_array(), |a, b| if b > a { b } else { a });
+            low = zip(low, position.to_array(), smaller);
+            high = zip(high, position.to_array(), larger);
         }
         // The smallest step must still change the largest coordinate, or the box has no inside.
         let mut step = f32::MIN_POSITIVE;
@@ -125,7 +126,7 @@ impl QuantisedBox {
     pub fn error(&self) -> f32 {
         let rounding = |origin: f32, upper: f32| {
             let (origin, upper) = (origin.abs(), upper.abs());
-            (if origin > upper { origin } else { upper }) * (f32::EPSILON * 2.0)
+            larger(upper, origin) * (f32::EPSILON * 2.0)
         };
         let upper = self.upper_corner().to_array();
         let axes = zip(self.origin.to_array(), upper, rounding);

@@ -62,6 +62,7 @@ use core::fmt;
 
 use glam::Vec3;
 
+use crate::math::order::{larger, smaller};
 use crate::math::round::sum_down;
 use crate::math::sqrt::sqrt;
 use crate::query::{NoSide, Proximity, Side};
@@ -180,7 +181,7 @@ impl SpringDamper {
     #[must_use]
     pub fn device_damping(&self, tick: f32) -> f32 {
         let wall = self.stiffness * tick / 2.0 + self.damping;
-        if wall > self.held() { wall } else { self.held() }
+        larger(self.held(), wall)
     }
 
     /// Force along the approach's direction of a spring displaced by `length` mm; at least `least` N, which is 0 for a
@@ -215,7 +216,7 @@ impl SpringDamper {
         let scaled = velocity / largest;
         let length = sqrt(scaled.length_squared());
         let wanted = self.held() * (largest * length);
-        let size = if wanted > self.max_force { self.max_force } else { wanted };
+        let size = smaller(wanted, self.max_force);
         let force = scaled / length * -size;
         // NaN from a velocity of zero, or from one that is not finite.
         let force = if force.is_finite() { force } else { Vec3::ZERO };

@@ -14,6 +14,8 @@
 
 use glam::Vec3;
 
+use crate::math::order::larger;
+
 pub(super) const MOST: usize = 8;
 
 /// Fraction of its depth by which a wall yields under its force, so that two contacts with one wall share the force.
@@ -67,7 +69,7 @@ pub(super) fn displacement(mut walls: [Wall; MOST]) -> Vec3 {
             let may_turn = if wall.acts { rate > 0.0 } else { rate < 0.0 };
             let until = wall.left(at) / rate;
             if may_turn && until < length {
-                length = if until > 0.0 { until } else { 0.0 };
+                length = larger(0.0, until);
                 first = Some(wall);
             }
         }

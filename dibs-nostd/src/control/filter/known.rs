@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 
 /// A pair's distance at a pose.
@@ -54,34 +55,5 @@ impl PairState {
             Some(end) => larger(at, end.distance_at(ends)),
             None => at,
         }
-    }
-}
-
-/// The larger number; NaN if `a` is.
-pub(super) fn larger(a: f32, b: f32) -> f32 {
-    if b > a { b } else { a }
-}
-
-/// The smaller number; NaN if either is.
-pub(super) fn smaller(a: f32, b: f32) -> f32 {
-    if a < b {
-        a
-    } else if b <= a {
-        b
-    } else {
-        f32::NAN
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A distance that is not a number is never replaced by one.
-    #[test]
-    fn no_number_hides_one_that_is_missing() {
-        assert_eq!((smaller(1.0, 2.0), smaller(2.0, 1.0), larger(1.0, 2.0)), (1.0, 1.0, 2.0));
-        assert!(smaller(f32::NAN, 1.0).is_nan() && smaller(1.0, f32::NAN).is_nan());
-        assert!(larger(f32::NAN, 1.0).is_nan());
     }
 }

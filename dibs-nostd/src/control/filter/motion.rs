@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::known::smaller;
 use super::nearest::Vector;
+use crate::math::order::smaller_or_nan;
 use crate::math::sqrt::sqrt;
 
 /// A motion of a rigid instrument in one period: its reference point moves in a straight line by `translation`, while
@@ -89,7 +89,7 @@ pub(super) fn shortened(vector: Vec3, most: f32) -> Vec3 {
 
 /// Largest angle (rad) of a period.
 pub(super) fn most_turn(most: f32, lever: f32) -> f32 {
-    smaller(most / lever, MOST_TURN)
+    smaller_or_nan(most / lever, MOST_TURN)
 }
 
 /// The largest fraction of a step, at most 1, after which a point that starts within `most` of the origin still is.
@@ -102,7 +102,7 @@ pub(super) fn inside(start: Vec3, step: Vec3, most: f32) -> f32 {
     let root = along * along + square * room;
     // Written so that NaN gives 0.
     if room > 0.0 && root > 0.0 {
-        smaller((sqrt(root) - along) / square * (1.0 - 8.0 * f32::EPSILON), 1.0)
+        smaller_or_nan((sqrt(root) - along) / square * (1.0 - 8.0 * f32::EPSILON), 1.0)
     } else {
         0.0
     }

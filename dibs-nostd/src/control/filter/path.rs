@@ -1,5 +1,6 @@
 //! The least distance of an axis from a surface during a motion between two poses.
 
+use crate::math::order::smaller;
 use crate::math::sqrt::sqrt;
 
 /// Rounding of the sums below, relative to the distances.
@@ -19,11 +20,11 @@ const ROUNDING: f32 = 16.0 / 16_777_216.0;
 pub(super) fn least(start: f32, end: f32, moved: f32, grow: f32) -> f32 {
     let last = end - grow;
     // Written so that NaN is kept.
-    let ends = if last > start { start } else { last };
+    let ends = smaller(last, start);
     let slack = ROUNDING * (start.abs() + end.abs() + moved);
     let by_motion = (start + end - moved) * 0.5 - grow;
     if !(start > 0.0 && end > 0.0) {
-        return (if by_motion < ends { by_motion } else { ends }) - slack;
+        return smaller(ends, by_motion) - slack;
     }
     // The bound falls no faster than the surface approaches.
     if !(moved > grow) {
@@ -46,7 +47,7 @@ pub(super) fn least(start: f32, end: f32, moved: f32, grow: f32) -> f32 {
     let squared =
         (1.0 - s) * start * start + s * end * end - s * (1.0 - s) * moved * moved - rounding;
     let inside = if squared > 0.0 { sqrt(squared) - grow * s } else { by_motion };
-    (if inside < ends { inside } else { ends }) - slack
+    smaller(ends, inside) - slack
 }
 
 #[cfg(test)]

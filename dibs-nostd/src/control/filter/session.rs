@@ -5,7 +5,7 @@
 use glam::Vec3;
 use heapless::Vec;
 
-use super::known::{PairState, PoseDistance, larger, smaller};
+use super::known::{PairState, PoseDistance};
 use super::motion::{inside, most_turn, shortened};
 use super::nearest::{Vector, add};
 use super::pair::{ClosestPair, Pair};
@@ -16,6 +16,7 @@ use super::{
     AdmittedMotion, EPSILON, Filter, FilterError, MOST_PAIRS, MotionRow, Reason, RigidMotion,
     Uncertainty, path,
 };
+use crate::math::order::{larger, smaller, smaller_or_nan};
 use crate::math::sqrt::sqrt;
 use crate::{Budget, Cost};
 
@@ -265,7 +266,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             let turn = most_turn(self.most, self.lever) * self.lever;
             let straight = inside(Vec3::new(a, b, c), Vec3::new(u, v, w), self.most);
             let turned = inside(Vec3::new(d, e, f), Vec3::new(x, y, z), turn);
-            add(&mut whole, &step, if straight < turned { straight } else { turned });
+            add(&mut whole, &step, smaller(turned, straight));
         }
         Proposal { least, whole, is_command: false }
     }
@@ -367,10 +368,10 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             }
         }
         found.is_admissible &= is_enough(nearest);
-        found.least = smaller(found.least, nearest - reach);
-        found.last = smaller(found.last, last - grow - reach);
+        found.least = smaller_or_nan(found.least, nearest - reach);
+        found.last = smaller_or_nan(found.last, last - grow - reach);
         if part.is_none() {
-            found.separation = smaller(found.separation, nearest - reach);
+            found.separation = smaller_or_nan(found.separation, nearest - reach);
         }
         Ok(())
     }

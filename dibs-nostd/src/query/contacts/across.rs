@@ -16,6 +16,7 @@ use glam::Vec3;
 
 use super::Contact;
 use super::add::{NO_DIRECTION, Pair};
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::query::corners::positions;
 use crate::query::made::Tests;
@@ -81,8 +82,8 @@ impl ProfilePoint {
     fn meeting(&self, far: &Self) -> (f32, f32) {
         let between = far.along - self.along;
         let step = (far.depth - self.depth - far.slope * between) / (self.slope - far.slope);
-        let step = if step > 0.0 { step } else { 0.0 };
-        let step = if step < between { step } else { between };
+        let step = larger(0.0, step);
+        let step = smaller(between, step);
         (self.along + step, self.depth + self.slope * step)
     }
 }
@@ -156,13 +157,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
                 None => {
                     let mut along = near.along + (most - near.depth) / near.slope;
                     for least in [near.along + STEP * near.depth, end] {
-                        along = if along < least { along } else { least };
+                        along = smaller(least, along);
                     }
                     (along, f32::INFINITY)
                 }
             };
             let is_known = |far: &ProfilePoint| {
-                let deepest = if far.depth > near.depth { far.depth } else { near.depth };
+                let deepest = larger(near.depth, far.depth);
                 expected <= deepest + accuracy
             };
             if far.as_ref().is_some_and(|(far, _)| is_known(far)) {

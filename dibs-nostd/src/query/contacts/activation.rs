@@ -13,6 +13,7 @@
 
 use super::add::Pair;
 use super::basins::{Basins, NearTriangle};
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::query::made::Tests;
 use crate::query::prices::ACTIVATION;
@@ -31,7 +32,7 @@ const STEPS: usize = 128;
 /// The ridge (mm) up to which a contact at this distance has activation 0.
 pub(super) fn least_ridge(distance: f32, (most, error): (f32, f32)) -> f32 {
     let ridge = distance * RIDGE;
-    (if ridge < most { ridge } else { most }) + error
+    smaller(most, ridge) + error
 }
 
 #[derive(Clone, Copy)]
@@ -122,7 +123,7 @@ impl<const N: usize> Basins<N> {
             let (Some(near), Some(())) = (self.at(entry), tester.pay()) else { return Ok(1.0) };
             // Next to a point that is hardly lower, the ridge does not matter.
             let tied = full - (own - sqrt(near.square));
-            let parted = if tied > ridge { tied } else { ridge };
+            let parted = larger(ridge, tied);
             if parted < least {
                 least = parted;
             }
@@ -135,13 +136,13 @@ impl<const N: usize> Basins<N> {
                     return Ok(1.0);
                 };
                 let beyond = self.height(next).unwrap_or(f32::INFINITY);
-                let mut over = if beyond > height { beyond } else { height };
+                let mut over = larger(height, beyond);
                 if self.is_marked(next) || !(over - own < least) {
                     continue;
                 }
                 if !near.place.is_on(edge) {
                     let Some(edge) = tester.edge(near.row, edge)? else { return Ok(1.0) };
-                    over = if edge > over { edge } else { over };
+                    over = larger(over, edge);
                 }
                 if over - own < least {
                     let Some(path) = paths.get_mut(count) else { return Ok(1.0) };

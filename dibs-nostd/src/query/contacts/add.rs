@@ -6,6 +6,7 @@ use super::activation::TriangleTester;
 use super::basins::{Basins, ClosestPoint, NearTriangle};
 use super::low::SearchExtent;
 use super::{Contact, Contacts};
+use crate::math::order::smaller;
 use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
 use crate::query::made::Tests;
@@ -165,8 +166,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         } else {
             None
         };
-        let deepest =
-            own.map_or(least, |own| if own.separation < least { own.separation } else { least });
+        let deepest = own.map_or(least, |own| smaller(least, own.separation));
         for contact in &mut found.list {
             let is_own = (contact.surface, contact.tool) == (pair.surface, pair.number);
             if is_own && contact.separation > deepest {
@@ -188,7 +188,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
         // For a part without the closest pair, the search has seen the deepest contact if it was completed.
         found.is_open |= !is_known || !(is_crossing || own.is_some() || beyond >= limit);
-        let mut from = if beyond < complete { beyond } else { complete };
+        let mut from = smaller(complete, beyond);
         if let Some(missing) = missing.map(sqrt).filter(|&missing| missing < from) {
             from = missing;
         }

@@ -5,6 +5,7 @@
 use heapless::Vec;
 
 use super::Contact;
+use crate::math::order::{larger, smaller};
 
 #[derive(Clone, Debug)]
 pub(super) struct List<const N: usize> {
@@ -59,7 +60,7 @@ impl<const N: usize> List<N> {
 
     /// No contact has a separation below `least`.
     pub fn raise_bound(&mut self, least: f32) {
-        let least = if least < self.margin { least } else { self.margin };
+        let least = smaller(self.margin, least);
         if least > self.bound {
             self.bound = least;
         }
@@ -70,7 +71,7 @@ impl<const N: usize> List<N> {
         if self.list.is_full() {
             self.is_full = true;
             let farthest = self.list.last().map_or(f32::NEG_INFINITY, |last| last.separation);
-            let dropped = if contact.separation > farthest { contact.separation } else { farthest };
+            let dropped = larger(farthest, contact.separation);
             self.lower_bound(dropped);
             if !(contact.separation < farthest) {
                 return;

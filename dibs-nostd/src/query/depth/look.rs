@@ -3,8 +3,9 @@
 //! A tracker remembers the leaves around the deepest point, so that the next ticks search only these. If a budget ends
 //! the search of a point, the next tick continues it: subtrees and leaves keep their bounds, less the motion.
 
-use super::part::{Fit, Parts, Sample, smaller};
+use super::part::{Fit, Parts, Sample};
 use super::{Depth, EXACT};
+use crate::math::order::smaller;
 use crate::query::memory::depth::Remembered;
 use crate::query::prices::TIE;
 use crate::query::search::{Search, UNTIL};
@@ -196,7 +197,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
                 distance
             }
             Some(_) => distance,
-            None => smaller(sample.depth, distance),
+            None => smaller(distance, sample.depth),
         };
         let accuracy = found.accuracy + COORDINATES * on_axis.abs().max_element();
         if accuracy > answer.accuracy {

@@ -32,12 +32,13 @@ use super::prices::TURN;
 use super::search::{Ties, Waiting};
 use super::side::{self, NoSide, Side};
 use super::{Options, Proximity};
+use crate::math::order::{larger, smaller};
 use crate::tool::Tool;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
 use look::LOOK_COST;
-use part::{Bound, Fit, MOST_DISTANCES, Part, Parts, Sample, larger, smaller};
+use part::{Bound, Fit, MOST_DISTANCES, Part, Parts, Sample};
 use touches::Touches;
 
 /// A limit that never ends a search early.
@@ -176,8 +177,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     fn reach(&self) -> f32 {
         let (length, closest) = (self.tool.axis_length(), self.closest);
         let along = closest.axis_parameter * length;
-        let reach = larger(along, length - along) + closest.axis_distance + closest.accuracy;
-        self.remembered.as_ref().map_or(reach, |known| smaller(reach, known.between[1]))
+        let reach = larger(length - along, along) + closest.axis_distance + closest.accuracy;
+        self.remembered.as_ref().map_or(reach, |known| smaller(known.between[1], reach))
     }
 
     /// Searches the last tick's deepest point, then divides the part with the highest bound until none exceeds the
@@ -262,7 +263,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     /// A part whose bound is at most this is not searched.
     fn enough(&self, tolerance: f32) -> f32 {
         let least = self.remembered.as_ref().map_or(0.0, |known| known.between[0]);
-        larger(self.deepest, least) + tolerance
+        larger(least, self.deepest) + tolerance
     }
 
     /// Bounds a remembered part again.
@@ -359,7 +360,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 (true, true) => Side::Inside,
             };
         }
-        let most = if bound > self.deepest { bound } else { self.deepest };
+        let most = larger(self.deepest, bound);
         // If no point is inside, `answer` is still the closest pair, which may be farther than the accuracy.
         if self.deepest > 0.0 {
             answer.separation = -self.tool.radius() - self.deepest;

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use super::touches::{Free, Touches};
 use crate::TriangleRow;
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPoint, Tool};
 
@@ -70,7 +71,7 @@ impl Sample {
             return Some(0.0);
         }
         // The distance to a triangle is convex.
-        let square = larger(self.square(self.on_axis), self.square(point(free.from)));
+        let square = larger(self.square(point(free.from)), self.square(self.on_axis));
         (square <= enough * enough).then(|| sqrt(square))
     }
 }
@@ -111,7 +112,7 @@ impl Part {
     /// The part with its own bound, limited by the bound `most` of a part that contains it.
     pub fn new(mut from: Sample, next: usize, own: &Bound, most: f32) -> Self {
         from.depth = own.depth;
-        Self { from, next, bound: smaller(own.bound, most), split: Some(own.split) }
+        Self { from, next, bound: smaller(most, own.bound), split: Some(own.split) }
     }
 }
 
@@ -120,8 +121,8 @@ impl Bound {
     pub fn between(from: &Sample, to: &Sample, enough: f32, touches: &Touches) -> Self {
         let length = to.along - from.along;
         // A depth changes by at most the length moved.
-        let depth = smaller(from.depth, to.depth + length);
-        let to_depth = smaller(to.depth, depth + length);
+        let depth = smaller(to.depth + length, from.depth);
+        let to_depth = smaller(depth + length, to.depth);
         let part = |bound, split, distances| Self { depth, bound, split, distances };
         let span = to.on_axis - from.on_axis;
         let point = |along: f32| from.on_axis + span * ((along - from.along) / length);
@@ -133,13 +134,13 @@ impl Bound {
         if ahead.is_outside && ahead.from < to.along {
             distances += 2;
             if let Some(most) = from.passes(&ahead, point, enough) {
-                (first, beside) = (larger(first, ahead.to), most);
+                (first, beside) = (larger(ahead.to, first), most);
             }
         }
         if behind.is_outside && behind.from > from.along {
             distances += 2;
             if let Some(most) = to.passes(&behind, point, enough) {
-                (last, beside) = (smaller(last, behind.to), larger(beside, most));
+                (last, beside) = (smaller(behind.to, last), larger(most, beside));
             }
         }
         if !(first < last) {
@@ -149,7 +150,7 @@ impl Bound {
         let slope = (depth + to_depth + length) * 0.5;
         let middle = (first + last) * 0.5;
         if slope <= enough {
-            return part(larger(beside, slope), middle, distances);
+            return part(larger(slope, beside), middle, distances);
         }
         let squares = |along: f32| [from.square(point(along)), to.square(point(along))];
         let (at_first, at_last) = (squares(first), squares(last));
@@ -165,7 +166,7 @@ impl Bound {
             let along = if is_between { equal } else { (low.0 + high.0) * 0.5 };
             let here = squares(along);
             distances += 2;
-            let highest = larger(convex(at_first, here), convex(here, at_last));
+            let highest = larger(convex(here, at_last), convex(at_first, here));
             if highest < least {
                 (least, peak) = (highest, along);
             }
@@ -188,7 +189,7 @@ impl Bound {
         } else {
             peak
         };
-        part(larger(beside, smaller(convex, slope)), split, distances)
+        part(larger(smaller(slope, convex), beside), split, distances)
     }
 }
 
@@ -246,7 +247,7 @@ impl Parts {
                 break;
             }
             let length = self.sample(right.next).along - left.from.along;
-            let bound = larger(left.bound, right.bound);
+            let bound = larger(right.bound, left.bound);
             if length < least && bound <= enough && !kept.contains(&right.from.parameter) {
                 (least, joined) = (length, Some((row, Part { next: right.next, bound, ..left })));
             }
@@ -317,7 +318,7 @@ impl Parts {
         let own = Bound::between(from, to, enough, touches);
         if let Some(part) = self.rows.get_mut(row) {
             part.from.depth = own.depth;
-            part.bound = smaller(own.bound, part.bound);
+            part.bound = smaller(part.bound, own.bound);
             part.split = Some(own.split);
         }
         own.distances
@@ -341,18 +342,10 @@ pub(super) fn square(point: Vec3, corners: &[Vec3; 3]) -> f32 {
 
 /// Upper bound on the smaller of two convex functions between two points, from their values there.
 fn convex([one, other]: [f32; 2], [one_next, other_next]: [f32; 2]) -> f32 {
-    let (most, other_most) = (larger(one, one_next), larger(other, other_next));
-    smaller(most, other_most)
-}
-
-pub(super) fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-pub(super) fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+    let (most, other_most) = (larger(one_next, one), larger(other_next, other));
+    smaller(other_most, most)
 }
 
 fn above_zero(x: f32) -> f32 {
-    if x > 0.0 { x } else { 0.0 }
+    larger(0.0, x)
 }

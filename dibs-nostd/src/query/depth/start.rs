@@ -1,8 +1,9 @@
 //! The initial parts of the axis: between its intersections with the surface, or the last tick's parts.
 
-use super::part::{Part, Parts, Sample, smaller};
+use super::part::{Part, Parts, Sample};
 use super::touches::Touches;
 use super::{DISTANCE_COST, Depth};
+use crate::math::order::smaller;
 use crate::query::Proximity;
 use crate::query::memory::depth::Point;
 use crate::query::prices::POINT;
@@ -113,7 +114,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             if depth < 0.0 {
                 self.touches.add_outside(from.along);
             }
-            parts.push(Part::remembered(from, parts.count() + 1, smaller(bound, reach)));
+            parts.push(Part::remembered(from, parts.count() + 1, smaller(reach, bound)));
         }
         parts.end();
         self.spend_if_priced(price);

@@ -3,8 +3,8 @@
 use glam::Vec3;
 use heapless::Vec;
 
-use super::part::{larger, smaller};
 use crate::TriangleRow;
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, AxisPoint, SLIVER, Tool};
 
@@ -47,7 +47,7 @@ impl Touch {
     fn joined(&self, other: &Self) -> Self {
         let before = if self.before == other.before { self.before } else { None };
         let after = if self.after == other.after { self.after } else { None };
-        let (first, last) = (smaller(self.first, other.first), larger(self.last, other.last));
+        let (first, last) = (smaller(other.first, self.first), larger(other.last, self.last));
         Self { first, last, before, after, ..*self }
     }
 }
@@ -110,8 +110,8 @@ impl Touches {
             outside
         };
         let [a, b, c] = [a, b, c].map(|corner| along.dot(corner - start));
-        let first = smaller(a, smaller(b, smaller(c, middle))) - 2.0 * accuracy;
-        let last = larger(a, larger(b, larger(c, middle))) + 2.0 * accuracy;
+        let first = smaller(smaller(smaller(middle, c), b), a) - 2.0 * accuracy;
+        let last = larger(larger(larger(middle, c), b), a) + 2.0 * accuracy;
         let (first, last) = (end(first), end(last));
         self.insert(Touch { first, last, parameter, triangle, ..Touch::unknown(0.0) });
         2 * HALVINGS

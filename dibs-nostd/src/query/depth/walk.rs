@@ -1,8 +1,9 @@
 //! Steps from a triangle to closer neighbours. The distance to any triangle is an upper bound on a point's depth, so a
 //! close triangle may save a search.
 
-use super::part::{self, Fit, Parts, Sample, smaller};
+use super::part::{self, Fit, Parts, Sample};
 use super::{DISTANCE_COST, Depth};
+use crate::math::order::smaller;
 use crate::math::sqrt::sqrt;
 use crate::query::prices::STEP;
 use crate::tool::Tool;
@@ -67,7 +68,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             before = Some(from);
         }
         sample.fit = Fit::Closest;
-        sample.depth = smaller(sample.depth, sqrt(least));
+        sample.depth = smaller(sqrt(least), sample.depth);
         self.spend(distances * walk.cost);
         Ok(())
     }

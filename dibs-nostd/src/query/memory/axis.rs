@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use crate::Tool;
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
 
@@ -28,9 +29,9 @@ impl Axis {
             return 0;
         }
         let (start, end) = (start.length_squared(), (start + end).length_squared());
-        let larger = if start > end { start } else { end };
+        let square = larger(end, start);
         // Each component of a span is off by at most `2 U` of the axis' length; a difference rounds by `U` of itself.
         let rounding = 8.0 * U * (tool.axis_length() + self.length);
-        unit.up(sqrt(larger) * (1.0 + 16.0 * U) + rounding)
+        unit.up(sqrt(square) * (1.0 + 16.0 * U) + rounding)
     }
 }

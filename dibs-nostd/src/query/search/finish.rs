@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::slack::{ACCURACY, FLOOR};
 use super::{NearestPin, Search};
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::query::{NoSide, Proximity, Side};
 use crate::{Coverage, Index, QueryError, Tool, TriangleRow, VertexTable};
@@ -37,7 +38,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         };
         let axis_distance = sqrt(pair.distance_squared);
         let made = self.meter.made();
-        let above_zero = |x: f32| if x > 0.0 { x } else { 0.0 };
+        let above_zero = |x: f32| larger(0.0, x);
         let separation = axis_distance - radius;
         let left = above_zero(lower) - radius;
         // Divided by the vector's own length: near contact the points' rounding differs from the distance's.
@@ -47,7 +48,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let direction = if touches { Vec3::ZERO } else { towards / length };
         Ok(Proximity {
             separation,
-            lower: if left < separation { left } else { separation },
+            lower: smaller(separation, left),
             accuracy: self.accuracy(),
             side: Side::Undefined(NoSide::NotAsked),
             coverage: Coverage::Assumed,

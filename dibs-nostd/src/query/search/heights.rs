@@ -9,6 +9,7 @@ use glam::Vec3;
 use heapless::Vec;
 
 use super::Search;
+use crate::math::order::smaller;
 use crate::query::Options;
 use crate::query::prices::{LEAF, SEEN};
 use crate::unavailable::QueryError;
@@ -158,12 +159,7 @@ impl Heights {
     pub fn least_standing(&self) -> f32 {
         let standing =
             self.places.iter().chain(&self.evicted).filter(|vertex| vertex.standing().is_some());
-        standing.fold(
-            f32::INFINITY,
-            |least, vertex| {
-                if vertex.square < least { vertex.square } else { least }
-            },
-        )
+        standing.fold(f32::INFINITY, |least, vertex| smaller(least, vertex.square))
     }
 }
 

@@ -12,6 +12,7 @@ use heapless::VecView;
 
 use super::node::AROUND;
 use super::{Search, Waiting};
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::query::memory::leaves::{Leaf, Leaves};
 use crate::query::plane::least;
@@ -98,7 +99,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let Some(own) = self.leaf_bound(first, count, price)? else {
                 return self.leave(Waiting { lower, link }, wider, leaves, waiting);
             };
-            let bound = (if own > lower { own } else { lower }) - slack;
+            let bound = larger(lower, own) - slack;
             if leaves.is_full() {
                 wider *= 0.5;
                 leaves.keep_within(leaves.then(self.cutoff + wider - slack));

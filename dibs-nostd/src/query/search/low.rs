@@ -16,6 +16,7 @@ use glam::Vec3;
 
 use super::Search;
 use super::heights::{CacheSlot, Heights, Vertex};
+use crate::math::order::smaller;
 use crate::query::prices::{FACING, ON_EDGE, STANDING};
 use crate::tool::{AxisPair, SLIVER, Tool};
 use crate::tree::{MAX_RING, after, before};
@@ -159,7 +160,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let &Vertex { square, position, towards, .. } = heights.at(lowest);
         let rise = |to: CacheSlot| towards.dot(heights.at(to).position - position);
         let (along, across) = (rise(next), rise(last));
-        let least = if along < across { along } else { across };
+        let least = smaller(across, along);
         if least >= self.tilt_slack {
             return Ok(TriangleHeight { lowest, low: square - self.tilt_slack, dip: Dip::Nowhere });
         }

@@ -6,6 +6,7 @@ use super::heights::{CacheSlot, Heights};
 use super::meter::Meter;
 use super::node::RANGE;
 use super::{Search, Waiting};
+use crate::math::order::smaller;
 use crate::math::sqrt::sqrt;
 use crate::query::made::Tests;
 use crate::query::prices::{CHILD, LIST};
@@ -59,7 +60,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let least = match self.visit_waiting(ridge, &mut heights, &mut visit)? {
             Some(waiting) => {
                 let standing = least_standing(&heights, ridge);
-                if standing < waiting { standing } else { waiting }
+                smaller(waiting, standing)
             }
             None if self.visit_rest(&heights, &mut visit)? => f32::INFINITY,
             None => least_standing(&heights, ridge),
@@ -87,7 +88,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let square = beyond * beyond - tilt;
         // A bound below zero is none, and neither is one that is not a number.
         let beyond = if beyond > 0.0 && square > 0.0 { sqrt(square) } else { 0.0 };
-        let nearest = if beyond < nearest { beyond } else { nearest };
+        let nearest = smaller(nearest, beyond);
         let Tests { node_tests, triangle_tests } = tests;
         Ok(LabelDistance {
             distance: nearest - accuracy,

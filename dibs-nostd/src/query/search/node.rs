@@ -2,9 +2,11 @@
 
 // Requirement: A-04
 
+use glam::Vec3;
+
 use super::{Search, Waiting};
 use crate::math::sqrt::sqrt;
-use crate::tree::format::Link;
+use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, VertexTable};
 
@@ -51,9 +53,18 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         waiting.fold(known(lower), least)
     }
 
+    /// A child's pin, the vector from it to the axis, its length, and the lower bound of the child's sphere.
+    #[inline(always)]
+    pub(super) fn child(&self, child: &Node) -> Result<(Vec3, Vec3, f32, f32), QueryError> {
+        let position = self.position(child.pin)?;
+        let normal = self.tool.axis_to(position);
+        let distance = sqrt(normal.dot(normal));
+        Ok((position, normal, distance, distance - child.radius_code as f32 * self.radius_scale))
+    }
+
     /// Tests the spheres of a node's children, and the planes of its leaves, up to `wider` (mm) beyond the cutoff;
     /// pushes the rest. The caller has counted the spheres. Each child's bound is at least its parent's, so the
-    /// certified bound never falls.
+    /// certified bound never falls. Not by [`Self::child`]: most children are rejected before the root of their distance.
     #[inline(always)]
     pub(super) fn expand<const KIND: u8>(
         &mut self,

@@ -8,6 +8,7 @@ mod tests;
 use super::heights::Heights;
 use super::near::least_standing;
 use super::{Search, Waiting};
+use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::query::Options;
 use crate::query::made::Tests;
@@ -58,7 +59,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         }
         if front.node(at).is_some() || !self.visit_rest(&heights, &mut visit)? {
             let (beyond, standing) = (self.least_from(front, at)?, least_standing(&heights, ridge));
-            let least = if standing < beyond { standing } else { beyond };
+            let least = smaller(beyond, standing);
             return Ok((least, self.meter.made()));
         }
         Ok((f32::INFINITY, self.meter.made()))
@@ -97,10 +98,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 *front.node_mut(at).ok_or(corrupt)? = RangeNode { link, deadline, opened, near };
                 return Ok(false);
             }
-            let position = self.position(child.pin)?;
-            let normal = self.tool.axis_to(position);
-            let distance = sqrt(normal.dot(normal));
-            let own = distance - child.radius_code as f32 * self.radius_scale;
+            let (position, normal, distance, own) = self.child(&child)?;
             let mut deadline = later(own);
             // NaN counts as near: the leaves below report the vertex that it comes from.
             if !(own > self.cutoff) {
@@ -186,7 +184,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let mut first_due: Option<Deadline> = None;
         let add = |least: &mut f32, bound: f32| {
             // NaN or below zero: no bound.
-            let bound = if bound > 0.0 { bound } else { 0.0 };
+            let bound = larger(0.0, bound);
             if bound < *least {
                 *least = bound;
             }

@@ -16,6 +16,7 @@ use glam::Vec3;
 use facing::FacingPlane;
 
 use super::{Expansion, Search, Waiting};
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
 use crate::query::made::Tests;
@@ -119,7 +120,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                     self.put_back_waiting().ok_or(corrupt)?;
                     self.search.leave_unfinished();
                     let least = self.clock.left(self.front.first(&self.clock));
-                    let lower = if least > 0.0 { least } else { 0.0 };
+                    let lower = larger(0.0, least);
                     return Ok(Outcome::Ended { lower, is_complete: false, restarted });
                 }
                 Visit::Full => {
@@ -263,11 +264,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             if search.meter.node().is_none() {
                 return Ok(Expansion::OutOfBudget);
             }
-            let position = search.position(node.pin)?;
-            let normal = search.tool.axis_to(position);
-            let distance = sqrt(normal.dot(normal));
+            let (position, normal, distance, own) = search.child(&node)?;
             search.lower_cutoff_to_pin(node.pin, distance);
-            let own = distance - node.radius_code as f32 * search.radius_scale;
             *due = later(*due, own);
             if own > search.cutoff {
                 continue;

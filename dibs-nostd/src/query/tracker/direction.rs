@@ -10,6 +10,7 @@ use glam::Vec3;
 
 use super::Tracker;
 use super::kept::DIRECTED;
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
 use crate::query::memory::separation::Certain;
@@ -83,7 +84,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             (at, last.direction, Vec3::ZERO)
         };
         let end = across.dot(span);
-        let foremost = if end > 0.0 { end } else { 0.0 };
+        let foremost = larger(0.0, end);
         if least(corners.map(|corner| across.dot(corner - from))) - foremost > closest + 2.0 * tie {
             return Ok(());
         }

@@ -12,6 +12,7 @@
 use glam::Vec3;
 
 use super::Tracker;
+use crate::math::order::larger;
 use crate::math::round::{sum_down, sum_up};
 use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
@@ -117,7 +118,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let own = Certain::of(found, tool.radius());
         let has_depth = found.lower < nearest;
         let unsigned = Certain::of(&Proximity { lower: nearest, ..*found }, tool.radius());
-        let nearest = if unsigned.lower > 0.0 { unsigned.lower } else { 0.0 };
+        let nearest = larger(0.0, unsigned.lower);
         let mut both = last;
         if own.upper < both.upper {
             both.upper = own.upper;

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::query::plane::least;
 use crate::query::search::Search;
@@ -36,7 +37,7 @@ impl FacingPlane {
         }
         let normal = across / length;
         let end = normal.dot(search.tool.axis_span());
-        let foremost = if end > 0.0 { end } else { 0.0 };
+        let foremost = larger(0.0, end);
         let within = sqrt(pair.distance_squared) - ACCURACY * search.scale;
         Self { start, normal, foremost, within }
     }
