@@ -90,6 +90,36 @@ fn contacts_do_not_depend_on_the_positions_error() {
     assert!(near > 200 && several > 30, "{near} contacts, {several} lists of several");
 }
 
+/// A search that a budget ends leaves the closest pair in the list, however uncertain the positions are.
+#[test]
+fn a_budget_leaves_the_closest_pair_of_uncertain_positions() {
+    let mesh = generate::heart(2_000).expect("a valid size").mesh;
+    let mut rng = Rng::with_seed(3);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("valid");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut list = Contacts::<32, 1024>::new();
+    let (mut cut, mut several) = (0, 0);
+    for _ in 0..sample(40_000) {
+        let from = rows[rng.usize(..rows.len())] + unit(&mut rng) * 6.0;
+        let tool = Capsule::new(from, from + unit(&mut rng) * 20.0, 1.5).expect("finite");
+        let error = 3.0 * rng.f32();
+        let options = Options::cold().budget(Budget::new(rng.u32(200..2_000)));
+        let closest = query.contacts(&Inexact(&rows, error), &tool, 4.0, &options, &mut list);
+        let closest = closest.expect("an answer");
+        if closest.side != Side::Outside || closest.separation > 4.0 {
+            continue;
+        }
+        let Some(first) = list.iter().next() else { continue };
+        let apart = 2.0 * (closest.accuracy - error);
+        assert!(first.separation <= closest.lower + apart, "{closest:?} {first:?}");
+        cut += usize::from(list.bound() < 4.0);
+        several += usize::from(list.len() > 1);
+    }
+    assert!(cut > 300 && several > 100, "{cut} lists cut short, {several} of several contacts");
+}
+
 /// A tool whose axis meets the surface has no side of its own, but the side of the tick before.
 #[test]
 fn contacts_of_a_tool_that_arrives_at_the_surface_stay_known() {
