@@ -263,7 +263,9 @@ impl Report {
             promise(self.silence.is_some(), "the silent line did not make it safe".to_owned());
             promise(recovered.is_some(), "it did not recover from the silence".to_owned());
         } else if let Some(bridge) = &self.bridge {
-            let bridged = Bridged { sent, events: &self.bus_events, totals: bridge };
+            let received = outcome.network.as_ref().map_or(0, |network| network.packets);
+            let (ticks, events) = (self.ticks, &self.bus_events);
+            let bridged = Bridged { sent, received, ticks, events, totals: bridge };
             bridged.broken().into_iter().for_each(|sentence| promise(false, sentence));
         } else {
             promise(rejected == 0, format!("{rejected} packets or frames were rejected"));

@@ -8,25 +8,35 @@ use dibs_nostd::wire::Event;
 use dibs_prove::demo::bridged::Bridged;
 use serde_json::json;
 
-/// Sentences about 100 frames of 10 packets, of which these events were counted besides 90 published ones.
-fn broken(events: &[(Event, u32)]) -> Vec<String> {
+/// Sentences about frames of 10 packets, of which these events were counted besides 90 published ones and 20 heartbeats.
+fn broken_of(sent: u32, received: u32, events: &[(Event, u32)]) -> Vec<String> {
     let mut counted: BTreeMap<&'static str, u32> =
         events.iter().map(|(event, count)| (event.name(), *count)).collect();
     counted.insert(Event::Published.name(), 90);
-    let totals = json!({ "frames": 100, "packets": 1_000 });
-    Bridged { sent: 100, events: &counted, totals: &totals }.broken()
+    counted.insert(Event::Heartbeat.name(), 20);
+    let totals = json!({ "frames": sent, "packets": 10 * sent + 22 });
+    let events = &counted;
+    Bridged { sent, received, ticks: 1_600, events, totals: &totals }.broken()
+}
+
+/// All of 100 frames arrived.
+fn broken(events: &[(Event, u32)]) -> Vec<String> {
+    broken_of(100, 1_020, events)
+}
+
+fn assert_says(found: &[String], sentence: &str) {
+    assert!(matches!(found, [one] if one.contains(sentence)), "{found:?}");
 }
 
 #[test]
 fn every_frame_is_published_or_refused_once() {
     use Event::{Abandoned, Busy, Damaged, Stale, TooFast, Unexpected};
     let good: [&[(Event, u32)]; 5] = [
-        // Three end as too fast at their second packet, and the last is on its way.
-        &[(Busy, 7), (TooFast, 3), (Unexpected, 63 + 3 * 8 + 9)],
+        // Three end as too fast at their second packet, and the last is in its check.
+        &[(Busy, 6), (TooFast, 3), (Unexpected, 54 + 3 * 8)],
         &[(Busy, 6), (Stale, 2), (TooFast, 2), (Unexpected, 72)],
-        // The last one is on its way, refused or not.
         &[(Busy, 9), (Unexpected, 81)],
-        &[(Busy, 10), (Unexpected, 84)],
+        &[(Busy, 10), (Unexpected, 90)],
         &[(Busy, 8), (Abandoned, 2), (Unexpected, 72)],
     ];
     for events in good {
@@ -41,7 +51,24 @@ fn every_frame_is_published_or_refused_once() {
         (&[(Busy, 10), (Unexpected, 90), (Damaged, 1)], "1 rejections of another cause"),
     ];
     for (events, sentence) in wrong {
-        let found = broken(events);
-        assert!(matches!(&found[..], [one] if one.contains(sentence)), "{found:?}");
+        assert_says(&broken(events), sentence);
     }
+}
+
+/// A run may end with frames on their way. None of those that arrived may be missing for it.
+#[test]
+fn frames_are_missing_with_their_packets_only() {
+    use Event::{Busy, Unexpected};
+    let refused = [(Busy, 10), (Unexpected, 90)];
+    // The last packet of the hundredth frame, or its first: it was refused, or is incomplete.
+    for (received, events) in
+        [(1_019, refused), (1_011, refused), (1_011, [(Busy, 9), (Unexpected, 81)])]
+    {
+        assert_eq!(broken_of(102, received, &events), Vec::<String>::new(), "{received}");
+    }
+    assert_says(&broken_of(102, 1_031, &refused), "of 102 frames that arrived");
+    assert_says(&broken_of(102, 1_010, &refused), "of 99 frames that arrived");
+    // 7 of 107 frames in 1,600 ticks wait for 105 ms, 9 of 109 for 132 ms.
+    assert_eq!(broken_of(107, 1_020, &refused), Vec::<String>::new());
+    assert_says(&broken_of(109, 1_020, &refused), "9 of 109 frames did not arrive");
 }
