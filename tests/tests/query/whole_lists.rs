@@ -120,6 +120,45 @@ fn a_budget_leaves_the_closest_pair_of_uncertain_positions() {
     assert!(cut > 300 && several > 100, "{cut} lists cut short, {several} of several contacts");
 }
 
+/// The tracker's pair is less exact than a query's. Its list is not: it parts the same valleys.
+#[test]
+fn a_tracked_list_has_the_contacts_of_a_query() {
+    let mesh = generate::heart(10_272).expect("a valid size").mesh;
+    let mut rng = Rng::with_seed(11);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut odometer = Odometer::new(&tree);
+    let mut lists = [const { Contacts::<32, 1024>::new() }; 2];
+    let (mut several, mut outside) = (0, 0);
+    for _ in 0..sample(200_000) {
+        let from = rows[rng.usize(..rows.len())] + unit(&mut rng) * 6.0;
+        let tool = Capsule::new(from, from + unit(&mut rng) * 60.0, 2.5).expect("finite");
+        let [own, tracked] = &mut lists;
+        let options = Options::cold();
+        let closest = query.contacts(rows.as_slice(), &tool, 8.0, &options, own);
+        let side = closest.expect("an answer").side;
+        if own.len() < 2 {
+            continue;
+        }
+        let mut tracker = Tracked::new(&tree).expect("deep enough");
+        let surface = odometer.start(rows.as_slice());
+        tracker.contacts(&surface, &tool, 8.0, &options, tracked).expect("an answer");
+        let bound = own.bound().min(tracked.bound());
+        let [own, tracked] = lists.each_ref().map(|list| {
+            // An axis that crosses has several closest pairs, and where it nearly does, either may call it so.
+            let is_apart = |at: &&Contact| -2.49 < at.separation && at.separation < bound;
+            let place = |at: &Contact| (at.triangle, at.separation, at.normal);
+            list.iter().filter(is_apart).map(place).collect::<Vec<_>>()
+        });
+        assert_eq!(own, tracked, "{side:?}");
+        several += 1;
+        outside += usize::from(side == Side::Outside);
+    }
+    assert!(several > 2_000 && outside > 200, "{several} lists of several, {outside} outside");
+}
+
 /// A tool whose axis meets the surface has no side of its own, but the side of the tick before.
 #[test]
 fn contacts_of_a_tool_that_arrives_at_the_surface_stay_known() {

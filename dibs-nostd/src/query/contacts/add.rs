@@ -11,7 +11,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
 use crate::query::made::Tests;
 use crate::query::prices::LIST;
-use crate::query::search::Waiting;
+use crate::query::search::{Search, Waiting};
 use crate::query::side::{self, OnAxis, Side};
 use crate::query::{NoSide, Options, Proximity};
 use crate::tool::AxisPair;
@@ -83,10 +83,9 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         options: &Options,
         find: impl FnOnce(
             &mut Basins<NEAR>,
-            &mut [Waiting],
+            Search<'_, '_, I, V, T>,
             &Options,
-            f32,
-            f32,
+            (f32, f32),
         ) -> Result<SearchExtent, QueryError>,
     ) -> Result<Tests, QueryError> {
         let Self { found, basins } = self;
@@ -95,7 +94,6 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if closest.accuracy > found.accuracy {
             found.accuracy = closest.accuracy;
         }
-        let accuracy = pair.search_accuracy();
         let is_side_searched = closest.side != Side::Undefined(NoSide::CutShort);
         found.has_no_side |= may_be_inside(closest);
         let is_of = |row| options.part.is_none() || tree.label(row) == options.part;
@@ -114,10 +112,22 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             return Ok(spent);
         }
         let options = &options.after(spent);
-        let ridge = (margin * RIDGE) + 2.0 * accuracy;
-        let limit = tool.radius() + margin + ridge;
-        let SearchExtent { complete, beyond, tests: mut made } =
-            find(basins, stack, options, limit, ridge)?;
+        let is_begun = options.covers(LIST);
+        let accuracy = pair.search_accuracy();
+        // How triangles lie to each other depends on the error of their distances only: a tracker's pair is less exact.
+        let mut error = accuracy;
+        let extent = |error: f32| {
+            let ridge = (margin * RIDGE) + 2.0 * error;
+            (tool.radius() + margin + ridge, ridge)
+        };
+        let SearchExtent { complete, beyond, tests: mut made } = if is_begun {
+            let search = pair.over_range(stack, options)?;
+            error = search.accuracy();
+            find(basins, search, options, extent(error))?
+        } else {
+            SearchExtent::NOT_BEGUN
+        };
+        let (limit, ridge) = extent(error);
         let is_crossing = matches!(closest.side, Side::Crossing | Side::Either);
         let has_crossing = is_crossing && own.is_some();
         if let Some(contact) = own.filter(|_| is_crossing) {
@@ -128,14 +138,14 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let mut tester = TriangleTester {
             pair,
             limit: limit_above,
-            accuracy,
+            accuracy: error,
             left,
             made: Tests::NONE,
             is_priced,
         };
         let (mut least, mut meets) = (f32::INFINITY, 0_u32);
         let is_left_out = |row| !is_of(TriangleRow(row));
-        let ridges = (0.5 * RIDGE * margin, 2.0 * accuracy);
+        let ridges = (0.5 * RIDGE * margin, 2.0 * error);
         let visit = |near: NearTriangle| {
             let is_on = sqrt(near.square) <= accuracy;
             meets += u32::from(is_on);
@@ -161,7 +171,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             Ok(())
         };
         // A search that was not begun has left an earlier one's triangles.
-        let missing = if options.covers(LIST) {
+        let missing = if is_begun {
             basins.each_valley(tree, ridges, is_left_out, &mut tester, visit)?
         } else {
             None

@@ -7,7 +7,6 @@ use crate::math::sqrt::sqrt;
 use crate::query::Options;
 use crate::query::made::Tests;
 use crate::query::memory::range::RangeFrontMut;
-use crate::query::prices::LIST;
 use crate::query::search::{Search, Waiting};
 use crate::tool::AxisPair;
 use crate::tree::RootSet;
@@ -23,9 +22,10 @@ pub(super) struct SearchExtent {
     pub tests: Tests,
 }
 
-/// The result of a search that a tick's budget does not cover: nothing was visited.
-const NOT_BEGUN: SearchExtent =
-    SearchExtent { complete: f32::INFINITY, beyond: 0.0, tests: Tests::NONE };
+impl SearchExtent {
+    /// That of a search that a tick's budget does not cover: nothing was visited.
+    pub const NOT_BEGUN: Self = Self { complete: f32::INFINITY, beyond: 0.0, tests: Tests::NONE };
+}
 
 impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// Adds the contacts of a pair. Returns the tests made.
@@ -35,12 +35,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         stack: &mut [Waiting],
         options: &Options,
     ) -> Result<Tests, QueryError> {
-        self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
-            if !options.covers(LIST) {
-                return Ok(NOT_BEGUN);
-            }
-            let mut low = Low::new(basins, limit, pair);
-            let search = over_range(pair, stack, options)?;
+        self.add_from(pair, stack, options, |basins, search, options, (limit, ridge)| {
+            let mut low = Low::new(basins, limit, search.accuracy());
             let visit = |row, at: &AxisPair| low.add(row, at);
             let (beyond, tests) = search.each_low(limit, (ridge, options), visit)?;
             Ok(SearchExtent { complete: low.complete, beyond, tests })
@@ -57,13 +53,9 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     ) -> Result<Tests, QueryError> {
         let mut is_begun = false;
         let made =
-            self.add_from(pair, stack, options, |basins, stack, options, limit, ridge| {
-                if !options.covers(LIST) {
-                    return Ok(NOT_BEGUN);
-                }
+            self.add_from(pair, stack, options, |basins, search, options, (limit, ridge)| {
                 is_begun = true;
-                let mut low = Low::new(basins, limit, pair);
-                let search = over_range(pair, stack, options)?;
+                let mut low = Low::new(basins, limit, search.accuracy());
                 let visit = |row, at: &AxisPair| low.add(row, at);
                 let (beyond, tests) =
                     search.each_low_from(&mut front, limit, (ridge, options), visit)?;
@@ -78,15 +70,18 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     }
 }
 
-/// The search of a pair's contacts.
-#[inline(always)]
-fn over_range<'s, I: Index, V: VertexTable + ?Sized, T: Tool>(
-    &Pair { tree, vertices, tool, .. }: &Pair<'s, I, V, T>,
-    stack: &'s mut [Waiting],
-    options: &Options,
-) -> Result<Search<'s, 's, I, V, T>, QueryError> {
-    let search = Search::start(RootSet::ALL, tree, stack, vertices, tool, options, None, None)?;
-    Ok(search.over_range(options))
+impl<'s, I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'s, I, V, T> {
+    /// The search of this pair's contacts.
+    #[inline(always)]
+    pub(super) fn over_range(
+        &self,
+        stack: &'s mut [Waiting],
+        options: &Options,
+    ) -> Result<Search<'s, 's, I, V, T>, QueryError> {
+        let &Self { tree, vertices, tool, .. } = self;
+        let search = Search::start(RootSet::ALL, tree, stack, vertices, tool, options, None, None)?;
+        Ok(search.over_range(options))
+    }
 }
 
 /// The low triangles, as they are found.
@@ -94,18 +89,13 @@ struct Low<'b, const NEAR: usize> {
     basins: &'b mut Basins<NEAR>,
     /// All closer triangles are collected.
     complete: f32,
-    /// That of distances from the given positions: their error does not change how the triangles lie to each other.
     accuracy: f32,
 }
 
 impl<'b, const NEAR: usize> Low<'b, NEAR> {
-    fn new<I, V: VertexTable + ?Sized, T>(
-        basins: &'b mut Basins<NEAR>,
-        limit: f32,
-        pair: &Pair<'_, I, V, T>,
-    ) -> Self {
+    fn new(basins: &'b mut Basins<NEAR>, limit: f32, accuracy: f32) -> Self {
         basins.clear();
-        Self { basins, complete: limit, accuracy: pair.search_accuracy() }
+        Self { basins, complete: limit, accuracy }
     }
 
     /// Collects a triangle. Returns the distance beyond which there is no room for more.

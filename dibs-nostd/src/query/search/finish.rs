@@ -14,7 +14,7 @@ use crate::{Coverage, Index, QueryError, Tool, TriangleRow, VertexTable};
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// The error (mm) of a distance, without that of the table's positions.
     #[inline(always)]
-    pub(super) fn accuracy(&self) -> f32 {
+    pub fn accuracy(&self) -> f32 {
         ACCURACY * self.scale + FLOOR + self.tree.position_error()
     }
 
