@@ -66,7 +66,10 @@ fn frames_are_missing_with_their_packets_only() {
     {
         assert_eq!(broken_of(102, received, &events), Vec::<String>::new(), "{received}");
     }
-    assert_says(&broken_of(102, 1_031, &refused), "of 102 frames that arrived");
+    // A heartbeat that the board has not counted yet.
+    assert_eq!(broken_of(102, 1_021, &refused), Vec::<String>::new());
+    assert_eq!(broken_of(102, 1_021, &[(Busy, 9), (Unexpected, 81)]), Vec::<String>::new());
+    assert_says(&broken_of(102, 1_032, &refused), "of 102 frames that arrived");
     assert_says(&broken_of(102, 1_010, &refused), "of 99 frames that arrived");
     // 7 of 107 frames in 1,600 ticks wait for 105 ms, 9 of 109 for 132 ms.
     assert_eq!(broken_of(107, 1_020, &refused), Vec::<String>::new());
