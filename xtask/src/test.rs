@@ -1,4 +1,4 @@
-//! `cargo xtask test`: everything that CI runs.
+//! `cargo xtask test`: what CI runs, but for mutants and advisories.
 
 // Requirement: E-04
 
@@ -47,7 +47,9 @@ pub enum Job {
     Docs,
     /// Builds for the board and for WebAssembly.
     Board,
-    /// The checks of every promise: emulated boards, bindings, demo, sanitizers.
+    /// C on this computer and on the board, and Python.
+    Bindings,
+    /// The checks of every promise: emulated boards, demo, sanitizers.
     Promises,
 }
 
@@ -59,14 +61,20 @@ pub fn test(options: &Options) -> Result<()> {
     if is_due(Job::Lints) {
         lints(&mut steps, is_whole);
     }
-    if is_due(Job::Host) || is_due(Job::Promises) {
+    let has_checks = is_due(Job::Bindings) || is_due(Job::Promises);
+    if is_due(Job::Host) || has_checks {
         steps.run("build", || workspace::build().map(|()| Outcome::Passed));
     }
     // Found first, because otherwise all threads would install them.
-    let found = (is_due(Job::Board) || is_due(Job::Promises))
+    let found = (is_due(Job::Board) || has_checks)
         .then(|| Cross::find().and_then(|cross| qemu::find().map(|_| cross)));
     // Threads, because tests, builds and emulators each leave a core idle at times.
-    let checks = is_due(Job::Promises).then(|| thread::spawn(move || checks(seconds, is_whole)));
+    let part = match options.job {
+        Some(Job::Bindings) => &["--part", "bindings"][..],
+        Some(_) => &["--part", "others"],
+        None => &[],
+    };
+    let checks = has_checks.then(|| thread::spawn(move || checks(seconds, is_whole, part)));
     let board = found
         .filter(|_| is_due(Job::Board))
         .map(|found| thread::spawn(move || board(found, is_whole)));
@@ -77,6 +85,10 @@ pub fn test(options: &Options) -> Result<()> {
         let variables = if is_whole { &variables[..] } else { &variables[..1] };
         steps.cargo("tests", &[&tests, bench_too(is_whole)].concat(), variables);
         steps.run("files of other programs", other_programs);
+    }
+    // Without a job they are among the tests.
+    if options.job == Some(Job::Bindings) {
+        steps.cargo("C interface", &["test", "--release", "-p", "dibs-c"], &[workspace::IS_BUILT]);
     }
     if is_due(Job::Docs) {
         documents(&mut steps);
@@ -159,12 +171,13 @@ fn board(found: Result<Cross>, is_whole: bool) -> Steps {
 }
 
 /// Runs the checks of `tests/prove`. Returns the file with the list of its steps.
-fn checks(demo_seconds: u32, is_whole: bool) -> Result<PathBuf> {
+fn checks(demo_seconds: u32, is_whole: bool, part: &[&str]) -> Result<PathBuf> {
     let list = workspace::target().join("steps.txt");
     // A list of an earlier run must not be mistaken for this run's.
     std::fs::write(&list, "")?;
     let mut prove = prove::with_workspace()?;
     prove.args(["test", "--demo-seconds", &demo_seconds.to_string(), "--steps"]).arg(&list);
+    prove.args(part);
     if is_whole {
         prove.arg("--whole");
     }
@@ -228,9 +241,18 @@ fn core_crate(cross: &Cross) -> Result<Outcome> {
         check
     };
     run(check().args(["--features", "defmt,embedded-can,embedded-io,mint,serde"]))?;
-    for layer in
-        ["", "wide", "bus", "control", "modes", "control,bus", "control,modes", "bus,modes"]
-    {
+    for layer in [
+        "",
+        "wide",
+        "bus",
+        "control",
+        "modes",
+        "nodes",
+        "control,bus",
+        "control,modes",
+        "bus,modes",
+        "bus,nodes",
+    ] {
         run(check().args(["--no-default-features", "--features", layer]))
             .with_context(|| format!("dibs-nostd with only the layers \"{layer}\""))?;
     }

@@ -43,6 +43,9 @@ enum Task {
         /// Where to list the steps.
         #[arg(long)]
         steps: PathBuf,
+        /// Only these checks; by default all.
+        #[arg(long)]
+        part: Option<harness::Part>,
     },
     /// Runs the checks of the second lane, for another process.
     #[command(hide = true)]
@@ -67,12 +70,15 @@ fn main() -> ExitCode {
                 println!("skipped: {reason}");
             }
         }),
-        Task::Test { demo_seconds, whole, steps: file } => {
+        Task::Test { demo_seconds, whole, steps: file, part } => {
             let mut steps = Steps::default();
             let effort = Effort { demo_seconds, is_whole: whole, ..Effort::TEST };
-            harness::test(&effort, &mut steps);
-            steps.run("processors", processors::check);
-            if whole {
+            harness::test(&effort, part, &mut steps);
+            let has_others = part != Some(harness::Part::Bindings);
+            if has_others {
+                steps.run("processors", processors::check);
+            }
+            if whole && has_others {
                 steps.run("mutants of changed lines", mutants::sample);
             }
             steps.write(&file)

@@ -146,6 +146,9 @@ pub const BESIDE: [&str; 16] = [
     python::CHECK.name,
 ];
 
+/// Checks of the interfaces for other languages.
+pub const BINDINGS: [&str; 2] = [demo_c::CHECK.name, python::CHECK.name];
+
 /// Checks that build no program and boot none: in `cargo xtask evidence` they run in the lane that is idle first.
 pub const EITHER: [&str; 6] = [
     anytime::CHECK.name,

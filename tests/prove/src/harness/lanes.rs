@@ -43,13 +43,15 @@ pub struct Beside {
 }
 
 impl Beside {
-    pub fn start(effort: &Effort) -> Result<Self> {
+    pub fn start(effort: &Effort, left_out: &[&str]) -> Result<Self> {
         let folder = workspace::target().join("beside");
         // Removed, so that no file of an earlier run is mistaken for this one's.
         if folder.exists() {
             fs::remove_dir_all(&folder)?;
         }
-        let mut command = command(&env::current_exe()?, &folder, effort, &BESIDE)?;
+        let wanted: Vec<&str> =
+            BESIDE.into_iter().filter(|name| !left_out.contains(name)).collect();
+        let mut command = command(&env::current_exe()?, &folder, effort, &wanted)?;
         let log = File::create(folder.join(LOG))?;
         command.stdout(log.try_clone()?).stderr(log);
         Ok(Self { process: command.spawn()?, folder })

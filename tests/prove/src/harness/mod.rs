@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use anyhow::{Result, ensure};
 use xtask::steps::{Outcome, Steps};
 
-use crate::checks::{BESIDE, CHECKS, ON_REQUEST};
+use crate::checks::{BESIDE, BINDINGS, CHECKS, ON_REQUEST};
 use crate::evidence::pages;
 pub use effort::Effort;
 use figures::Figures;
@@ -119,11 +119,26 @@ fn resume(effort: &Effort, raise: Raise<'_>) -> Result<()> {
 }
 
 /// Runs the checks as steps of `cargo xtask test`, and compares their figures with the committed ones.
-pub fn test(effort: &Effort, steps: &mut Steps) {
-    let measured = run(effort, None, steps);
+pub fn test(effort: &Effort, part: Option<Part>, steps: &mut Steps) {
+    if part == Some(Part::Bindings) {
+        let mut measured = Measured::new(Run::now(effort.size()));
+        measured.run_each(effort, |name| BINDINGS.contains(&name), steps);
+        return;
+    }
+    let left_out = if part.is_some() { &BINDINGS[..] } else { &[] };
+    let measured = run_all(effort, left_out, steps);
     steps.run("figures within their bounds", || {
         record::compare(&measured).map(|()| Outcome::Passed)
     });
+}
+
+/// A part of the checks, whose job of CI fails apart.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Part {
+    /// C and Python.
+    Bindings,
+    /// All others.
+    Others,
 }
 
 /// The figures of a run, and the checks that could not run.
@@ -161,15 +176,21 @@ impl Measured {
 
 /// Runs the checks: all, in two lanes, or those whose names contain `only`.
 fn run(effort: &Effort, only: Option<&str>, steps: &mut Steps) -> Measured {
+    let Some(only) = only else { return run_all(effort, &[], steps) };
+    // Naming a check requests it.
+    let effort = &Effort { is_whole: true, ..*effort };
     let mut measured = Measured::new(Run::now(effort.size()));
-    if let Some(only) = only {
-        // Naming a check requests it.
-        let effort = &Effort { is_whole: true, ..*effort };
-        measured.run_each(effort, |name| name.contains(only), steps);
-        return measured;
-    }
-    let beside = Beside::start(effort);
-    measured.run_each(effort, |name| !BESIDE.contains(&name), steps);
+    measured.run_each(effort, |name| name.contains(only), steps);
+    measured
+}
+
+/// Runs all checks but those left out, in two lanes.
+fn run_all(effort: &Effort, left_out: &[&'static str], steps: &mut Steps) -> Measured {
+    let mut measured = Measured::new(Run::now(effort.size()));
+    measured.skipped.extend(left_out);
+    let is_wanted = |name: &str| !left_out.contains(&name);
+    let beside = Beside::start(effort, left_out);
+    measured.run_each(effort, |name| is_wanted(name) && !BESIDE.contains(&name), steps);
     if let Err(error) = beside.and_then(|beside| beside.join(&mut measured, steps)) {
         steps.run("the checks beside", || Err(error));
     }
