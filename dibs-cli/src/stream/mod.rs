@@ -118,7 +118,7 @@ pub struct Args {
     /// Send 6 bytes a vertex instead of 12, quantised in a box around each frame
     #[arg(long)]
     quantise: bool,
-    /// Send only the vertices that moved by more than this (in the mesh's unit)
+    /// Send only the vertices that moved by more than this (mm)
     #[arg(long, value_name = "TOLERANCE")]
     partial: Option<f32>,
     /// Send the weights of the displacement modes that the tree was built with, instead of positions

@@ -56,9 +56,12 @@ fn read(path: &Path) -> Result<String> {
 /// Makes the page in the checkout that contains this program. It appears completely or not at all.
 fn make(program: &Path, page: &Path) -> Result<()> {
     let name = page.display();
-    // Neither the current folder nor any folder above this program's may decide which program is run.
+    // Neither the current folder nor any folder above this program's may decide which program is run: only the
+    // checkout in which it was compiled.
     let is_own = |folder: &&Path| is_checkout(folder) && program.starts_with(folder.join("target"));
-    let Some(root) = program.ancestors().find(is_own) else {
+    let compiled = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
+    let compiled = compiled.filter(|folder| is_checkout(folder));
+    let Some(root) = program.ancestors().find(is_own).or(compiled) else {
         bail!(
             "{name} is missing; `{MAKER}` in a checkout of the repository writes {PAGE}: put it there, or give it with --page"
         );

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use dibs_build::glam::Vec3;
 use dibs_build::{Mesh, Motion};
-use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
+use dibs_nostd::modes::{ModalAdmissionCheck, ModalReader, Modes};
 use dibs_nostd::{Advance, Assembler, Frames, Millis, Tree, VertexTable};
 use serde_json::Value;
 
@@ -76,8 +76,8 @@ fn weights_are_streamed() {
     let modes = Modes::of(&tree).unwrap();
     let frames: &'static Frames<MODES> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
-    let gate = ModalGate::<_, MODES>::new(&modes, &tree).unwrap();
-    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 1e4);
+    let admission_check = ModalAdmissionCheck::<_, MODES>::new(&modes, &tree).unwrap();
+    let mut assembler = Assembler::new(writer, admission_check, tree.mesh_id(), 1e4);
     let mut reader = ModalReader::<MODES>::new(reader, &modes).unwrap();
     let motion = Motion::read_pc2(folder.join("heart.pc2")).unwrap();
     let (mut buffer, mut published) = ([0; 2048], 0);

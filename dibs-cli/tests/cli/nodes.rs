@@ -370,8 +370,8 @@ fn nodes_are_streamed() {
     let nodes = Nodes::of(&tree).unwrap();
     let frames: &'static Frames<NODES> = Box::leak(Box::new(Frames::new()));
     let (writer, mut reader) = frames.split().unwrap();
-    let gate = NodeMonitor::new(&nodes).limits(SurfaceLimits::reach_mm(500.0));
-    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 500.0);
+    let admission_check = NodeMonitor::new(&nodes).limits(SurfaceLimits::reach_mm(500.0));
+    let mut assembler = Assembler::new(writer, admission_check, tree.mesh_id(), 500.0);
     let (mut published, mut packet) = (0, [0; 2048]);
     while let Ok(length) = socket.recv(&mut packet) {
         let _ = assembler.accept(&packet[..length], Millis(0));

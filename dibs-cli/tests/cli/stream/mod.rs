@@ -418,7 +418,7 @@ fn a_receiver_that_acknowledges_nothing_is_named() {
     let mut link = Bytes::new(socket);
     let frames = Frames::<N>::new();
     let (writer, _reader) = frames.split().unwrap();
-    let mut deaf = Assembler::new(writer, dibs_nostd::NoGate, mesh, 1e4);
+    let mut deaf = Assembler::new(writer, dibs_nostd::NoAdmissionCheck, mesh, 1e4);
     let mut child = child;
     let start = Instant::now();
     while child.try_wait().unwrap().is_none() {

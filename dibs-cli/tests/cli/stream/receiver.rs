@@ -1,5 +1,5 @@
-//! A receiver with a gate: packets from a socket go through the assembler, and published positions are compared with the
-//! motion's.
+//! A receiver with an admission check: packets from a socket go through the assembler, and published positions are
+//! compared with the motion's.
 
 use std::io::{Read, Write};
 use std::net::UdpSocket;
