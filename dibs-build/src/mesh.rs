@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 
 /// A triangle mesh: fixed connectivity, and the positions of one frame.
 ///
-/// Coordinates are in the mesh's own unit (mm in the examples), and f32 as on the controller: geodesics computed on
+/// Coordinates are in millimetres, and f32 as on the controller: geodesics computed on
 /// more precise coordinates would not bound the controller's distances.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
@@ -37,7 +37,7 @@ pub trait RestSurface {
     /// Its positions and triangles.
     fn mesh(&self) -> &Mesh;
 
-    /// Largest error of a vertex position (in the mesh's unit, not negative).
+    /// Largest error of a vertex position (mm, not negative).
     fn position_error(&self) -> f32;
 
     /// The unit of its file, whose lengths were converted to millimetres; `None` if it has no file.

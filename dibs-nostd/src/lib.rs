@@ -22,7 +22,7 @@
 //! | the force | [`constraint`] | control interrupt |
 //! | or the motion that a command may make | [`filter`] | control interrupt |
 //!
-//! Lengths are in the mesh's own unit, mm in the examples. Trees come from the crate `dibs-build`.
+//! Lengths are in millimetres: the builder converts a mesh's. Trees come from the crate `dibs-build`.
 //!
 //! ```
 //! use dibs_build::{Builder, generate};
@@ -102,8 +102,8 @@ pub use receive::{Advance, Assembler, BusHealth, LastHeartbeat, Progress, Receiv
 #[doc(hidden)]
 pub use stretch::Comparison;
 pub use stretch::{
-    Admission, FrameExtent, Gate, IncomingSurface, NoGate, StretchError, StretchMonitor,
-    SurfaceLimits, measure_stretch,
+    Admission, AdmissionCheck, FrameExtent, IncomingSurface, NoAdmissionCheck, StretchError,
+    StretchMonitor, SurfaceLimits, measure_stretch,
 };
 #[doc(hidden)]
 pub use surface::REGIONS;

@@ -5,7 +5,7 @@
 //!
 //! - A stamp up to [`AHEAD`] in the future has age 0: the core that wrote it may have read its clock a little later. A
 //!   stamp up to half the clock's range ahead has an age of at least 2^31, beyond any limit of a
-//!   [`Watch`](crate::failsafe::Watch). So a flipped bit does not keep an old surface valid.
+//!   [`ThresholdPair`](crate::failsafe::ThresholdPair). So a flipped bit does not keep an old surface valid.
 //! - A stamp never grows younger: when the clock wraps around, its age stays [`Millis::MAX`]. This requires reading its
 //!   age at least once in 2^31 ms.
 

@@ -38,7 +38,7 @@ pub use control::{
 pub use fingerprint::fingerprint;
 pub use hand::Hand;
 pub use instrument::instrument;
-pub use pushed::{ACCOUNT, Pushed};
+pub use pushed::{ACCOUNT, PushedRobot};
 pub use receiver::{MTU, Receiver, STATUS_FRAMED, STATUS_MTU};
 pub use robot::{Either, Robot, Script};
 pub use status::BusStatus;

@@ -35,7 +35,7 @@ const ARM: f32 = 1.0;
 const ANGLE: f32 = 2.4;
 
 /// The instrument and the hand.
-pub struct Pushed {
+pub struct PushedRobot {
     hand: Hand,
     /// Vector from the tip to the other end (mm).
     shaft: Vec3,
@@ -49,7 +49,7 @@ pub struct Pushed {
     record: Push,
 }
 
-impl Pushed {
+impl PushedRobot {
     /// The instrument outside the surface, in a hand that waits for the surface.
     #[must_use]
     #[expect(clippy::new_without_default, reason = "there is no usual robot")]
@@ -101,7 +101,7 @@ fn place(number: u32) -> Vec3 {
     CENTRE + Vec3::new(0.9 * libm::cosf(angle), 0.9 * libm::sinf(angle), 1.2) * REACH
 }
 
-impl Robot for Pushed {
+impl Robot for PushedRobot {
     fn instrument(&self, _: u32) -> Result<Capsule, ToolError> {
         Capsule::new(self.hand.at, self.hand.at + self.shaft, RADIUS)
     }

@@ -8,7 +8,7 @@ use dibs_nostd::guard::Answer;
 use dibs_nostd::{Capsule, ToolError};
 
 use crate::instrument;
-use crate::pushed::Pushed;
+use crate::pushed::PushedRobot;
 use crate::telemetry::Push;
 
 /// An instrument's robot. To use your own, read the encoders and write to the drives here.
@@ -60,14 +60,14 @@ pub enum Either {
     /// The script.
     Script(Script),
     /// The hand.
-    Pushed(Pushed),
+    Pushed(PushedRobot),
 }
 
 impl Either {
     /// The script, or an instrument that a simulated hand pushes.
     #[must_use]
     pub fn new(is_pushed: bool) -> Self {
-        if is_pushed { Self::Pushed(Pushed::new()) } else { Self::Script(Script) }
+        if is_pushed { Self::Pushed(PushedRobot::new()) } else { Self::Script(Script) }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Limits of the trust in a surface, which depend on its bus.
 
 use dibs_nostd::Millis;
-use dibs_nostd::failsafe::{LimitError, Limits, Watch};
+use dibs_nostd::failsafe::{LimitError, Limits, ThresholdPair};
 
 use crate::TICK_RATE;
 
@@ -73,17 +73,17 @@ impl Trust {
         }
         macro_rules! watch {
             ($pair:expr) => {
-                tri!(Watch::new(Millis($pair.0), Millis($pair.1)))
+                tri!(ThresholdPair::new(Millis($pair.0), Millis($pair.1)))
             };
         }
         let limits = tri!(Limits::new(watch!(self.age), self.tissue_speed));
         let limits = tri!(limits.recovery(RECOVERY_FRAMES)).silence(watch!(self.silence));
         let limits = limits
             .heartbeat(watch!(self.heartbeat))
-            .rejections(tri!(Watch::count(REJECTIONS.0, REJECTIONS.1)));
+            .rejections(tri!(ThresholdPair::count(REJECTIONS.0, REJECTIONS.1)));
         let limits = limits.transit(watch!(self.transit));
         let limits = tri!(limits.source_age(watch!(self.source_age)));
-        let forgeries = tri!(Watch::count(FORGERIES.0, FORGERIES.1));
+        let forgeries = tri!(ThresholdPair::count(FORGERIES.0, FORGERIES.1));
         Ok(tri!(limits.forgeries(forgeries)).dwell(DWELL).automatic())
     }
 }

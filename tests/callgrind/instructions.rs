@@ -9,8 +9,8 @@ use std::hint::black_box;
 use dibs_nostd::constraint::{ForbiddenRegion, GainError, SpringDamper};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{
-    Assembler, Budget, Capsule, Frames, Millis, NoGate, Options, Proximity, QuantisedVertices,
-    Query, Scrub, Sphere, Tool, Tree, Unavailable, VertexTable, measure_stretch,
+    Assembler, Budget, Capsule, Frames, Millis, NoAdmissionCheck, Options, Proximity,
+    QuantisedVertices, Query, Scrub, Sphere, Tool, Tree, Unavailable, VertexTable, measure_stretch,
 };
 use dibs_tests::bus::{MESH, N, frame};
 use gungraun::prelude::*;
@@ -127,12 +127,12 @@ fn stretch_of_a_thousand_triangles(scene: Scene) -> f32 {
 }
 
 /// A bus, and the packets of two frames.
-type Bus = (Assembler<'static, NoGate>, Vec<Vec<u8>>);
+type Bus = (Assembler<'static, NoAdmissionCheck>, Vec<Vec<u8>>);
 
 fn bus(quantised: bool) -> Bus {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
     let (writer, _reader) = frames.split().expect("split once");
-    (Assembler::new(writer, NoGate, MESH, 100.0), frame(1, quantised))
+    (Assembler::new(writer, NoAdmissionCheck, MESH, 100.0), frame(1, quantised))
 }
 
 #[library_benchmark]

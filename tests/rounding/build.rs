@@ -12,8 +12,9 @@ use syn::visit_mut::{self, VisitMut};
 use syn::{Expr, ImplItem, ImplItemFn, Item, ItemConst, Lit, Type, Visibility, parse_quote};
 
 /// A shipped file, and its constants.
-const CONSTANTS: [(&str, &[&str]); 3] = [
-    ("query/search/slack.rs", &["U", "BOUND", "PLANE", "DOT", "COORDINATES", "FLOOR"]),
+const CONSTANTS: [(&str, &[&str]); 4] = [
+    ("math/round.rs", &["U"]),
+    ("query/search/slack.rs", &["BOUND", "PLANE", "DOT", "COORDINATES", "FLOOR"]),
     ("query/search/node.rs", &["CLOSEST", "RANGE", "AROUND"]),
     ("nodes/surface.rs", &["ROUNDING"]),
 ];

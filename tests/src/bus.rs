@@ -3,29 +3,32 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{CHECKSUM_BYTES, Encoding, FrameEncoder, FrameId, Mac, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, Gate, Millis, NoGate, ReceiveError, VertexTable,
+    AdmissionCheck, Advance, Assembler, FrameReader, Frames, Millis, NoAdmissionCheck,
+    ReceiveError, VertexTable,
 };
 
 /// Mesh id of the packets.
 pub const MESH: u32 = 0xD1B5_0001;
 /// Vertices of the surface.
 pub const N: usize = 40;
-/// An assembler without a gate, and the reader of its frames.
-pub type Bus = (Assembler<'static, NoGate>, FrameReader<'static>);
+/// An assembler without an admission check, and the reader of its frames.
+pub type Bus = (Assembler<'static, NoAdmissionCheck>, FrameReader<'static>);
 
-/// A new bus without a gate.
+/// A new bus without an admission check.
 pub fn bus() -> Bus {
-    bus_with(NoGate)
+    bus_with(NoAdmissionCheck)
 }
 
-/// A new bus with a gate.
+/// A new bus with an admission check.
 ///
 /// # Panics
 /// Never: the frames are new.
-pub fn bus_with<G: Gate>(gate: G) -> (Assembler<'static, G>, FrameReader<'static>) {
+pub fn bus_with<G: AdmissionCheck>(
+    admission_check: G,
+) -> (Assembler<'static, G>, FrameReader<'static>) {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::new(writer, gate, MESH, 100.0), reader)
+    (Assembler::new(writer, admission_check, MESH, 100.0), reader)
 }
 
 /// A surface that differs in every epoch.
@@ -90,7 +93,7 @@ pub fn frame(epoch: u32, quantised: bool) -> Vec<Vec<u8>> {
 ///
 /// # Errors
 /// The assembler's rejection.
-pub fn give<G: Gate, M: Mac>(
+pub fn give<G: AdmissionCheck, M: Mac>(
     assembler: &mut Assembler<'_, G, M>,
     packet: &[u8],
 ) -> Result<Option<u32>, ReceiveError> {
@@ -101,7 +104,7 @@ pub fn give<G: Gate, M: Mac>(
 ///
 /// # Errors
 /// The assembler's rejection.
-pub fn give_at<G: Gate, M: Mac>(
+pub fn give_at<G: AdmissionCheck, M: Mac>(
     assembler: &mut Assembler<'_, G, M>,
     packet: &[u8],
     now: u32,

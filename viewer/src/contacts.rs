@@ -12,7 +12,7 @@ const SPRING: SpringDamper = SpringDamper::stiffness(0.5).damping(0.001).max_for
 
 /// All contacts within the margin, and the force of all together.
 #[derive(Clone, Debug)]
-pub struct Touching {
+pub struct ContactMarks {
     /// Deepest first.
     pub contacts: Vec<Contact>,
     /// Every contact whose separation is below this is in the list.
@@ -79,7 +79,7 @@ impl VertexTable for Speeds<'_> {
     }
 }
 
-impl Touching {
+impl ContactMarks {
     /// The contacts found, and their force.
     pub fn new(found: &Found, margin: f32, velocity: Velocity) -> Self {
         let mut touching = Self {

@@ -12,8 +12,8 @@ mod page;
 mod session;
 mod spheres;
 
-pub use contacts::Touching;
+pub use contacts::ContactMarks;
 pub use error::SessionError;
 pub use instrument::Instrument;
-pub use motion::{Between, Motion};
+pub use motion::{Interpolation, Motion};
 pub use session::{Counts, Search, Session, Settings, open};

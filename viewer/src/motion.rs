@@ -10,7 +10,7 @@ use crate::SessionError;
 
 /// The surface between two frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Between {
+pub enum Interpolation {
     /// That of the last frame.
     Held,
     /// On its way from the frame before: late by a frame.

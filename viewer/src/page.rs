@@ -5,7 +5,7 @@ use dibs_nostd::{Contact, Coverage, Side};
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsError, throw_str};
 
-use crate::{Between, Search, Session};
+use crate::{Interpolation, Search, Session};
 
 /// A page's session.
 #[wasm_bindgen(js_name = Session)]
@@ -30,9 +30,9 @@ impl Page {
         let settings = self.session.settings();
         (settings.limit, settings.margin, settings.budget) = (limit, margin, budget);
         settings.between = match between {
-            0 => Between::Held,
-            1 => Between::Interpolated,
-            _ => Between::Extrapolated,
+            0 => Interpolation::Held,
+            1 => Interpolation::Interpolated,
+            _ => Interpolation::Extrapolated,
         };
         settings.search = match search {
             0 => Search::Tracker,

@@ -10,10 +10,10 @@ use dibs_nostd::{
     Query, Step, Tool, Tracker, Tree, TriangleRow, VertexTable, format,
 };
 
-use crate::contacts::{Found, Speeds, Touching, Velocity};
+use crate::contacts::{ContactMarks, Found, Speeds, Velocity};
 use crate::motion::{Frame, between, stretch_beyond};
 use crate::spheres::{self, Recorder};
-use crate::{Between, Instrument, Motion, SessionError};
+use crate::{Instrument, Interpolation, Motion, SessionError};
 
 /// As much as any tree needs.
 const STACK: usize = format::MAX_STACK;
@@ -42,7 +42,7 @@ pub struct Settings {
     /// Most node tests, and most triangle tests, of a tick.
     pub budget: u32,
     /// The surface between frames.
-    pub between: Between,
+    pub between: Interpolation,
     /// The way to an answer.
     pub search: Search,
     /// Spheres are scaled by the measured stretch, not by the tree's limit.
@@ -55,7 +55,7 @@ impl Default for Settings {
             limit: f32::INFINITY,
             margin: 10.0,
             budget: u32::MAX,
-            between: Between::default(),
+            between: Interpolation::default(),
             search: Search::default(),
             is_measured: true,
         }
@@ -118,7 +118,7 @@ pub trait Session {
     ///
     /// # Errors
     /// As [`advance`](Self::advance).
-    fn touching(&mut self) -> Result<Touching, SessionError>;
+    fn touching(&mut self) -> Result<ContactMarks, SessionError>;
     /// The spheres of a level: centre and radius of each.
     fn level(&self, level: u32) -> Vec<f32>;
     /// The spheres that a whole query for the last tick's instrument tests.
@@ -139,9 +139,9 @@ pub fn open(tree: Vec<u8>, packed: &[u8], rate: f64) -> Result<Box<dyn Session>,
     let bytes = tree.leak();
     Ok(match Tree::<u16>::from_bytes(bytes) {
         Err(FormatError::Width { .. }) => {
-            Box::new(Running::new(Tree::<u32>::from_bytes(bytes)?, packed, rate)?)
+            Box::new(LoadedSession::new(Tree::<u32>::from_bytes(bytes)?, packed, rate)?)
         }
-        tree => Box::new(Running::new(tree?, packed, rate)?),
+        tree => Box::new(LoadedSession::new(tree?, packed, rate)?),
     })
 }
 
@@ -174,7 +174,7 @@ impl VertexTable for Surface {
     }
 }
 
-struct Running<I: 'static> {
+struct LoadedSession<I: 'static> {
     tree: Tree<'static, I>,
     motion: Motion,
     settings: Settings,
@@ -205,7 +205,7 @@ struct Now {
     answer: Option<Proximity>,
 }
 
-impl<I: Index> Running<I> {
+impl<I: Index> LoadedSession<I> {
     fn new(tree: Tree<'static, I>, packed: &[u8], rate: f64) -> Result<Self, SessionError> {
         let motion = Motion::new(&tree, packed, rate)?;
         let mut odometer = Odometer::new(&tree);
@@ -269,13 +269,13 @@ impl<I: Index> Running<I> {
         let now = &mut self.now;
         (now.surface, now.part, now.stretch) = match self.settings.between {
             _ if self.refused.is_some() => (held, 1.0, last),
-            Between::Held => (held, 1.0, last),
-            Between::Interpolated => {
+            Interpolation::Held => (held, 1.0, last),
+            Interpolation::Interpolated => {
                 let stretch = before.or_larger(last).unwrap_or(last);
                 (Surface::Moving(self.step.at(share)), share, stretch)
             }
             // An extrapolated surface beyond the limit is not searched: the last frame is held.
-            Between::Extrapolated => {
+            Interpolation::Extrapolated => {
                 let frames = [self.before, self.last].map(|frame| &self.motion.frames[frame]);
                 let beyond = self.step.beyond(share);
                 match stretch_beyond(&self.tree, frames, share, &beyond) {
@@ -351,7 +351,7 @@ fn closest<I: Index>(
     Ok((query.closest(surface, tool, options)?, false))
 }
 
-impl<I: Index> Session for Running<I> {
+impl<I: Index> Session for LoadedSession<I> {
     fn settings(&mut self) -> &mut Settings {
         // A frame may have to be refused, or may pass now.
         self.number = None;
@@ -432,7 +432,7 @@ impl<I: Index> Session for Running<I> {
         self.refused
     }
 
-    fn touching(&mut self) -> Result<Touching, SessionError> {
+    fn touching(&mut self) -> Result<ContactMarks, SessionError> {
         let (margin, options) = (self.settings.margin, self.options());
         let mut query = Query::<I, STACK>::new(&self.tree)?;
         let (surface, contacts) = (&self.now.surface, &mut *self.contacts);
@@ -448,7 +448,7 @@ impl<I: Index> Session for Running<I> {
         let [before, last] =
             [self.before, self.last].map(|frame| self.motion.frames[frame].positions());
         contacts.move_with(&Speeds { before, last, rate: self.now.rate })?;
-        Ok(Touching::new(&self.contacts, margin, self.now.velocity))
+        Ok(ContactMarks::new(&self.contacts, margin, self.now.velocity))
     }
 
     fn level(&self, level: u32) -> Vec<f32> {

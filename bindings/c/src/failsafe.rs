@@ -3,7 +3,9 @@
 use core::ffi::c_void;
 
 use bytemuck::AnyBitPattern;
-use dibs_nostd::failsafe::{FailSafe, LimitError, Limits, Observation, State, Verdict, Watch};
+use dibs_nostd::failsafe::{
+    FailSafe, LimitError, Limits, Observation, State, ThresholdPair, Verdict,
+};
 use dibs_nostd::{Millis, Proximity, QueryError, Unavailable};
 
 use crate::border::{Handle, Input, Kind, Output, Storage};
@@ -47,7 +49,7 @@ impl dibs_watch {
     const OFF: (u32, u32) = (u32::MAX, u32::MAX);
 }
 
-impl TryFrom<dibs_watch> for Watch {
+impl TryFrom<dibs_watch> for ThresholdPair {
     type Error = LimitError;
 
     fn try_from(dibs_watch { degraded, safe }: dibs_watch) -> Result<Self, LimitError> {
@@ -58,7 +60,7 @@ impl TryFrom<dibs_watch> for Watch {
     }
 }
 
-impl TryFrom<dibs_watch> for Watch<u32> {
+impl TryFrom<dibs_watch> for ThresholdPair<u32> {
     type Error = LimitError;
 
     fn try_from(dibs_watch { degraded, safe }: dibs_watch) -> Result<Self, LimitError> {

@@ -8,7 +8,7 @@ use dibs_nostd::{MeasuredStretch, VertexTable, measure_stretch};
 
 use crate::border::{Handle, Input, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
-use crate::surface::Held;
+use crate::surface::HeldFrame;
 use crate::tree::dibs_tree;
 
 /// Bytes of a frame's storage.
@@ -30,7 +30,7 @@ impl Kind for dibs_frame {
 pub(crate) enum Table {
     Empty,
     Vertices(Vertices),
-    Held(Held),
+    Held(HeldFrame),
 }
 
 /// For calls that take several frames, each of either kind.

@@ -9,7 +9,7 @@ use dibs_nostd::{FrameAge, Millis};
 use crate::border::{Handle, Kind, Out, Output, Storage};
 use crate::code::dibs_code;
 use crate::frame::{Table, dibs_frame};
-use crate::surface::{Held, Reader, dibs_surface};
+use crate::surface::{HeldFrame, Reader, dibs_surface};
 
 /// Bytes of a reader's storage.
 pub const DIBS_READER_SIZE: usize = 128;
@@ -155,7 +155,7 @@ pub extern "C" fn dibs_reader_latest(
         let hold = reader.surface.hold()?;
         let latest = reader.reader.latest(Millis(now));
         Out::set_if_any(age, latest.frame().into());
-        frame.table = Table::Held(Held::new(latest.within(Millis(limit))?, hold));
+        frame.table = Table::Held(HeldFrame::new(latest.within(Millis(limit))?, hold));
         Ok(())
     })
 }

@@ -203,13 +203,13 @@ impl Drop for Hold {
 }
 
 /// The frame that a reader holds.
-pub(crate) struct Held {
+pub(crate) struct HeldFrame {
     // Declared first, so that it is dropped before the right to it is given back.
     guard: FrameGuard<'static>,
     _hold: Hold,
 }
 
-impl Held {
+impl HeldFrame {
     pub(crate) fn new(guard: FrameGuard<'_>, hold: Hold) -> Self {
         // SAFETY: a guard refers to the surface's memory, which the caller keeps, and not to its reader. Its lifetime
         // would prevent a second guard at the same time; here the hold prevents it.
@@ -223,7 +223,7 @@ impl Held {
     }
 }
 
-impl VertexTable for Held {
+impl VertexTable for HeldFrame {
     fn len(&self) -> usize {
         self.guard.len()
     }

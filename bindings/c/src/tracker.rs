@@ -40,10 +40,10 @@ pub struct dibs_tracker {
     tracker: TheTracker,
     odometer: Odometer,
     /// The copies: the present one, and the one to be written next.
-    copies: [&'static Copied; 2],
-    surface: Option<MovingTable<'static, Copied>>,
+    copies: [&'static TableCopy; 2],
+    surface: Option<MovingTable<'static, TableCopy>>,
     /// From the previous surface to the present one; without a previous one, from the present one to itself.
-    step: Option<Step<'static, Copied, Copied>>,
+    step: Option<Step<'static, TableCopy, TableCopy>>,
 }
 
 pub(crate) type TheTracker = Tracker<'static, Row, STACK, DIBS_OPENED, DIBS_OPENED>;
@@ -54,19 +54,19 @@ impl Kind for dibs_tracker {
 }
 
 /// Offset of the copies' heads, at the end of the tracker's own storage.
-const HEADS: usize = (DIBS_TRACKER_BASE - 2 * size_of::<Copied>()) & !(DIBS_ALIGNMENT - 1);
+const HEADS: usize = (DIBS_TRACKER_BASE - 2 * size_of::<TableCopy>()) & !(DIBS_ALIGNMENT - 1);
 
 const _: () = assert!(size_of::<dibs_tracker>() + DIBS_ALIGNMENT <= HEADS);
 
 /// A copy of a frame.
-pub(crate) struct Copied {
+pub(crate) struct TableCopy {
     /// Bits of x, y and z of each vertex.
     words: &'static [Cell<u32>],
     stretch: Cell<Option<MeasuredStretch>>,
     position_error: Cell<f32>,
 }
 
-impl Copied {
+impl TableCopy {
     fn new(words: &'static mut [u32]) -> Self {
         let words = Cell::from_mut(words).as_slice_of_cells();
         Self { words, stretch: Cell::new(None), position_error: Cell::new(0.0) }
@@ -89,7 +89,7 @@ impl Copied {
     }
 }
 
-impl VertexTable for Copied {
+impl VertexTable for TableCopy {
     fn len(&self) -> usize {
         self.words.len() / 3
     }
@@ -137,8 +137,8 @@ pub extern "C" fn dibs_tracker_init(
                 tracker: Tracker::with_range(tree)?,
                 odometer: Odometer::new(tree),
                 copies: [
-                    storage.keep(size, HEADS, Copied::new(first))?,
-                    storage.keep(size, HEADS + size_of::<Copied>(), Copied::new(second))?,
+                    storage.keep(size, HEADS, TableCopy::new(first))?,
+                    storage.keep(size, HEADS + size_of::<TableCopy>(), TableCopy::new(second))?,
                 ],
                 surface: None,
                 step: None,
@@ -175,14 +175,14 @@ impl dibs_tracker {
     /// The core's tracker, and its own surface.
     pub(crate) fn parts(
         &mut self,
-    ) -> Result<(&mut TheTracker, &MovingTable<'static, Copied>), dibs_code> {
+    ) -> Result<(&mut TheTracker, &MovingTable<'static, TableCopy>), dibs_code> {
         Ok((&mut self.tracker, self.surface.as_ref().ok_or(dibs_code::NoSurface)?))
     }
 
     /// The core's tracker, and the step from the previous surface to the present one.
     pub(crate) fn step(
         &mut self,
-    ) -> Result<(&mut TheTracker, &Step<'static, Copied, Copied>), dibs_code> {
+    ) -> Result<(&mut TheTracker, &Step<'static, TableCopy, TableCopy>), dibs_code> {
         Ok((&mut self.tracker, self.step.as_ref().ok_or(dibs_code::NoSurface)?))
     }
 

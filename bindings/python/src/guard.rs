@@ -19,9 +19,9 @@ use pyo3::sync::MutexExt;
 use pyo3::types::{PyByteArray, PyBytes};
 
 use crate::record::push_answer;
-use crate::surface::{Kept, List};
+use crate::surface::{KeptContacts, List};
 use crate::tool::AnyTool;
-use crate::tracker::{AdmittedMotion, Filter, Listed, listed, motion, named, record};
+use crate::tracker::{AdmittedMotion, ContactRows, Filter, listed, motion, named, record};
 use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, error, invalid, pose};
 
@@ -178,7 +178,7 @@ impl Guard {
         &self,
         py: Python<'_>,
         positions: &[u8],
-        pose: Option<pose::Given>,
+        pose: Option<pose::PoseParts>,
         captured: u32,
         now: u32,
     ) -> PyResult<()> {
@@ -201,7 +201,7 @@ impl Guard {
         &self,
         py: Python<'_>,
         weights: &[u8],
-        pose: Option<pose::Given>,
+        pose: Option<pose::PoseParts>,
         captured: u32,
         now: u32,
     ) -> PyResult<()> {
@@ -279,7 +279,7 @@ impl Guard {
         tool: &[u8],
         margin: f32,
         now: u32,
-    ) -> PyResult<(Answer, Listed<'py>)> {
+    ) -> PyResult<(Answer, ContactRows<'py>)> {
         let (origin, now) = (self.tree.origin, Millis(now));
         let tool = AnyTool::of(&bytes::doubles(tool), origin);
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
@@ -354,7 +354,7 @@ fn start_error(error: Error) -> PyErr {
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct Answer {
     pub answer: guard::Answer,
-    pub contacts: Option<Box<Kept>>,
+    pub contacts: Option<Box<KeptContacts>>,
     pub tree: Arc<Owned>,
 }
 

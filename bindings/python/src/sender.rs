@@ -163,7 +163,7 @@ impl Sender {
         py: Python<'_>,
         positions: &[u8],
         age: Option<f64>,
-        pose: Option<pose::Given>,
+        pose: Option<pose::PoseParts>,
     ) -> PyResult<(u32, &'static str, usize, usize, usize, f32)> {
         let age = age.map(seconds).transpose()?;
         let millimetres = self.unit.millimetres();

@@ -22,7 +22,7 @@ pub const MOST_CONTACTS: usize = 64;
 pub type List = Contacts<MOST_CONTACTS, 16_384>;
 
 /// The same contacts, kept beside an answer.
-pub type Kept = Contacts<MOST_CONTACTS, 1>;
+pub type KeptContacts = Contacts<MOST_CONTACTS, 1>;
 
 /// A tree with the positions and velocities of its vertices.
 #[pyclass(frozen, module = "dibs._dibs")]

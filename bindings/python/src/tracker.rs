@@ -13,7 +13,7 @@ use pyo3::sync::MutexExt;
 use pyo3::types::PyByteArray;
 
 use crate::record::{push_answer, push_contact};
-use crate::surface::{Kept, List, Surface};
+use crate::surface::{KeptContacts, List, Surface};
 use crate::tool::AnyTool;
 use crate::tree::{Owned, Tree, View, of_any_width};
 use crate::{bytes, invalid};
@@ -119,9 +119,9 @@ pub struct Tracker {
 }
 
 /// A list's records, its bound, and its accuracy.
-pub type Listed<'py> = (Bound<'py, PyByteArray>, f32, f32);
+pub type ContactRows<'py> = (Bound<'py, PyByteArray>, f32, f32);
 
-pub fn listed<'py>(py: Python<'py>, list: &List, tree: &Owned) -> Listed<'py> {
+pub fn listed<'py>(py: Python<'py>, list: &List, tree: &Owned) -> ContactRows<'py> {
     let mut records = Vec::new();
     list.iter().for_each(|found| push_contact(&mut records, 0, found, tree));
     (PyByteArray::new(py, &records), list.bound(), list.accuracy())
@@ -142,7 +142,7 @@ impl Tracker {
         tool: &[u8],
         instructions: Option<u32>,
         margin: Option<f32>,
-    ) -> PyResult<(TrackerAnswer, Option<Listed<'py>>)> {
+    ) -> PyResult<(TrackerAnswer, Option<ContactRows<'py>>)> {
         check(surface.get(), &self.tree)?;
         let tool = AnyTool::of(&bytes::doubles(tool), self.tree.origin);
         let tool = tool.map_err(|error| invalid(format!("tool: {error}")))?;
@@ -185,7 +185,7 @@ impl Tracker {
 #[pyclass(frozen, module = "dibs._dibs")]
 pub struct TrackerAnswer {
     found: dibs_nostd::TrackerAnswer,
-    pub contacts: Option<Box<Kept>>,
+    pub contacts: Option<Box<KeptContacts>>,
     pub tree: Arc<Owned>,
 }
 

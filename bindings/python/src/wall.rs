@@ -8,7 +8,7 @@ use dibs_nostd::constraint::{self, ConstraintForce, ConstraintState, SpringDampe
 use pyo3::prelude::*;
 
 use crate::guard::Answer;
-use crate::surface::Kept;
+use crate::surface::KeptContacts;
 use crate::tracker::TrackerAnswer;
 use crate::{error, invalid};
 
@@ -72,7 +72,7 @@ pub struct Proxy {
 type Twist = [[f64; 3]; 3];
 
 /// Force (N), torque (N mm), state, and the cause of a hold.
-type Torqued = ([f32; 3], [f32; 3], u8, Option<String>);
+type WrenchParts = ([f32; 3], [f32; 3], u8, Option<String>);
 
 #[pymethods]
 impl Proxy {
@@ -83,13 +83,13 @@ impl Proxy {
     }
 
     /// Of a guard's contacts.
-    fn force(&self, answer: &Answer, twist: Twist) -> PyResult<Torqued> {
+    fn force(&self, answer: &Answer, twist: Twist) -> PyResult<WrenchParts> {
         let reason = answer.answer.closest.err();
         self.wrench(answer.contacts.as_deref(), reason, answer.tree.origin, twist)
     }
 
     /// Of a tracker's contacts.
-    fn force_of(&self, tracked: &TrackerAnswer, twist: Twist) -> PyResult<Torqued> {
+    fn force_of(&self, tracked: &TrackerAnswer, twist: Twist) -> PyResult<WrenchParts> {
         self.wrench(tracked.contacts.as_deref(), None, tracked.tree.origin, twist)
     }
 }
@@ -98,11 +98,11 @@ impl Proxy {
     /// The hold if there is a reason for one.
     fn wrench(
         &self,
-        contacts: Option<&Kept>,
+        contacts: Option<&KeptContacts>,
         reason: Option<Unavailable>,
         origin: DVec3,
         twist: Twist,
-    ) -> PyResult<Torqued> {
+    ) -> PyResult<WrenchParts> {
         let list = contacts.ok_or_else(|| {
             invalid("answer: it has no contacts; ask for them with a margin of at least the wall's")
         })?;

@@ -50,7 +50,7 @@ pub struct Summary {
     pub surface_paths: bool,
     /// Roots: one for each part of the surface that shares no vertex with another.
     pub roots: u32,
-    /// Radius of the largest root's sphere at rest, in the mesh's unit.
+    /// Radius of the largest root's sphere at rest, in mm.
     pub root_radius: f32,
     /// The corners of the box around the vertices at rest; `None` if the tree has neither a rest shape nor nodes.
     pub bounding_box: Option<[[f32; 3]; 2]>,
@@ -103,7 +103,7 @@ pub struct VolumeSummary {
     pub ram_bytes: usize,
 }
 
-/// The size and cost of a tree's modes. Lengths are in the mesh's unit.
+/// The size and cost of a tree's modes. Lengths are in mm.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[non_exhaustive]
 pub struct ModesSummary {

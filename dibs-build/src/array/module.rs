@@ -147,7 +147,7 @@ fn extent_source(bounds: [[f32; 3]; 2]) -> String {
     let reach = (high - low).max_element() / 2.0;
     format!(
         r#"
-    /// Centre of the rest shape's bounding box, in the mesh's unit.
+    /// Centre of the rest shape's bounding box, in mm.
     pub const CENTRE: ::dibs_nostd::glam::Vec3 = ::dibs_nostd::glam::Vec3::new({x:?}, {y:?}, {z:?});
 
     /// Half the longest side of that box.
@@ -193,7 +193,7 @@ fn modal_source(ModesSummary { count, position_error, .. }: &ModesSummary) -> St
             /// Publishes frames whose weights, and the stretch that follows from them, are within their limits.
             pub type Receiver = ::dibs_nostd::Assembler<
                 'static,
-                ::dibs_nostd::modes::ModalGate<'static, ::dibs_nostd::StretchMonitor<'static, super::Index>, MODES>,
+                ::dibs_nostd::modes::ModalAdmissionCheck<'static, ::dibs_nostd::StretchMonitor<'static, super::Index>, MODES>,
             >;
         }}
     }}

@@ -66,7 +66,7 @@ pub struct Import {
 /// How to read a mesh file. [`read`] uses the defaults.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadOptions {
-    /// Weld vertices that are at most this far apart, in the mesh's unit; 0 welds those with
+    /// Weld vertices that are at most this far apart, in mm; 0 welds those with
     /// exactly equal f32 coordinates (`-0.0` equals `0.0`).
     ///
     /// `None` decides by the file: triangle soup (STL, and an indexed file in which no two faces share a vertex) is

@@ -133,7 +133,7 @@ pub struct Report {
     pub non_manifold_edges: usize,
     /// Edges whose two triangles run along them in the same direction, so that their normals disagree.
     pub inconsistent_edges: usize,
-    /// The surface's largest extent along an axis, in the mesh's unit.
+    /// The surface's largest extent along an axis, in mm.
     pub extent: f64,
     /// The point of the file (mm) that the mesh's positions are relative to.
     pub origin: [f64; 3],

@@ -30,7 +30,7 @@ const INTERVAL: Millis = Millis(100);
 /// Bytes of the tree checked in an idle slice for each unit of its work.
 const SCRUBBED: u32 = 2;
 
-type Receiver<'s, 't, I, M, R> = Assembler<'s, <R as Rows>::Gate<'s, 't, I>, M>;
+type Receiver<'s, 't, I, M, R> = Assembler<'s, <R as Rows>::AdmissionCheck<'s, 't, I>, M>;
 
 /// The bus's end of a [`Surface`](super::Surface): it takes packets, checks complete frames in slices, publishes them,
 /// checks the tree's bytes, and makes the statuses for the sender.
@@ -72,11 +72,17 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
         mac: M,
     ) -> Result<Self, Error> {
         let limits = limits.surface::<I, R>(tree, rows)?;
-        let gate = R::gate(tree, rows, limits, &notes.poses)?;
+        let admission_check = R::admission_check(tree, rows, limits, &notes.poses)?;
         Ok(Self {
             notes,
             deframer: Deframer::new(),
-            assembler: Assembler::with_mac(writer, gate, tree.mesh_id(), limits.reach, mac),
+            assembler: Assembler::with_mac(
+                writer,
+                admission_check,
+                tree.mesh_id(),
+                limits.reach,
+                mac,
+            ),
             order: R::order(tree, rows),
             scrub: bytes.scrub(),
             reported: Millis(0),
@@ -156,7 +162,8 @@ impl<'s, 't, I: Index, M: Mac, R: Rows> Bus<'s, 't, I, M, R> {
 
     /// Takes a frame of this process by the weights of the tree's displacement modes: all vertices are computed, and the
     /// modes' own [`position_error`](Modes::position_error) is part of each answer's accuracy. Otherwise the same as
-    /// [`frame`](Self::frame). An [`Assembler`] with a [`ModalGate`](crate::modes::ModalGate) stores the weights alone.
+    /// [`frame`](Self::frame). An [`Assembler`] with a [`ModalAdmissionCheck`](crate::modes::ModalAdmissionCheck)
+    /// stores the weights alone.
     ///
     /// Cost: O(vertices times modes), several times.
     ///

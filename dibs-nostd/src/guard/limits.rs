@@ -3,7 +3,7 @@
 // Requirement: C-07
 
 use super::Rows;
-use crate::failsafe::{LimitError, Limits, Watch};
+use crate::failsafe::{LimitError, Limits, ThresholdPair};
 use crate::{Budget, Cost, Index, Millis, Options, SurfaceLimits, Tree};
 
 /// The limits on the surface, and the options of a tick's query.
@@ -127,7 +127,9 @@ impl GuardLimits {
         }
         let limits = match self.trust {
             Some(limits) => limits,
-            None => Limits::new(Watch::new(Millis(self.age.0 / 4 * 3), self.age)?, self.speed)?,
+            None => {
+                Limits::new(ThresholdPair::new(Millis(self.age.0 / 4 * 3), self.age)?, self.speed)?
+            }
         };
         let limits = if self.has_transit { limits } else { limits.without_transit() };
         Ok(if self.is_automatic { limits.automatic() } else { limits })

@@ -23,6 +23,8 @@
 //! // Bus interrupt, or a thread: bytes of a line, or packets of a network; then slices of the checks.
 //! bus.receive(&bytes, now);
 //! bus.work(100);
+//! # let mut line = [0; dibs_nostd::guard::Bus::<u16>::STATUS_FRAMED];
+//! let _to_send = bus.status_framed(now, &mut line); // its echo measures the transit: unknown, it is unsafe
 //!
 //! // Control interrupt, of higher priority.
 //! let tool = Capsule::new(Vec3::new(0.0, 0.0, 90.0), Vec3::new(0.0, 0.0, 150.0), 2.5)?;
@@ -38,7 +40,7 @@ mod bus;
 mod limits;
 #[cfg(feature = "embedded-io")]
 mod line;
-mod pose_gate;
+mod pose_admission;
 mod posed;
 mod poses;
 mod rows;

@@ -6,7 +6,7 @@ use core::marker::PhantomData;
 
 use glam::Vec3;
 
-use super::pose_gate::PoseGate;
+use super::pose_admission::PoseAdmissionCheck;
 use super::poses::Poses;
 use super::rows::{Blend, Rows, sealed};
 use super::{SearchedSurface, Vertices};
@@ -67,7 +67,7 @@ pub struct PosedFacts<T> {
 
 impl<R: Rows<Poses = ()>> Rows for PosedRows<R> {
     type Of<'t> = PosedFacts<R::Of<'t>>;
-    type Gate<'s, 't, I: Index> = PoseGate<'s, R::Gate<'s, 't, I>>;
+    type AdmissionCheck<'s, 't, I: Index> = PoseAdmissionCheck<'s, R::AdmissionCheck<'s, 't, I>>;
     type Surface<'f> = R::Surface<'f>;
     type Room<'f> = R::Room<'f>;
     type Poses = Poses;
@@ -98,14 +98,14 @@ impl<R: Rows<Poses = ()>> Rows for PosedRows<R> {
         R::order(tree, &of.of)
     }
 
-    fn gate<'s, 't, I: Index>(
+    fn admission_check<'s, 't, I: Index>(
         tree: &Tree<'t, I>,
         of: &Self::Of<'t>,
         limits: SurfaceLimits,
         poses: &'s Poses,
-    ) -> Result<Self::Gate<'s, 't, I>, Error> {
-        let gate = R::gate(tree, &of.of, limits, &())?;
-        Ok(PoseGate::new(gate, poses, of.centre, R::amplification(&of.of)))
+    ) -> Result<Self::AdmissionCheck<'s, 't, I>, Error> {
+        let admission_check = R::admission_check(tree, &of.of, limits, &())?;
+        Ok(PoseAdmissionCheck::new(admission_check, poses, of.centre, R::amplification(&of.of)))
     }
 
     fn surface<'s, 'f: 's, 't: 'f>(

@@ -8,8 +8,8 @@ use super::posed::TickPose;
 use crate::surface::FrameView;
 use crate::tree::VertexOrder;
 use crate::{
-    Error, FrameGuard, Gate, Index, MovingSurface, StretchMonitor, SurfaceBlend, SurfaceLimits,
-    Tree,
+    AdmissionCheck, Error, FrameGuard, Index, MovingSurface, StretchMonitor, SurfaceBlend,
+    SurfaceLimits, Tree,
 };
 
 /// The rows between the last two frames, or extrapolated.
@@ -21,7 +21,7 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
     /// The facts of a tree about its rows.
     type Of<'t>: Copy + core::fmt::Debug;
     /// The check of a frame.
-    type Gate<'s, 't, I: Index>: Gate + core::fmt::Debug;
+    type AdmissionCheck<'s, 't, I: Index>: AdmissionCheck + core::fmt::Debug;
     /// The surface that rows make.
     type Surface<'f>: MovingSurface;
     /// Memory for the surface, if the rows are not the surface.
@@ -53,12 +53,12 @@ pub trait Rows: sealed::Sealed + core::fmt::Debug + 'static {
 
     /// The check of frames and of their extrapolations.
     #[doc(hidden)]
-    fn gate<'s, 't, I: Index>(
+    fn admission_check<'s, 't, I: Index>(
         tree: &Tree<'t, I>,
         of: &Self::Of<'t>,
         limits: SurfaceLimits,
         poses: &'s Self::Poses,
-    ) -> Result<Self::Gate<'s, 't, I>, Error>;
+    ) -> Result<Self::AdmissionCheck<'s, 't, I>, Error>;
 
     /// The current rows.
     #[doc(hidden)]
@@ -127,7 +127,7 @@ pub struct Vertices;
 
 impl Rows for Vertices {
     type Of<'t> = ();
-    type Gate<'s, 't, I: Index> = StretchMonitor<'t, I, 2>;
+    type AdmissionCheck<'s, 't, I: Index> = StretchMonitor<'t, I, 2>;
     type Surface<'f> = Blend<'f>;
     type Room<'f> = ();
     type Poses = ();
@@ -153,7 +153,7 @@ impl Rows for Vertices {
     }
 
     #[inline(always)]
-    fn gate<'t, I: Index>(
+    fn admission_check<'t, I: Index>(
         tree: &Tree<'t, I>,
         (): &(),
         limits: SurfaceLimits,
@@ -181,7 +181,7 @@ impl Rows for Vertices {
 #[cfg(feature = "nodes")]
 impl Rows for crate::nodes::Nodes<'static> {
     type Of<'t> = crate::nodes::Nodes<'t>;
-    type Gate<'s, 't, I: Index> = crate::nodes::NodeMonitor<'t, 2>;
+    type AdmissionCheck<'s, 't, I: Index> = crate::nodes::NodeMonitor<'t, 2>;
     type Surface<'f> = crate::nodes::EmbeddedSurface<'f, 'f, Blend<'f>>;
     type Room<'f> = Option<Self::Surface<'f>>;
     type Poses = ();
@@ -206,12 +206,12 @@ impl Rows for crate::nodes::Nodes<'static> {
         nodes.amplification()
     }
 
-    fn gate<'s, 't, I: Index>(
+    fn admission_check<'s, 't, I: Index>(
         _: &Tree<'t, I>,
         nodes: &Self::Of<'t>,
         limits: SurfaceLimits,
         (): &'s (),
-    ) -> Result<Self::Gate<'s, 't, I>, Error> {
+    ) -> Result<Self::AdmissionCheck<'s, 't, I>, Error> {
         Ok(crate::nodes::NodeMonitor::continuous(nodes).limits(limits))
     }
 

@@ -1,6 +1,9 @@
-//! Sums rounded up or down.
+//! The unit of rounding, and sums rounded up or down.
 
 // Requirement: A-03
+
+/// Half a unit in the last place of 1.
+pub(crate) const U: f32 = 1.0 / 16_777_216.0;
 
 /// `a + b`, rounded down; NaN if the sum is.
 pub(crate) fn sum_down(a: f32, b: f32) -> f32 {

@@ -9,15 +9,15 @@
 //! | [`Modes`] | the builder's fit, read from the tree's bytes and validated once |
 //! | [`ModalSurface`] | the surface at some weights: a [`VertexTable`](crate::VertexTable) |
 //! | [`Modes::stretch_bound`] | a bound on its stretch, in time that does not depend on the vertices |
-//! | [`ModalGate`], [`ModalReader`] | both ends of a bus that carries weights |
+//! | [`ModalAdmissionCheck`], [`ModalReader`] | both ends of a bus that carries weights |
 //! | [`Memo`] | remembers positions, for the length of a query |
 
 // Requirement: F-06
 
+mod admission;
 mod bound;
 mod error;
 mod frame;
-mod gate;
 mod layout;
 mod memo;
 mod reach;
@@ -28,9 +28,9 @@ mod tests;
 
 use layout::Header;
 
+pub use admission::ModalAdmissionCheck;
 pub use error::{ModesError, WeightsError};
 pub use frame::ModalFrame;
-pub use gate::ModalGate;
 /// The layout of the modes' bytes, for their builder.
 #[doc(hidden)]
 pub use layout::{ANCHOR_TAIL_BYTES, HEADER_BYTES, MAX_ANCHORS, MODE_BYTES, VERTEX_MODE_BYTES};

@@ -3,13 +3,13 @@
 use super::Nodes;
 use super::measure::Pass;
 use crate::stretch::{
-    Admission, Comparison, FrameExtent, Gate, IncomingSurface, StretchError, SurfaceLimits,
-    farthest, largest_step, too_fast,
+    Admission, AdmissionCheck, Comparison, FrameExtent, IncomingSurface, StretchError,
+    SurfaceLimits, farthest, largest_step, too_fast,
 };
 use crate::surface::{Millis, MotionUnit, SurfaceBlend, VertexTable};
 use crate::tree::SurfaceFacts;
 
-/// Measures every frame of nodes before it is published, a few elements at a time: the [`Gate`] of an
+/// Measures every frame of nodes before it is published, a few elements at a time: the [`AdmissionCheck`] of an
 /// [`Assembler`](crate::Assembler) whose buffers have a row for each node.
 ///
 /// It refuses frames with an element stretched beyond the tree's limit, shrunk, or inverted, and nodes that move too
@@ -23,7 +23,7 @@ use crate::tree::SurfaceFacts;
 /// Between two frames the stretch is bounded by theirs, because the largest singular value is convex; between frames
 /// that both turn an element by much, it may be inverted, which does not affect distance bounds.
 ///
-/// Cost: [`advance`](Gate::advance) checks at most `work` nodes and elements. RAM: 250 bytes.
+/// Cost: [`advance`](AdmissionCheck::advance) checks at most `work` nodes and elements. RAM: 250 bytes.
 #[derive(Clone, Debug)]
 pub struct NodeMonitor<'a, const SURFACES: usize = 1> {
     nodes: Nodes<'a>,
@@ -114,7 +114,7 @@ impl<'a, const SURFACES: usize> NodeMonitor<'a, SURFACES> {
     }
 }
 
-impl<const SURFACES: usize> Gate for NodeMonitor<'_, SURFACES> {
+impl<const SURFACES: usize> AdmissionCheck for NodeMonitor<'_, SURFACES> {
     fn begin(&mut self, changed: FrameExtent) {
         (self.changed, self.next_row, self.is_beyond) = (changed, 0, false);
         self.passes = [Pass::new(); SURFACES];

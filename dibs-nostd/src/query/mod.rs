@@ -46,7 +46,7 @@ use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
 #[cfg(feature = "wide")]
 use search::WideSearch;
-use search::{Search, Ties, WHOLE, Waiting};
+use search::{Search, Ties, WHOLE, WaitingNode};
 use separation::signed;
 
 /// A query on one tree, with the fixed stack that its traversal needs: 8 bytes an entry.
@@ -56,7 +56,7 @@ use separation::signed;
 #[derive(Clone, Debug)]
 pub struct Query<'t, I, const STACK: usize> {
     tree: Tree<'t, I>,
-    stack: [Waiting; STACK],
+    stack: [WaitingNode; STACK],
     triangle: Option<TriangleRow>,
     ties: Ties,
 }
@@ -71,7 +71,7 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
         if tree.stack() as usize > STACK {
             return Err(QueryError::Stack { needed: tree.stack(), available: STACK as u32 });
         }
-        let stack = [Waiting { lower: 0.0, link: 0 }; STACK];
+        let stack = [WaitingNode { lower: 0.0, link: 0 }; STACK];
         Ok(Self { tree: *tree, stack, triangle: None, ties: Ties::new() })
     }
 

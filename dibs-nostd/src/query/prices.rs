@@ -67,8 +67,8 @@ pub(super) const ENTRY: u32 = 1;
 /// An edge over which a flood may spread (132), besides the test of the triangle beyond.
 pub(super) const EDGE: u32 = 1;
 
-/// A valley: its pair, its side, and its place in the list (1,400).
-pub(super) const VALLEY: u32 = 14;
+/// A basin: its pair, its side, and its place in the list (1,400).
+pub(super) const BASIN: u32 = 14;
 
 /// The start of a contact's activation: its empty paths (889).
 pub(super) const ACTIVATION: u32 = 9;

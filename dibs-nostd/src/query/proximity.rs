@@ -11,7 +11,7 @@ use crate::{Coverage, TriangleRow, VertexTable};
 
 /// The closest pair between a tool and a surface, with a certified interval for its separation.
 ///
-/// Lengths are in the mesh's own unit (mm in the examples). [`interval`](Self::interval) holds the true separation; its
+/// Lengths are in millimetres. [`interval`](Self::interval) holds the true separation; its
 /// ends are twice the accuracy apart if the budget did not end the query early. It relies on the surface's stretch: see
 /// [`coverage`](Self::coverage).
 ///

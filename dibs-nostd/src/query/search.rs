@@ -18,7 +18,7 @@ mod ties;
 #[cfg(feature = "wide")]
 mod wide;
 
-pub(super) use super::memory::waiting::Waiting;
+pub(super) use super::memory::waiting::WaitingNode;
 #[cfg(feature = "control")]
 pub(crate) use near::LabelDistance;
 pub(super) use tick::{Outcome, Tick};
@@ -67,7 +67,7 @@ pub(super) struct Search<'s, 't, I, V: ?Sized, T> {
     tree: &'s Tree<'t, I>,
     vertices: &'s V,
     tool: &'s T,
-    stack: &'s mut [Waiting],
+    stack: &'s mut [WaitingNode],
     waiting: usize,
     meter: Meter,
     /// Converts a radius code into the sphere's radius under the current stretch.
@@ -99,7 +99,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     pub fn start(
         roots: RootSet,
         tree: &'s Tree<'t, I>,
-        stack: &'s mut [Waiting],
+        stack: &'s mut [WaitingNode],
         vertices: &'s V,
         tool: &'s T,
         options: &Options,
@@ -188,7 +188,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             let corners = search.corners(triangle)?;
             search.test_triangle(triangle, &corners);
         }
-        let subtree = Waiting { lower: distance - radius, link: root.link };
+        let subtree = WaitingNode { lower: distance - radius, link: root.link };
         search.push(0, subtree).ok_or(QueryError::Corrupt { row: 0 })?;
         Ok(search)
     }
@@ -198,7 +198,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
     /// Each kind is a function with one caller, into which it is inlined: this keeps the plain query's loop in
     /// registers.
     pub fn run<const KIND: u8>(mut self, limit: f32) -> Result<Proximity, QueryError> {
-        while let Some(Waiting { lower, link }) = self.pop() {
+        while let Some(WaitingNode { lower, link }) = self.pop() {
             if lower > self.cutoff {
                 continue;
             }

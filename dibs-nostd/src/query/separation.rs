@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::depth::Depth;
 use super::memory::depth::KnownDepthMut;
-use super::search::{Ties, Waiting};
+use super::search::{Ties, WaitingNode};
 use super::side::{self, NoSide, OnAxis, Side};
 use super::{Options, Proximity, solids};
 use crate::tree::RootSet;
@@ -29,7 +29,7 @@ pub(super) struct Request<'a, 't, I, V: ?Sized, T> {
 #[inline(never)]
 pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
-    stack: &mut [Waiting],
+    stack: &mut [WaitingNode],
     vertices: &V,
     tool: &T,
     options: &Options,
@@ -55,7 +55,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Request<'_, '_, I, V, T> {
     #[inline(always)]
     pub fn signed(
         &self,
-        stack: &mut [Waiting],
+        stack: &mut [WaitingNode],
         found: &mut Proximity,
         (ties, known): (&mut Ties, Option<KnownDepthMut<'_>>),
         roots: RootSet,

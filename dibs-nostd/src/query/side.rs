@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::exact::{Exact, SideOfPlane};
 use super::normal::{Feature, NORMAL, NoNormal, corners};
-use super::search::{Search, Ties, Waiting};
+use super::search::{Search, Ties, WaitingNode};
 use super::{Options, Proximity};
 use crate::math::sqrt::sqrt;
 use crate::tool::AxisPoint;
@@ -212,7 +212,7 @@ fn decided<I: Index, V: VertexTable + ?Sized>(
 pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
     roots: RootSet,
     tree: &Tree<'_, I>,
-    stack: &mut [Waiting],
+    stack: &mut [WaitingNode],
     vertices: &V,
     pair: &mut Proximity,
     point: Vec3,

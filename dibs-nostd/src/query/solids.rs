@@ -8,7 +8,7 @@
 
 use super::Proximity;
 use super::memory::depth::KnownDepthMut;
-use super::search::{Search, Ties, WHOLE, Waiting};
+use super::search::{Search, Ties, WHOLE, WaitingNode};
 use super::separation::Request;
 use super::side::{NoSide, Side};
 use crate::math::order::smaller;
@@ -22,7 +22,7 @@ use crate::{Index, Tool, VertexTable};
 #[inline(never)]
 pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
     asked: &Request<'_, '_, I, V, T>,
-    stack: &mut [Waiting],
+    stack: &mut [WaitingNode],
     answer: &mut Proximity,
     memory: (&mut Ties, Option<KnownDepthMut<'_>>),
 ) -> Result<(), QueryError> {
@@ -59,7 +59,7 @@ pub(super) fn signed<I: Index, V: VertexTable + ?Sized, T: Tool>(
 /// The signed answer of one solid, with the budget left after the answer's tests so far.
 fn of_solid<I: Index, V: VertexTable + ?Sized, T: Tool>(
     asked: &Request<'_, '_, I, V, T>,
-    stack: &mut [Waiting],
+    stack: &mut [WaitingNode],
     answer: &Proximity,
     roots: RootSet,
 ) -> Result<Proximity, QueryError> {

@@ -5,6 +5,7 @@
 use super::tracker::{Tracker, TrackerAnswer};
 use super::{Options, Proximity, Side};
 use crate::math::order::larger;
+use crate::math::round::U;
 use crate::math::sqrt::sqrt;
 use crate::unavailable::QueryError;
 use crate::{Index, Step, Tool, VertexTable};
@@ -82,7 +83,6 @@ impl<W: VertexTable + ?Sized, V: VertexTable + ?Sized, T: Tool> Sweep<'_, '_, W,
 
     /// An upper bound on the change of any distance from start to end, rounded up.
     fn most(&self) -> f32 {
-        const U: f32 = 1.0 / 16_777_216.0;
         let [from, to] = &self.tools;
         let start = to.axis_start() - from.axis_start();
         let end = start + (to.axis_span() - from.axis_span());

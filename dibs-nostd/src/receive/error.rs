@@ -132,7 +132,7 @@ pub enum ReceiveError {
     },
     /// The frame's rotation and shift are not a rigid pose.
     Pose(PoseError),
-    /// The gate refused the surface. The frame is abandoned.
+    /// The admission check refused the surface. The frame is abandoned.
     Stretch(StretchError),
 }
 

@@ -1,4 +1,4 @@
-//! Whole frames of this process, without packets: the same checks and the same gate.
+//! Whole frames of this process, without packets: the same checks and the same admission check.
 
 // Requirement: B-08
 
@@ -7,11 +7,11 @@ use glam::Vec3;
 use super::health::FrameName;
 use super::packets::check;
 use super::{Assembler, Progress, ReceiveError};
-use crate::stretch::Gate;
+use crate::stretch::AdmissionCheck;
 use crate::surface::{Millis, Position, RigidPose, elapsed};
 use crate::wire::{Begin, Content, Encoding, FrameId, Freshness, Mac};
 
-impl<G: Gate, M: Mac> Assembler<'_, G, M> {
+impl<G: AdmissionCheck, M: Mac> Assembler<'_, G, M> {
     /// Takes a whole frame from this process, for example from a solver's thread: the positions (mm) of all rows, in
     /// the rows' order, captured at `captured`, at most 65.5 s before `now` on the receiver's clock. As after a frame's
     /// last packet, [`advance`](Self::advance) then checks and publishes it.
@@ -125,7 +125,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         check: impl FnOnce(&Self) -> Result<(), ReceiveError>,
         store: impl FnOnce(&[Position]),
     ) -> Result<Progress, ReceiveError> {
-        let (rows, takes_weights) = (begin.rows, self.gate.weight_range(0).is_some());
+        let (rows, takes_weights) = (begin.rows, self.admission_check.weight_range(0).is_some());
         if rows != self.writer.len() {
             return Err(ReceiveError::RowCount { rows });
         }
@@ -137,7 +137,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         self.begin_frame(id.epoch, begin, [0; 2])?;
         self.collector.set_error(error);
         if let Some(pose) = pose {
-            self.gate.place(pose);
+            self.admission_check.place(pose);
         }
         let misplaced = ReceiveError::OutOfRange { first: 0, count: rows };
         let place = self.collector.place_whole(rows).ok_or(misplaced)?;

@@ -1,4 +1,4 @@
-//! From packets to published frames: the gate between the bus and the surface that the controller acts on.
+//! From packets to published frames: the admission check between the bus and the surface that the controller acts on.
 //!
 //! One file, because it is the assembler's whole interface.
 
@@ -15,7 +15,7 @@ mod step;
 use crate::MAX_COORDINATE;
 use crate::math::order::smaller;
 use crate::stretch::{
-    Admission, Gate, IncomingSurface, StretchError, StretchMonitor, SurfaceLimits,
+    Admission, AdmissionCheck, IncomingSurface, StretchError, StretchMonitor, SurfaceLimits,
 };
 use crate::surface::{
     FrameLabel, FrameView, FrameWriter, LastStep, Millis, PredictionCheck, PublishError,
@@ -35,32 +35,32 @@ use step::{Earlier, StepMeter};
 /// Assembles frames of vertices from packets, and publishes those that are complete and admitted.
 ///
 /// [`accept`](Self::accept) takes packets, in the bus interrupt. [`advance`](Self::advance) does the longer work, in
-/// slices: it checks the surface ([`Gate`]), publishes it, and copies the rows on which partial frames build. The two
-/// must not interrupt each other: call both in the bus interrupt, or call `advance` at another priority below the
-/// control tick's with the bus interrupt masked.
+/// slices: it checks the surface ([`AdmissionCheck`]), publishes it, and copies the rows on which partial frames
+/// build. The two must not interrupt each other: call both in the bus interrupt, or call `advance` at another priority
+/// below the control tick's with the bus interrupt masked.
 ///
 /// A frame is published when every row has arrived at its place in the sequence, the commit's digest confirms that all
-/// packets belong to one frame, and the gate admits the surface. Until then, and after any rejection, the last
-/// published frame stays. `docs/wire.md` has the whole table of packets and outcomes. With a [`Mac`], a packet without
-/// a genuine tag is dropped first.
+/// packets belong to one frame, and the admission check admits the surface. Until then, and after any rejection, the
+/// last published frame stays. `docs/wire.md` has the whole table of packets and outcomes. With a [`Mac`], a packet
+/// without a genuine tag is dropped first.
 ///
-/// With a gate of modes the buffers have one row for each mode, and frames hold weights instead of positions: see
-/// [`Gate::weight_range`].
+/// With an admission check of modes the buffers have one row for each mode, and frames hold weights instead of
+/// positions: see [`AdmissionCheck::weight_range`].
 ///
-/// RAM: less than 700 bytes besides [`Frames`](crate::Frames) and gate, for any number of vertices. A surface's buffers
-/// with both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24 bytes for each
-/// vertex plus at most 1,750 bytes.
+/// RAM: less than 700 bytes besides [`Frames`](crate::Frames) and admission check, for any number of vertices. A
+/// surface's buffers with both ends, the assembler and the [`StretchMonitor`](crate::StretchMonitor) together take 24
+/// bytes for each vertex plus at most 1,750 bytes.
 ///
 /// ```
 /// use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 /// use dibs_nostd::{
-///     Advance, Assembler, BusHealth, FrameView, Frames, LastHeartbeat, Millis, NoGate, VertexTable,
+///     Advance, Assembler, BusHealth, FrameView, Frames, LastHeartbeat, Millis, NoAdmissionCheck, VertexTable,
 ///     glam::Vec3,
 /// };
 ///
 /// static FRAMES: Frames<3> = Frames::new();
 /// let (writer, mut reader) = FRAMES.split().unwrap();
-/// let mut assembler = Assembler::new(writer, NoGate, 0xB0D1, 1000.0);
+/// let mut assembler = Assembler::new(writer, NoAdmissionCheck, 0xB0D1, 1000.0);
 ///
 /// let positions = [Vec3::X, Vec3::Y, Vec3::Z];
 /// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 1 };
@@ -82,7 +82,7 @@ use step::{Earlier, StepMeter};
 #[derive(Debug)]
 pub struct Assembler<'f, G, M = NoMac> {
     writer: FrameWriter<'f>,
-    gate: G,
+    admission_check: G,
     mac: M,
     max_coordinate: f32,
     collector: Collector,
@@ -147,13 +147,18 @@ pub enum Advance {
     },
 }
 
-impl<'f, G: Gate> Assembler<'f, G> {
+impl<'f, G: AdmissionCheck> Assembler<'f, G> {
     /// An assembler for the mesh with this id, whose vertices stay within `max_coordinate` (mm) of the origin on each
     /// axis, at most [`MAX_COORDINATE`]. A smaller limit detects more damage, and improves the accuracy of every query.
     /// With NaN nothing is ever published.
     #[must_use]
-    pub fn new(writer: FrameWriter<'f>, gate: G, mesh_id: u32, max_coordinate: f32) -> Self {
-        Assembler::with_mac(writer, gate, mesh_id, max_coordinate, NoMac)
+    pub fn new(
+        writer: FrameWriter<'f>,
+        admission_check: G,
+        mesh_id: u32,
+        max_coordinate: f32,
+    ) -> Self {
+        Assembler::with_mac(writer, admission_check, mesh_id, max_coordinate, NoMac)
     }
 }
 
@@ -189,12 +194,12 @@ impl<'f, 't, I: Index> Assembler<'f, StretchMonitor<'t, I, 2>> {
     }
 }
 
-impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
+impl<'f, G: AdmissionCheck, M: Mac> Assembler<'f, G, M> {
     /// The same, for packets with tags.
     #[must_use]
     pub fn with_mac(
         writer: FrameWriter<'f>,
-        gate: G,
+        admission_check: G,
         mesh_id: u32,
         max_coordinate: f32,
         mac: M,
@@ -202,7 +207,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         let max_coordinate = smaller(max_coordinate, MAX_COORDINATE);
         Self {
             writer,
-            gate,
+            admission_check,
             mac,
             max_coordinate,
             collector: Collector::new(mesh_id),
@@ -257,10 +262,10 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
     /// in all, and publishes an admitted frame.
     ///
     /// Call it after each packet, so that the check keeps up with the frame, and periodically while the bus is quiet.
-    /// Cost: O(`work`), with a sliced gate.
+    /// Cost: O(`work`), with a sliced admission check.
     ///
     /// # Errors
-    /// [`ReceiveError::Stretch`] if the gate refuses the surface; it has been counted.
+    /// [`ReceiveError::Stretch`] if the admission check refuses the surface; it has been counted.
     pub fn advance(&mut self, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else {
             self.clean();
@@ -298,8 +303,8 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
 
     /// The facts of this receiver's surface, for comparison with the sender's.
     fn surface_facts(&self) -> SurfaceFacts {
-        let facts = self.gate.surface_facts();
-        let is_modal = self.gate.weight_range(0).is_some();
+        let facts = self.admission_check.surface_facts();
+        let is_modal = self.admission_check.weight_range(0).is_some();
         if is_modal { facts } else { SurfaceFacts { vertices: self.writer.len(), ..facts } }
     }
 
@@ -309,10 +314,10 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         self.collector.mesh_id()
     }
 
-    /// The checksum of the tree whose frames are accepted, if the gate has one.
+    /// The checksum of the tree whose frames are accepted, if the admission check has one.
     #[cfg(all(feature = "control", feature = "modes"))]
     pub(crate) fn tree_checksum(&self) -> Option<u32> {
-        self.gate.motion_unit().map(|unit| unit.tree)
+        self.admission_check.motion_unit().map(|unit| unit.tree)
     }
 
     /// Name of the last published frame.
@@ -357,10 +362,10 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         self.collector.register();
     }
 
-    /// The gate.
+    /// The admission check.
     #[must_use]
-    pub const fn gate(&self) -> &G {
-        &self.gate
+    pub const fn admission_check(&self) -> &G {
+        &self.admission_check
     }
 
     /// The authenticator.
@@ -385,11 +390,11 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
         self.copied = end;
     }
 
-    /// Lets the gate check a slice of the current frame.
+    /// Lets the admission check check a slice of the current frame.
     fn check(&mut self, ready: u32, work: u32) -> Result<Advance, ReceiveError> {
         let Some(frame) = &self.collector.frame else { return Ok(Advance::Idle) };
         let (back, front) = (self.writer.back(), self.writer.front());
-        let unit = self.gate.motion_unit();
+        let unit = self.admission_check.motion_unit();
         let (mut work, mut compared) = (work, None);
         if let (Some(front), Some(_)) = (&front, &unit) {
             let two = self.writer.last_two();
@@ -398,7 +403,13 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
                 let step = LastStep::between(before, last)?;
                 Some(Earlier { frame: before, units: step.units(), t: step.ahead(age) })
             });
-            work = self.step.compare(&self.gate, (&back, front), earlier.as_ref(), ready, work);
+            work = self.step.compare(
+                &self.admission_check,
+                (&back, front),
+                earlier.as_ref(),
+                ready,
+                work,
+            );
             if frame.is_complete && self.step.rows() < ready {
                 return Ok(Advance::Pending);
             }
@@ -413,8 +424,9 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
             time.unwrap_or_else(|| front.time_to(frame.captured()))
         };
         let before = before.map(|front| (front, time(front)));
-        let verdict =
-            self.gate.advance(IncomingSurface { surface: &back, ready, before, compared }, work);
+        let verdict = self
+            .admission_check
+            .advance(IncomingSurface { surface: &back, ready, before, compared }, work);
         match verdict {
             Err(error) => {
                 let rejection = ReceiveError::Stretch(error);
@@ -430,12 +442,12 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
                 let label = FrameLabel {
                     epoch: frame.id.epoch,
                     received: frame.captured(),
-                    position_error: error + self.gate.position_error(),
+                    position_error: error + self.admission_check.position_error(),
                     stretch,
                 };
                 let before = front.and_then(|front| front.motion());
                 let motion = unit.map(|unit| self.step.motion(&unit, before));
-                let sigma = self.gate.ahead().unwrap_or(f32::NAN);
+                let sigma = self.admission_check.ahead().unwrap_or(f32::NAN);
                 let ahead = PredictionCheck { sigma, ..self.step.ahead(unit.as_ref()) };
                 self.writer.set_label(label, motion, ahead);
                 self.is_admitted = true;
@@ -454,7 +466,7 @@ impl<'f, G: Gate, M: Mac> Assembler<'f, G, M> {
                 self.copied = 0;
                 self.is_dirty = false;
                 self.collector.published(&frame);
-                self.gate.published();
+                self.admission_check.published();
                 Advance::Published { epoch }
             }
             Err(PublishError::Busy) => Advance::Held { epoch },

@@ -8,14 +8,14 @@ use glam::Vec3;
 
 use super::step::StepMeter;
 use super::{Assembler, Progress, ReceiveError, arrivals};
-use crate::stretch::{FrameExtent, Gate};
+use crate::stretch::{AdmissionCheck, FrameExtent};
 use crate::surface::{PoseError, Position, RigidPose};
 use crate::wire::{
     Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
     quantised_row,
 };
 
-impl<G: Gate, M: Mac> Assembler<'_, G, M> {
+impl<G: AdmissionCheck, M: Mac> Assembler<'_, G, M> {
     #[inline]
     pub(super) fn take(&mut self, packet: &Packet<'_>) -> Result<Progress, ReceiveError> {
         let epoch = packet.epoch;
@@ -60,8 +60,8 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         if self.is_admitted {
             self.publish();
         }
-        let takes_weights = self.gate.weight_range(0).is_some();
-        let takes_poses = self.gate.takes_poses();
+        let takes_weights = self.admission_check.weight_range(0).is_some();
+        let takes_poses = self.admission_check.takes_poses();
         let here = self.surface_facts();
         let check_begin = |begin: &Begin| {
             if begin.rows != self.writer.len() {
@@ -91,7 +91,11 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
             }
         };
         self.step = StepMeter::new();
-        self.gate.begin(if is_partial { FrameExtent::Partial } else { FrameExtent::Whole });
+        self.admission_check.begin(if is_partial {
+            FrameExtent::Partial
+        } else {
+            FrameExtent::Whole
+        });
         Ok(Progress::Begun { epoch: frame.id.epoch })
     }
 
@@ -110,7 +114,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         let Some(at) = frame.locate(packet.sequence, 0..0)? else {
             return Ok(Progress::Duplicate);
         };
-        self.gate.place(pose.map_err(ReceiveError::Pose)?);
+        self.admission_check.place(pose.map_err(ReceiveError::Pose)?);
         Ok(stored(self.collector.take_rows(contribution, at)?, packet.epoch))
     }
 
@@ -188,7 +192,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
     #[inline]
     pub(super) fn check_weight(&self, row: u32, weight: f32) -> Result<(), ReceiveError> {
         let out_of_range = ReceiveError::OutOfRange { first: row, count: 1 };
-        let [low, high] = self.gate.weight_range(row).ok_or(out_of_range)?;
+        let [low, high] = self.admission_check.weight_range(row).ok_or(out_of_range)?;
         if !weight.is_finite() {
             return Err(ReceiveError::NotFinite { row });
         }
@@ -205,7 +209,7 @@ impl<G: Gate, M: Mac> Assembler<'_, G, M> {
         rows: Range<u32>,
     ) -> Result<Progress, ReceiveError> {
         self.is_dirty = true;
-        self.gate.moved(rows);
+        self.admission_check.moved(rows);
         Ok(stored(self.collector.take_rows(contribution, at)?, epoch))
     }
 }

@@ -1,13 +1,13 @@
 //! The motion from the published frame to the current one, measured in slices while its rows arrive.
 //!
 //! The assembler measures it itself, because it alone knows that both frames are unchanged until the later one is
-//! published: so no gate and no user can understate the motion. The limit on speed is the gate's, because with nodes,
-//! weights or a pose a vertex moves by another length than its row.
+//! published: so no admission check and no user can understate the motion. The limit on speed is the admission
+//! check's, because with nodes, weights or a pose a vertex moves by another length than its row.
 
 // Requirement: T-04
 
 use crate::math::sqrt::sqrt;
-use crate::stretch::{Comparison, Gate, largest_change, largest_step};
+use crate::stretch::{AdmissionCheck, Comparison, largest_change, largest_step};
 use crate::surface::{MotionReading, MotionUnit, PredictionCheck, VertexTable};
 
 /// Most units of an extrapolated step: more than 32 times the root sphere's radius.
@@ -40,10 +40,11 @@ impl StepMeter {
     }
 
     /// Compares at most `work` of the rows below `ready` with the published ones, and with their extrapolation from an
-    /// earlier frame, if there is one; of these rows only those whose motion the gate counts. Returns the work left.
-    pub fn compare<V: VertexTable + ?Sized, G: Gate>(
+    /// earlier frame, if there is one; of these rows only those whose motion the admission check counts. Returns the
+    /// work left.
+    pub fn compare<V: VertexTable + ?Sized, G: AdmissionCheck>(
         &mut self,
-        gate: &G,
+        admission_check: &G,
         (now, before): (&V, &V),
         earlier: Option<&Earlier<'_, V>>,
         ready: u32,
@@ -52,7 +53,7 @@ impl StepMeter {
         let waiting = ready.saturating_sub(self.rows);
         let rows = if waiting < work { waiting } else { work };
         let end = self.rows.saturating_add(rows);
-        let counted = (self.rows..end).filter(|&row| gate.carries(row));
+        let counted = (self.rows..end).filter(|&row| admission_check.carries(row));
         let largest = self.largest;
         (self.largest, self.off) = match earlier {
             Some(&Earlier { frame, units, t }) => {

@@ -25,11 +25,9 @@
 
 use glam::{Vec3, Vec4};
 
+use crate::math::round::U;
 use crate::math::sqrt::sqrt;
 use crate::math::vec3x4::Vec3x4;
-
-/// Half a unit in the last place of 1.
-pub(super) const U: f32 = 1.0 / 16_777_216.0;
 
 /// The least square that is measured, that of a half: a smaller one would make no search faster, and products do not
 /// underflow.

@@ -2,7 +2,7 @@
 
 // Requirements: F-02, F-03
 
-mod gate;
+mod admission;
 mod kernel;
 mod limits;
 mod monitor;
@@ -17,7 +17,9 @@ use core::fmt;
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
 use crate::tree::{Index, Tree, TriangleRow};
 
-pub use gate::{Admission, Comparison, FrameExtent, Gate, IncomingSurface, NoGate};
+pub use admission::{
+    Admission, AdmissionCheck, Comparison, FrameExtent, IncomingSurface, NoAdmissionCheck,
+};
 use kernel::Worst;
 #[cfg(feature = "nodes")]
 pub(crate) use kernel::{LEAST, root_up, squared_limit};

@@ -9,8 +9,8 @@ use super::pass::{ALL, Pass};
 use super::regions::region_rows;
 use super::volume::Volume;
 use super::{
-    Admission, Comparison, FrameExtent, Gate, IncomingSurface, StretchError, SurfaceLimits,
-    check_tables,
+    Admission, AdmissionCheck, Comparison, FrameExtent, IncomingSurface, StretchError,
+    SurfaceLimits, check_tables,
 };
 use crate::surface::{Millis, MotionUnit, REGIONS, SurfaceBlend, VertexTable};
 use crate::tree::{Index, SurfaceFacts, Tree, TriangleRow};
@@ -18,8 +18,8 @@ use crate::tree::{Index, SurfaceFacts, Tree, TriangleRow};
 /// Largest number of blocks of vertex rows, in which moved rows of a partial frame are marked.
 const BLOCKS: usize = 32;
 
-/// Measures every frame before it is published, a few triangles at a time. This [`Gate`] refuses surfaces stretched,
-/// shrunk or moved beyond their limits, and gives the query the measured stretch.
+/// Measures every frame before it is published, a few triangles at a time. This [`AdmissionCheck`] refuses surfaces
+/// stretched, shrunk or moved beyond their limits, and gives the query the measured stretch.
 ///
 /// A whole frame is measured as it arrives: a triangle is checked once its corners have arrived, and rows are sorted so
 /// that corners arrive along with their triangles. Of a partial frame only the [`REGIONS`] with a moved corner are
@@ -35,9 +35,9 @@ const BLOCKS: usize = 32;
 /// extrapolation, `now + 2 (now - before)`, with the published frame as `before`. By convexity the two bound the
 /// stretch of all surfaces between.
 ///
-/// Cost: [`advance`](Gate::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: at most 800
-/// bytes for any surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes two passes over the
-/// triangles.
+/// Cost: [`advance`](AdmissionCheck::advance) checks at most `work` rows and triangles, plus O([`REGIONS`]). RAM: at
+/// most 800 bytes for any surface, and 300 bytes more with the extrapolation. [`new`](Self::new) makes two passes over
+/// the triangles.
 ///
 /// ```
 /// use dibs_build::{Builder, generate};
@@ -247,7 +247,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
     }
 }
 
-impl<I: Index, const SURFACES: usize> Gate for StretchMonitor<'_, I, SURFACES> {
+impl<I: Index, const SURFACES: usize> AdmissionCheck for StretchMonitor<'_, I, SURFACES> {
     fn begin(&mut self, changed: FrameExtent) {
         self.changed = changed;
         self.next_row = 0;

@@ -77,7 +77,7 @@ const PUBLISHED: u32 = 8;
 /// # drop(frame);
 /// let latest = reader.latest(Millis(1008)); // the receiver's clock
 /// assert_eq!(latest.frame().unwrap().age, Millis(8));
-/// assert!(latest.within(Millis(50)).is_ok());
+/// assert!(latest.within(Millis(80)).is_ok());
 /// ```
 #[derive(Debug)]
 pub struct Frames<const N: usize, const BUFFERS: usize = 2> {

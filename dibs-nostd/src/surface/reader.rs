@@ -191,7 +191,8 @@ impl VertexTable for FrameGuard<'_> {
     }
 }
 
-/// Its motion since other frames is known if an [`Assembler`](crate::Assembler) with a tree's gate published them all.
+/// Its motion since other frames is known if an [`Assembler`](crate::Assembler) with a tree's admission check
+/// published them all.
 impl MovingSurface for FrameGuard<'_> {
     fn motion(&self) -> Option<MotionReading> {
         self.view.motion()

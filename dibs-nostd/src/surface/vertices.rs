@@ -13,7 +13,7 @@ pub trait VertexTable {
     /// Number of vertices.
     fn len(&self) -> usize;
 
-    /// Position of one vertex in the mesh's unit (mm), or `None` outside the table.
+    /// Position of one vertex in mm, or `None` outside the table.
     fn position(&self, vertex: u32) -> Option<Vec3>;
 
     /// Number of the frame, if it has one, so that a measurement of another frame is refused.

@@ -54,7 +54,7 @@ impl Axis {
 }
 
 impl Capsule {
-    /// All points within `radius` of the segment from `start` to `end`, in the mesh's unit and frame.
+    /// All points within `radius` of the segment from `start` to `end`, in millimetres and the mesh's frame.
     ///
     /// # Errors
     /// A coordinate or radius that is not finite or exceeds [`super::MAX_COORDINATE`], or a negative

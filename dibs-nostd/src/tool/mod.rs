@@ -37,7 +37,7 @@ pub const MAX_COORDINATE: f32 = 536_870_912.0;
 
 /// A rigid instrument. [`Sphere`] and [`Capsule`] implement it.
 ///
-/// All lengths are in the mesh's own unit (mm in the examples), all points in the mesh's frame.
+/// All lengths are in millimetres, all points in the mesh's frame.
 pub trait Tool: Copy + sealed::Sealed {
     /// Radius of the tool around its axis: finite, not negative.
     fn radius(&self) -> f32;

@@ -15,7 +15,7 @@ pub struct Sphere {
 }
 
 impl Sphere {
-    /// A sphere of `radius` around `center`, in the mesh's unit and frame.
+    /// A sphere of `radius` around `center`, in millimetres and the mesh's frame.
     ///
     /// # Errors
     /// A coordinate or radius that is not finite or exceeds [`super::MAX_COORDINATE`], or a negative

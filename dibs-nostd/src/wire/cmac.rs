@@ -22,7 +22,7 @@ use super::{Code, Direction, Mac};
 ///
 /// ```
 /// use dibs_nostd::wire::{AesCmac, Encoding, FrameEncoder, FrameId};
-/// use dibs_nostd::{Assembler, Frames, Millis, ReceiveError, NoGate, glam::Vec3};
+/// use dibs_nostd::{Assembler, Frames, Millis, ReceiveError, NoAdmissionCheck, glam::Vec3};
 ///
 /// let key = *b"a secret of ours";
 /// let receiver = 7; // this controller's number
@@ -30,7 +30,7 @@ use super::{Code, Direction, Mac};
 /// let frames = Frames::<2>::new();
 /// let (writer, mut reader) = frames.split().unwrap();
 /// let mac = AesCmac::new(&key, receiver, challenge);
-/// let mut assembler = Assembler::with_mac(writer, NoGate, 0xB0D1, 1e3, mac);
+/// let mut assembler = Assembler::with_mac(writer, NoAdmissionCheck, 0xB0D1, 1e3, mac);
 ///
 /// let mut send = |key: &[u8; 16], epoch| {
 ///     let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch };

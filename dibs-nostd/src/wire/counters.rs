@@ -93,11 +93,11 @@ events! {
     TooFar: "too far",
     /// The packets do not match the commit's digest.
     Digest: "digest",
-    /// The gate refused the surface: stretched too far, or not measured.
+    /// The admission check refused the surface: stretched too far, or not measured.
     Stretch: "stretch",
-    /// The gate refused the surface: a region has shrunk too far.
+    /// The admission check refused the surface: a region has shrunk too far.
     Shrunk: "shrunk",
-    /// The gate refused the surface: a vertex moved too fast.
+    /// The admission check refused the surface: a vertex moved too fast.
     TooFast: "too fast",
     /// A hello without a tag came too soon after one that is answered.
     Throttled: "throttled",
@@ -125,9 +125,9 @@ impl fmt::Display for Event {
 /// let mut counters = dibs_nostd::wire::Counters::new();
 /// assert_eq!(counters.to_string(), "no events");
 /// assert_eq!(format!("{counters:?}"), "{}");
-/// # use dibs_nostd::{Assembler, Frames, Millis, NoGate};
+/// # use dibs_nostd::{Assembler, Frames, Millis, NoAdmissionCheck};
 /// # let frames = Frames::<3>::new();
-/// # let mut assembler = Assembler::new(frames.split().unwrap().0, NoGate, 7, 1e3);
+/// # let mut assembler = Assembler::new(frames.split().unwrap().0, NoAdmissionCheck, 7, 1e3);
 /// assembler.accept(&[1, 2, 3], Millis(0)).unwrap_err();
 /// assert_eq!(assembler.counters().to_string(), "damaged 1");
 /// assert_eq!(format!("{:?}", assembler.counters()), r#"{"damaged": 1}"#);

@@ -2,7 +2,7 @@
 //! is a sequence of packets, each after its length; packets of odd length get a right checksum.
 #![no_main]
 
-use dibs_nostd::{Millis, Assembler, Frames, NoGate, VertexTable};
+use dibs_nostd::{Millis, Assembler, Frames, NoAdmissionCheck, VertexTable};
 use dibs_nostd::wire::Deframer;
 use dibs_tests::bus::{MESH, N, reseal};
 use libfuzzer_sys::fuzz_target;
@@ -10,7 +10,7 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|input: &[u8]| {
     let frames = Frames::<N>::new();
     let (writer, mut reader) = frames.split().expect("split once");
-    let mut assembler = Assembler::new(writer, NoGate, MESH, 100.0);
+    let mut assembler = Assembler::new(writer, NoAdmissionCheck, MESH, 100.0);
     let mut deframer = Deframer::<1024>::new();
     let mut rest = input;
     let mut now = 0;

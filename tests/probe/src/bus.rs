@@ -19,14 +19,17 @@ pub const KEY: [u8; 16] = *b"sixteen bytes...";
 pub const RECEIVER: u32 = 7;
 
 /// The check of a frame, which may have a pose.
-pub type PoseCheck<'s, 't> = <PosedRows as Rows>::Gate<'s, 't, u16>;
+pub type PoseCheck<'s, 't> = <PosedRows as Rows>::AdmissionCheck<'s, 't, u16>;
 
 /// A new check.
 #[must_use]
-pub fn gate<'s, 't>(tree: &Tree<'t, u16>, poses: &'s Poses) -> Option<PoseCheck<'s, 't>> {
+pub fn admission_check<'s, 't>(
+    tree: &Tree<'t, u16>,
+    poses: &'s Poses,
+) -> Option<PoseCheck<'s, 't>> {
     let limits = SurfaceLimits::reach_mm(1e3).speed(1e3);
     let rows = <PosedRows as Rows>::of(tree).ok()?;
-    <PosedRows as Rows>::gate(tree, &rows, limits, poses).ok()
+    <PosedRows as Rows>::admission_check(tree, &rows, limits, poses).ok()
 }
 
 /// A pose's numbers: of its rotation, then of its shift.

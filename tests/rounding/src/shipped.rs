@@ -57,14 +57,14 @@ impl<T> Search<T> {
 
     fn lower_cutoff_to_pin(&mut self, _: Vec3, _: f32) {}
 
-    fn push(&mut self, _: usize, subtree: Waiting) -> Option<()> {
+    fn push(&mut self, _: usize, subtree: WaitingNode) -> Option<()> {
         self.pushed = Some(subtree.lower);
         Some(())
     }
 }
 
 #[derive(Clone, Copy)]
-struct Waiting {
+struct WaitingNode {
     lower: f32,
     link: u32,
 }

@@ -44,9 +44,9 @@ impl<'m> Receiver<'m> {
         let both = [buffer(0, first), buffer(1, second)];
         let (writer, reader) = Buffers::new(&memory.state, both, None).ends();
         let limits = SurfaceLimits::reach_mm(5_000.0).recovery_mm(f32::INFINITY).shrinkage(0.0);
-        let gate = NodeMonitor::new(nodes).limits(limits);
+        let admission_check = NodeMonitor::new(nodes).limits(limits);
         let mesh_id = nodes.mesh_id();
-        let assembler = Assembler::new(writer, gate, mesh_id, 5_000.0);
+        let assembler = Assembler::new(writer, admission_check, mesh_id, 5_000.0);
         Self { assembler, reader, mesh_id, epoch: 0 }
     }
 

@@ -10,7 +10,7 @@ use dibs_nostd::wire::{
     AesCmac, Code, Content, Direction, Encoding, FrameEncoder, FrameId, Freshness, Mac, NoMac,
     encode_heartbeat,
 };
-use dibs_nostd::{Assembler, Millis, NoGate, ReceiveError};
+use dibs_nostd::{Assembler, Millis, NoAdmissionCheck, ReceiveError};
 use dibs_stream::SendError;
 use dibs_tests::bus::*;
 
@@ -266,7 +266,8 @@ fn keys_differ_by_receiver_and_direction() {
 #[test]
 fn a_frame_counts_once() {
     let (mut assembler, _reader) = bus();
-    let rejections = |assembler: &Assembler<'static, NoGate>| assembler.health().rejections;
+    let rejections =
+        |assembler: &Assembler<'static, NoAdmissionCheck>| assembler.health().rejections;
     for packet in frame(1, true) {
         give(&mut assembler, &packet).unwrap();
     }

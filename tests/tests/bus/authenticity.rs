@@ -7,7 +7,7 @@ use dibs_nostd::wire::{
     TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_hello, encode_status,
 };
 use dibs_nostd::{
-    Assembler, FrameReader, Frames, Millis, NoGate, Progress, ReceiveError, SurfaceFacts,
+    Assembler, FrameReader, Frames, Millis, NoAdmissionCheck, Progress, ReceiveError, SurfaceFacts,
 };
 use dibs_tests::bus::*;
 use proptest::prelude::*;
@@ -16,7 +16,7 @@ const KEY: [u8; 16] = *b"0123456789abcdef";
 const CHALLENGE: u64 = 0x5EED_0000_00C0_FFEE;
 const RECEIVER: u32 = 7;
 
-type Guarded = (Assembler<'static, NoGate, AesCmac>, FrameReader<'static>);
+type Guarded = (Assembler<'static, NoAdmissionCheck, AesCmac>, FrameReader<'static>);
 
 fn mac() -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, CHALLENGE)
@@ -25,7 +25,7 @@ fn mac() -> AesCmac {
 fn guarded() -> Guarded {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::with_mac(writer, NoGate, MESH, 100.0, mac()), reader)
+    (Assembler::with_mac(writer, NoAdmissionCheck, MESH, 100.0, mac()), reader)
 }
 
 fn tagged(session: u32, epoch: u32, mac: &AesCmac) -> Vec<Vec<u8>> {
@@ -159,7 +159,7 @@ fn recordings_are_worth_nothing() {
     let frames = Frames::<N>::new();
     let (writer, _reader) = frames.split().unwrap();
     let other = mac().with_challenge(CHALLENGE + 1);
-    let mut restarted = Assembler::with_mac(writer, NoGate, MESH, 100.0, other);
+    let mut restarted = Assembler::with_mac(writer, NoAdmissionCheck, MESH, 100.0, other);
     for packet in &recorded {
         assert!(give(&mut restarted, packet).is_err());
     }

@@ -285,7 +285,8 @@ fn gaps_are_bounded() {
     let positions: Vec<Vec3> = (0..200).map(|i| Vec3::splat(i as f32 * 0.01)).collect();
     let frames: &'static dibs_nostd::Frames<200> = Box::leak(Box::new(dibs_nostd::Frames::new()));
     let (writer, mut reader) = frames.split().unwrap();
-    let mut assembler = dibs_nostd::Assembler::new(writer, dibs_nostd::NoGate, MESH, 100.0);
+    let mut assembler =
+        dibs_nostd::Assembler::new(writer, dibs_nostd::NoAdmissionCheck, MESH, 100.0);
     let packets = packets::<64>(1, Encoding::Float, &positions);
     give(&mut assembler, &packets[0]).unwrap();
     let mut refused = Vec::new();

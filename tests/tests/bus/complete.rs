@@ -11,8 +11,8 @@ use dibs_nostd::wire::{
     Rows, StreamError, enframe, framed_bytes,
 };
 use dibs_nostd::{
-    Admission, Advance, FrameExtent, Gate, IncomingSurface, Millis, Progress, ReceiveError,
-    StretchError, VertexTable,
+    Admission, AdmissionCheck, Advance, FrameExtent, IncomingSurface, Millis, Progress,
+    ReceiveError, StretchError, VertexTable,
 };
 use dibs_tests::bus::*;
 
@@ -143,10 +143,10 @@ fn two_frames_of_one_epoch_are_never_mixed() {
     assert_eq!(assembler.counters().of(Event::Abandoned), 1);
 }
 
-/// A gate that refuses complete surfaces while the cell is true.
+/// An admission check that refuses complete surfaces while the cell is true.
 struct Refuse(Rc<Cell<bool>>);
 
-impl Gate for Refuse {
+impl AdmissionCheck for Refuse {
     fn begin(&mut self, _: FrameExtent) {}
 
     fn advance<V: VertexTable + ?Sized>(
@@ -195,7 +195,7 @@ fn a_refused_surface_is_not_published_and_the_last_one_stays() {
     assert_eq!(assembler.counters().of(Event::Stretch), 1);
 }
 
-/// A gate that takes 100 units of work for a frame, and counts its calls.
+/// An admission check that takes 100 units of work for a frame, and counts its calls.
 struct Slow {
     left: u32,
     began: Rc<Cell<u32>>,
@@ -203,7 +203,7 @@ struct Slow {
     published: Rc<Cell<u32>>,
 }
 
-impl Gate for Slow {
+impl AdmissionCheck for Slow {
     fn begin(&mut self, _: FrameExtent) {
         self.left = 100;
         self.began.set(self.began.get() + 1);
@@ -234,9 +234,9 @@ impl Gate for Slow {
 #[test]
 fn a_frame_is_checked_in_slices_and_then_published() {
     let [began, moved, done] = [(); 3].map(|()| Rc::new(Cell::new(0)));
-    let gate =
+    let admission_check =
         Slow { left: 0, began: began.clone(), moved: moved.clone(), published: done.clone() };
-    let (mut assembler, mut reader) = bus_with(gate);
+    let (mut assembler, mut reader) = bus_with(admission_check);
     let packets = frame(1, false);
     for packet in &packets {
         assembler.accept(packet, Millis(0)).unwrap();

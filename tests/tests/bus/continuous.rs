@@ -7,8 +7,8 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Assembler, FrameLabel, FrameReader, Frames, Gate, Millis, MovingSurface, NoGate,
-    Options, Query, Sphere, SurfaceLimits, Tracker, Tree, VertexTable,
+    AdmissionCheck, Advance, Assembler, FrameLabel, FrameReader, Frames, Millis, MovingSurface,
+    NoAdmissionCheck, Options, Query, Sphere, SurfaceLimits, Tracker, Tree, VertexTable,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::deform::unit;
@@ -31,7 +31,7 @@ fn heart() -> (Mesh, Vec<Vec<Vec3>>, BuiltTree) {
 }
 
 /// Sends a frame, either whole or based on the published one; true if it was published.
-fn send<G: Gate>(
+fn send<G: AdmissionCheck>(
     bus: &mut Bus<G>,
     mesh_id: u32,
     epoch: u32,
@@ -244,14 +244,14 @@ fn a_surface_of_unknown_motion_is_held() {
         writer.publish(label).expect("complete");
         assert_eq!(is_held(&mut reader, 20 * epoch + 5), [true; 2]);
     }
-    // With a gate that measures nothing.
-    let mut bus = Assembler::new(writer, NoGate, tree.mesh_id(), 1_000.0);
+    // With an admission check that measures nothing.
+    let mut bus = Assembler::new(writer, NoAdmissionCheck, tree.mesh_id(), 1_000.0);
     for epoch in 10..14 {
         let rows = &motion[epoch as usize];
         assert!(send(&mut bus, tree.mesh_id(), epoch, rows, None, 20 * epoch, &mut rng));
         assert_eq!(is_held(&mut reader, 20 * epoch + 5), [true; 2]);
     }
-    // With a gate that measures each frame but not the motion from it, and a frame of the same time.
+    // With an admission check that measures each frame but not the motion from it, and a frame of the same time.
     let frames: &'static Continuous = Box::leak(Box::new(Frames::new()));
     let (writer, mut reader) = frames.split().expect("once");
     let leaked: &'static Tree<'static, u16> =

@@ -6,15 +6,17 @@ use std::collections::BTreeMap;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder};
-use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, NoGate, VertexTable};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, NoAdmissionCheck, VertexTable};
 use dibs_tests::bus::*;
 
 /// Rows of the surface: three packets.
 const ROWS: usize = 9;
 
-fn receiver<const R: usize>(frames: &Frames<R>) -> (Assembler<'_, NoGate>, FrameReader<'_>) {
+fn receiver<const R: usize>(
+    frames: &Frames<R>,
+) -> (Assembler<'_, NoAdmissionCheck>, FrameReader<'_>) {
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::new(writer, NoGate, MESH, 1e3), reader)
+    (Assembler::new(writer, NoAdmissionCheck, MESH, 1e3), reader)
 }
 
 /// A model of the specification for a line without damage: it stores which packets have arrived.

@@ -4,7 +4,7 @@
 
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Guidance, SpringDamper};
-use dibs_nostd::failsafe::{LimitError, Limits, State, Watch};
+use dibs_nostd::failsafe::{LimitError, Limits, State, ThresholdPair};
 use dibs_nostd::filter::{Filter, FilterError, Reason, RigidMotion};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::guard::{Answer, Bus, Guard, GuardLimits, Surface};
@@ -181,7 +181,7 @@ fn the_state_is_safe_until_acknowledged_and_after_the_age() {
 fn a_line_without_statuses_is_a_written_choice() {
     let heart = generate::heart(320).expect("a valid size").mesh;
     let built = Builder::new().build(&heart).expect("a valid mesh");
-    let age = Watch::new(Millis(2_250), Millis(3_000)).expect("in order");
+    let age = ThresholdPair::new(Millis(2_250), Millis(3_000)).expect("in order");
     let own = Limits::new(age, 0.02).expect("a speed");
     let cases = [(false, State::Safe), (true, State::Nominal)];
     for (has_own, (is_left_out, expected)) in

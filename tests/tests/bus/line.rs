@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{AesCmac, Encoding, FrameEncoder, FrameId, Freshness, Mac, encode_status};
-use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, NoGate};
+use dibs_nostd::{Advance, Assembler, FrameReader, Frames, Millis, NoAdmissionCheck};
 use dibs_stream::transport::Transport;
 use dibs_stream::{SendError, Sender, Settings, SurfaceOrder};
 use dibs_tests::bus::*;
@@ -20,12 +20,12 @@ pub fn mac() -> AesCmac {
     AesCmac::new(&KEY, RECEIVER, 77)
 }
 
-pub type Guarded<M = AesCmac> = Assembler<'static, NoGate, M>;
+pub type Guarded<M = AesCmac> = Assembler<'static, NoAdmissionCheck, M>;
 
 pub fn guarded<M: Mac>(mac: M) -> (Guarded<M>, FrameReader<'static>) {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::with_mac(writer, NoGate, MESH, 100.0, mac), reader)
+    (Assembler::with_mac(writer, NoAdmissionCheck, MESH, 100.0, mac), reader)
 }
 
 pub fn tagged(id: FrameId, positions: &[Vec3], freshness: Freshness) -> Vec<Vec<u8>> {

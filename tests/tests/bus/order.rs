@@ -8,7 +8,8 @@ use dibs_nostd::wire::{
     encode_heartbeat, encode_status,
 };
 use dibs_nostd::{
-    Advance, Assembler, Frames, LastHeartbeat, Millis, NoGate, Progress, ReceiveError, VertexTable,
+    Advance, Assembler, Frames, LastHeartbeat, Millis, NoAdmissionCheck, Progress, ReceiveError,
+    VertexTable,
 };
 use dibs_tests::bus::*;
 
@@ -153,7 +154,7 @@ fn the_sequence_is_used_up_to_its_end() {
     const ROWS: usize = 3 * 65_534;
     static FRAMES: Frames<ROWS> = Frames::new();
     let (writer, mut reader) = FRAMES.split().unwrap();
-    let mut assembler = Assembler::new(writer, NoGate, MESH, 1e6);
+    let mut assembler = Assembler::new(writer, NoAdmissionCheck, MESH, 1e6);
     let positions: Vec<_> = (0..ROWS).map(|i| Vec3::splat(i as f32)).collect();
     let mut encoder = FrameEncoder::<_, 64>::new(id(1), Encoding::Float, &positions[..]).unwrap();
     let mut buffer = [0; 64];

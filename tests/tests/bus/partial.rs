@@ -5,8 +5,8 @@
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{EncodeError, Encoding, Event, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, FrameReader, Frames, Millis, NoGate, ReceiveError, StretchMonitor,
-    VertexTable,
+    Advance, Assembler, FrameReader, Frames, Millis, NoAdmissionCheck, ReceiveError,
+    StretchMonitor, VertexTable,
 };
 use dibs_tests::bus::*;
 use fastrand::Rng;
@@ -14,10 +14,10 @@ use fastrand::Rng;
 /// Rows of the larger surface, which takes several packets and several slices of copying.
 const ROWS: usize = 300;
 
-fn large() -> (Assembler<'static, NoGate>, FrameReader<'static>) {
+fn large() -> (Assembler<'static, NoAdmissionCheck>, FrameReader<'static>) {
     let frames: &'static Frames<ROWS> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::new(writer, NoGate, MESH, 1e4), reader)
+    (Assembler::new(writer, NoAdmissionCheck, MESH, 1e4), reader)
 }
 
 fn read(reader: &mut FrameReader<'_>) -> Vec<Vec3> {
@@ -224,7 +224,7 @@ fn copying_is_bounded_and_rows_wait_for_it() {
 #[test]
 fn memory_does_not_grow_with_marks() {
     fn besides<const N: usize>() -> (usize, usize) {
-        (size_of::<Frames<N>>() - 24 * N, size_of::<Assembler<'static, NoGate>>())
+        (size_of::<Frames<N>>() - 24 * N, size_of::<Assembler<'static, NoAdmissionCheck>>())
     }
     let one = besides::<1>();
     assert_eq!(one, besides::<42>());

@@ -7,8 +7,8 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Advance, Assembler, Fallback, FrameLabel, Frames, Gate, Millis, MovingSurface, Odometer,
-    Options, Query, Sphere, StretchMonitor, SurfaceLimits, Tracker, Tree, VertexTable,
+    AdmissionCheck, Advance, Assembler, Fallback, FrameLabel, Frames, Millis, MovingSurface,
+    Odometer, Options, Query, Sphere, StretchMonitor, SurfaceLimits, Tracker, Tree, VertexTable,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::deform::unit;
@@ -110,8 +110,8 @@ fn a_tracker_knows_the_motion_of_published_frames() {
     assert_eq!(unknown, 0, "{counts:?}");
 }
 
-/// After a small step a large one is measured again, to its last row, whatever work the gate does: the frames' readings
-/// advance as those of an odometer that measures whole frames.
+/// After a small step a large one is measured again, to its last row, whatever work the admission check does: the
+/// frames' readings advance as those of an odometer that measures whole frames.
 #[test]
 fn a_large_step_after_a_small_one_is_not_understated() {
     let mesh = generate::heart(320).expect("a valid size").mesh;
@@ -130,10 +130,10 @@ fn reading(surface: &impl MovingSurface) -> u64 {
     number.expect("a reading").parse().expect("a number")
 }
 
-fn follow<G: Gate>(tree: &Tree<'_, u16>, rest: &[Vec3], gate: G) {
+fn follow<G: AdmissionCheck>(tree: &Tree<'_, u16>, rest: &[Vec3], admission_check: G) {
     let frames: &'static Frames<ROWS> = Box::leak(Box::new(Frames::new()));
     let (writer, mut reader) = frames.split().expect("once");
-    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 1_000.0);
+    let mut assembler = Assembler::new(writer, admission_check, tree.mesh_id(), 1_000.0);
     let mut query = Query::<u16, MAX_STACK>::new(tree).expect("deep enough");
     let mut tracker = Tracker::<u16, MAX_STACK, 96>::new(tree).expect("deep enough");
     let tool = Sphere::new(Vec3::new(5.0, 5.0, 70.0), 2.0).expect("valid");

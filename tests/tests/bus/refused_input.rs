@@ -9,7 +9,8 @@ use dibs_nostd::wire::{
     WeightsEncoder, encode_heartbeat,
 };
 use dibs_nostd::{
-    Assembler, Frames, MAX_COORDINATE, Millis, NoGate, ReceiveError, SurfaceFacts, format::Unit,
+    Assembler, Frames, MAX_COORDINATE, Millis, NoAdmissionCheck, ReceiveError, SurfaceFacts,
+    format::Unit,
 };
 use dibs_tests::bus::{MESH, N, bus, collect, frame, give, id, packets, surface};
 use glam::Vec3;
@@ -54,7 +55,7 @@ fn no_limit_admits_coordinates_beyond_the_accurate_ones() {
     for (size, is_far) in [(MAX_COORDINATE, false), (MAX_COORDINATE.next_up(), true)] {
         let frames = Frames::<N>::new();
         let (writer, _reader) = frames.split().expect("new");
-        let mut assembler = Assembler::new(writer, NoGate, MESH, f32::INFINITY);
+        let mut assembler = Assembler::new(writer, NoAdmissionCheck, MESH, f32::INFINITY);
         let mut positions = surface(1);
         positions[1] = Vec3::X * size;
         let sent = packets::<64>(1, Encoding::Float, &positions);

@@ -2,19 +2,19 @@
 
 // Requirement: B-04
 
-use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, Watch};
+use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, ThresholdPair};
 use dibs_nostd::wire::{
     AesCmac, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, encode_heartbeat,
 };
-use dibs_nostd::{Assembler, BusHealth, FrameReader, Frames, Millis, NoGate};
+use dibs_nostd::{Assembler, BusHealth, FrameReader, Frames, Millis, NoAdmissionCheck};
 use dibs_tests::bus::*;
 
-type Line<M> = (Assembler<'static, NoGate, M>, FrameReader<'static>);
+type Line<M> = (Assembler<'static, NoAdmissionCheck, M>, FrameReader<'static>);
 
 fn line<M: Mac>(mac: M) -> Line<M> {
     let frames: &'static Frames<N> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().unwrap();
-    (Assembler::with_mac(writer, NoGate, MESH, 100.0, mac), reader)
+    (Assembler::with_mac(writer, NoAdmissionCheck, MESH, 100.0, mac), reader)
 }
 
 fn mac() -> AesCmac {
@@ -167,8 +167,8 @@ fn without_a_key_nothing_mutes() {
 #[test]
 fn publications_do_not_hide_forgeries() {
     let other = AesCmac::new(b"another key.....", 7, 77);
-    let watch = Watch::count(50, 500).unwrap();
-    let age = Watch::new(Millis(60), Millis(120)).unwrap();
+    let watch = ThresholdPair::count(50, 500).unwrap();
+    let age = ThresholdPair::new(Millis(60), Millis(120)).unwrap();
     let limits = Limits::new(age, 0.0).unwrap().without_transit();
     let limits = limits.forgeries(watch).unwrap().automatic();
     let drain = BusHealth::FORGERIES_A_SECOND;
@@ -221,8 +221,8 @@ fn publications_do_not_hide_forgeries() {
 /// A stranger sends stray rows with each frame for twenty seconds: with a key the state stays nominal.
 #[test]
 fn strangers_change_no_state() {
-    let age = Watch::new(Millis(60), Millis(120)).unwrap();
-    let rejections = Watch::count(10, 30).unwrap();
+    let age = ThresholdPair::new(Millis(60), Millis(120)).unwrap();
+    let rejections = ThresholdPair::count(10, 30).unwrap();
     let limits = Limits::new(age, 0.0).unwrap().without_transit();
     let limits = limits.rejections(rejections).automatic();
     for strays_a_frame in [1_u32, 11, 31] {

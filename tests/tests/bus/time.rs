@@ -6,7 +6,7 @@
 use std::sync::OnceLock;
 
 use dibs_build::{Builder, BuiltTree, generate};
-use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, Watch};
+use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, ThresholdPair};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId, Freshness};
 use dibs_nostd::{
@@ -161,7 +161,7 @@ fn a_surface_frozen_for_an_hour_is_never_nominal_again() {
     for (degraded, safe) in [(30_000, 60_000), (70_000, 90_000), (100_000, 120_000)] {
         let mut bus = Bus::new();
         let link = LinkStatus::new();
-        let watch = Watch::new(Millis(degraded), Millis(safe)).unwrap();
+        let watch = ThresholdPair::new(Millis(degraded), Millis(safe)).unwrap();
         let limits = Limits::new(watch, 0.0).unwrap().without_transit().dwell(0).automatic();
         let mut machine = FailSafe::new(limits);
         let mut last_nominal = 0;

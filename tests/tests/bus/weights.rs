@@ -5,11 +5,11 @@
 use dibs_build::Builder;
 use dibs_build::modes::ModalFit;
 use dibs_nostd::guard::{GuardLimits, PosedRows, Surface};
-use dibs_nostd::modes::{Memo, ModalGate, ModalReader, Modes};
+use dibs_nostd::modes::{Memo, ModalAdmissionCheck, ModalReader, Modes};
 use dibs_nostd::wire::{self, Encoding, Event, FrameEncoder, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Admission, Advance, Assembler, FrameExtent, Frames, Gate, IncomingSurface, Millis, Options,
-    Progress, Query, ReceiveError, Sphere, StretchError, Tree, TreeBytes, VertexTable,
+    Admission, AdmissionCheck, Advance, Assembler, FrameExtent, Frames, IncomingSurface, Millis,
+    Options, Progress, Query, ReceiveError, Sphere, StretchError, Tree, TreeBytes, VertexTable,
     measure_stretch,
 };
 use dibs_tests::bus::{collect, reseal};
@@ -22,7 +22,7 @@ use glam::{Quat, Vec3};
 struct Bus {
     tree: Tree<'static, u16>,
     modes: Modes<'static>,
-    assembler: Assembler<'static, ModalGate<'static, &'static Tree<'static, u16>, 4>>,
+    assembler: Assembler<'static, ModalAdmissionCheck<'static, &'static Tree<'static, u16>, 4>>,
     reader: ModalReader<'static, 'static, 4>,
     recorded: Vec<Vec<f32>>,
 }
@@ -35,11 +35,11 @@ fn bus() -> Bus {
     let modes = Modes::of(tree).expect("valid");
     let frames: &'static Frames<4> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().expect("new");
-    let gate = ModalGate::new(&modes, tree).expect("four modes");
+    let admission_check = ModalAdmissionCheck::new(&modes, tree).expect("four modes");
     Bus {
         tree: *tree,
         modes,
-        assembler: Assembler::new(writer, gate, tree.mesh_id(), 1e4),
+        assembler: Assembler::new(writer, admission_check, tree.mesh_id(), 1e4),
         reader: ModalReader::new(reader, &modes).expect("four modes"),
         recorded: built.modal_motion().expect("has modes").weights.clone(),
     }
@@ -188,7 +188,7 @@ fn the_gate_is_exact_whatever_the_bound() {
     let built = rest.with_modes(&fit, 4).expect("so many");
     let tree = built.tree::<u16>().expect("valid");
     let modes = Modes::of(&tree).expect("valid");
-    let mut gate = ModalGate::<_, 4>::new(&modes, &tree).expect("four modes");
+    let mut admission_check = ModalAdmissionCheck::<_, 4>::new(&modes, &tree).expect("four modes");
     let mut rng = Rng::with_seed(11);
     let (mut bounded, mut measured, mut refused) = (0, 0, 0);
     for _ in 0..2_000 {
@@ -197,13 +197,16 @@ fn the_gate_is_exact_whatever_the_bound() {
         let rows: Vec<Vec3> = weights.iter().map(|w| Vec3::new(*w, 0.0, 0.0)).collect();
         let surface = modes.surface::<4>(&weights).expect("in range");
         let exact = measure_stretch(&tree, &surface);
-        let before = gate.measured();
-        gate.begin(FrameExtent::Whole);
-        assert_eq!(gate.advance(IncomingSurface::new(&rows[..], 3), 1), Ok(Admission::Pending));
-        match (gate.advance(IncomingSurface::new(&rows[..], 4), u32::MAX), exact) {
+        let before = admission_check.measured();
+        admission_check.begin(FrameExtent::Whole);
+        assert_eq!(
+            admission_check.advance(IncomingSurface::new(&rows[..], 3), 1),
+            Ok(Admission::Pending)
+        );
+        match (admission_check.advance(IncomingSurface::new(&rows[..], 4), u32::MAX), exact) {
             (Ok(Admission::Admitted(Some(found))), Ok(exact)) => {
                 assert!(found.sigma() >= exact.sigma() * 0.9999);
-                if gate.measured() == before { bounded += 1 } else { measured += 1 }
+                if admission_check.measured() == before { bounded += 1 } else { measured += 1 }
             }
             (Err(StretchError::Exceeded { .. }), Err(StretchError::Exceeded { .. })) => {
                 refused += 1;

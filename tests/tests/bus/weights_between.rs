@@ -7,12 +7,12 @@ use dibs_build::glam::DVec3;
 use dibs_build::modes::ModalFit;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::modes::{ModalFrame, ModalGate, ModalReader, Modes};
+use dibs_nostd::modes::{ModalAdmissionCheck, ModalFrame, ModalReader, Modes};
 use dibs_nostd::wire::{FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Admission, Advance, Assembler, Fallback, FrameExtent, FrameLabel, FrameWriter, Frames, Gate,
-    IncomingSurface, Millis, MovingSurface, NoGate, Options, Query, Sphere, StretchError, Tracker,
-    Tree, VertexTable, measure_stretch,
+    Admission, AdmissionCheck, Advance, Assembler, Fallback, FrameExtent, FrameLabel, FrameWriter,
+    Frames, IncomingSurface, Millis, MovingSurface, NoAdmissionCheck, Options, Query, Sphere,
+    StretchError, Tracker, Tree, VertexTable, measure_stretch,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::modal::{anywhere, positions};
@@ -40,7 +40,13 @@ fn buffers(modes: &Modes<'static>) -> (FrameWriter<'static>, Reader) {
 }
 
 /// Sends a frame; true if it was published.
-fn send<G: Gate>(bus: &mut Bus<G>, mesh_id: u32, epoch: u32, weights: &[f32], now: u32) -> bool {
+fn send<G: AdmissionCheck>(
+    bus: &mut Bus<G>,
+    mesh_id: u32,
+    epoch: u32,
+    weights: &[f32],
+    now: u32,
+) -> bool {
     let id = FrameId { mesh_id, session: 1, epoch };
     let mut encoder = WeightsEncoder::<64>::new(id, weights).expect("can be sent");
     let (mut buffer, mut outcome) = ([0; 64], Ok(Advance::Idle));
@@ -100,8 +106,8 @@ fn the_surface_between_frames_of_weights_is_where_they_put_it() {
     let tree = surface();
     let modes = Modes::of(tree).expect("valid");
     let (writer, mut reader) = buffers(&modes);
-    let gate = ModalGate::<_, MODES>::new(&modes, tree).expect("four modes");
-    let mut bus = Assembler::new(writer, gate, tree.mesh_id(), 1e4);
+    let admission_check = ModalAdmissionCheck::<_, MODES>::new(&modes, tree).expect("four modes");
+    let mut bus = Assembler::new(writer, admission_check, tree.mesh_id(), 1e4);
     let mut query = Query::<u16, MAX_STACK>::new(tree).expect("deep enough");
     let mut trackers = [(); 3].map(|()| Tracker::<u16, MAX_STACK, 96>::new(tree).expect("deep"));
     let (mut known, mut now, mut tool) =
@@ -341,12 +347,12 @@ fn an_extrapolation_ends_at_the_ends_of_the_ranges() {
     assert!(ended > 2, "{ended}");
 }
 
-/// A gate that bounds no stretch.
+/// An admission check that bounds no stretch.
 struct WithinRange<'a>(&'a Modes<'a>);
 
-impl Gate for WithinRange<'_> {
+impl AdmissionCheck for WithinRange<'_> {
     fn begin(&mut self, changed: FrameExtent) {
-        NoGate.begin(changed);
+        NoAdmissionCheck.begin(changed);
     }
 
     fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
@@ -358,6 +364,6 @@ impl Gate for WithinRange<'_> {
         arriving: IncomingSurface<'_, V>,
         work: u32,
     ) -> Result<Admission, StretchError> {
-        NoGate.advance(arriving, work)
+        NoAdmissionCheck.advance(arriving, work)
     }
 }

@@ -4,10 +4,11 @@
 
 // Requirement: S-04
 
-mod valleys;
+mod basins;
 
 use std::sync::Mutex;
 
+use basins::{LIKE, MARGIN, Surroundings, basins, least_ridge};
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::format::MAX_STACK;
@@ -18,7 +19,6 @@ use dibs_tests::oracle::closest_pair;
 use dibs_tests::surfaces::{self, ball, sheet};
 use fastrand::Rng;
 use glam::Vec3;
-use valleys::{LIKE, MARGIN, Surroundings, least_ridge, valleys};
 
 fn build(mesh: &Mesh) -> (BuiltTree, Vec<Vec3>) {
     let built = Builder::new().stretch(1.5).build(mesh).expect("a valid mesh");
@@ -67,7 +67,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
                 assert_eq!(first.separation, closest.lower, "{name}: {closest:?}");
                 open += usize::from(closest.lower < closest.separation);
             }
-            let (truth, label) = valleys(&rows, &triangles, [from, to]);
+            let (truth, label) = basins(&rows, &triangles, [from, to]);
             // An axis that crosses may be inside in several parts, but only one of these has a contact.
             let is_bounded = is_crossing && contacts.bound() == closest.lower;
             assert!((contacts.bound() >= MARGIN || is_bounded) && !contacts.is_full());
@@ -76,20 +76,20 @@ fn no_contact_is_missing_and_none_is_doubled() {
             // The first contact of a crossing axis is its deepest point, and represents the whole crossing.
             let accuracy = f64::from(contacts.accuracy());
             for contact in contacts.iter().skip(usize::from(is_crossing)) {
-                let valley = label[contact.triangle.0 as usize];
+                let basin = label[contact.triangle.0 as usize];
                 // Walls in other directions are separate contacts, and separate those beside them.
                 let is_same = |other: &Contact| {
                     let rows = [contact, other].map(|at| at.triangle.0 as usize);
                     contact.normal.distance(other.normal) < LIKE && surroundings.connect(rows)
                 };
-                assert!(!found[valley].iter().any(is_same), "{name}: twice {:?}", truth[valley]);
-                found[valley].push(*contact);
+                assert!(!found[basin].iter().any(is_same), "{name}: twice {:?}", truth[basin]);
+                found[basin].push(*contact);
                 let corners =
                     triangles[contact.triangle.0 as usize].map(|v| rows[v as usize].as_dvec3());
                 let pair = closest_pair(from.as_dvec3(), to.as_dvec3(), corners);
                 let off = f64::from(contact.separation + radius) - pair.distance;
                 let off = off.abs() - f64::from(contacts.accuracy());
-                assert!(off <= 0.0, "{name}: {contact:?} {:?}", truth[valley]);
+                assert!(off <= 0.0, "{name}: {contact:?} {:?}", truth[basin]);
                 let apart = contact.point_on_tool - contact.point_on_surface;
                 assert!(
                     (apart.dot(contact.normal) - contact.separation).abs() < 1e-3,
@@ -97,12 +97,12 @@ fn no_contact_is_missing_and_none_is_doubled() {
                 );
             }
             let slack = 0.01;
-            for (listed, valley) in found.iter().zip(&truth) {
+            for (listed, basin) in found.iter().zip(&truth) {
                 let reach = f64::from(MARGIN + radius);
-                let is_apart = !is_crossing || valley.distance > accuracy;
-                let is_clear = is_apart && valley.distance < reach - slack && valley.up > 0.05;
-                let is_parted = valley.ridge > least_ridge(valley.distance) + slack;
-                assert!(!is_clear || !is_parted || !listed.is_empty(), "{name}: no {valley:?}");
+                let is_apart = !is_crossing || basin.distance > accuracy;
+                let is_clear = is_apart && basin.distance < reach - slack && basin.up > 0.05;
+                let is_parted = basin.ridge > least_ridge(basin.distance) + slack;
+                assert!(!is_clear || !is_parted || !listed.is_empty(), "{name}: no {basin:?}");
             }
             several += usize::from(contacts.len() > 1);
         }

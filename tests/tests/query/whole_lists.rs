@@ -120,7 +120,7 @@ fn a_budget_leaves_the_closest_pair_of_uncertain_positions() {
     assert!(cut > 300 && several > 100, "{cut} lists cut short, {several} of several contacts");
 }
 
-/// The tracker's pair is less exact than a query's. Its list is not: it parts the same valleys.
+/// The tracker's pair is less exact than a query's. Its list is not: it parts the same basins.
 #[test]
 fn a_tracked_list_has_the_contacts_of_a_query() {
     let mesh = generate::heart(10_272).expect("a valid size").mesh;

@@ -6,8 +6,8 @@ use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::modes::Modes;
 use dibs_nostd::{
-    Admission, FrameExtent, Gate, IncomingSurface, StretchError, StretchMonitor, SurfaceLimits,
-    measure_stretch,
+    Admission, AdmissionCheck, FrameExtent, IncomingSurface, StretchError, StretchMonitor,
+    SurfaceLimits, measure_stretch,
 };
 use fastrand::Rng;
 use glam::{Mat3, Vec3};
@@ -28,9 +28,9 @@ fn squashed(mesh: &Mesh, by: f32, turn: f32) -> Mesh {
 fn admitted(built: &BuiltTree, rows: &[Vec3], shrinkage: f32) -> Result<(), StretchError> {
     let tree = built.tree::<u16>().expect("small");
     let limits = SurfaceLimits::reach_mm(1e4).shrinkage(shrinkage);
-    let mut gate = StretchMonitor::new(&tree).expect("has a metric").limits(limits);
-    gate.begin(FrameExtent::Whole);
-    match gate.advance(IncomingSurface::new(rows, rows.len() as u32), u32::MAX)? {
+    let mut admission_check = StretchMonitor::new(&tree).expect("has a metric").limits(limits);
+    admission_check.begin(FrameExtent::Whole);
+    match admission_check.advance(IncomingSurface::new(rows, rows.len() as u32), u32::MAX)? {
         Admission::Admitted(_) => Ok(()),
         other => panic!("{other:?}"),
     }

@@ -9,9 +9,9 @@ use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::{NodeMonitor, Nodes};
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
-    Admission, Advance, Assembler, Coverage, Fallback, FrameExtent, Frames, Gate, IncomingSurface,
-    Millis, MovingSurface, Options, Query, ReceiveError, Sphere, StretchError, SurfaceLimits,
-    Tracker, VertexTable,
+    Admission, AdmissionCheck, Advance, Assembler, Coverage, Fallback, FrameExtent, Frames,
+    IncomingSurface, Millis, MovingSurface, Options, Query, ReceiveError, Sphere, StretchError,
+    SurfaceLimits, Tracker, VertexTable,
 };
 use dibs_tests::bus::collect;
 use dibs_tests::climb::climb;
@@ -208,8 +208,8 @@ fn nodes_come_over_the_bus() {
     let frames: &'static Frames<NODES, 3> = Box::leak(Box::new(Frames::new()));
     let (writer, mut reader) = frames.split().expect("once");
     let limits = SurfaceLimits::reach_mm(500.0).speed(4.0).recovery_mm(150.0);
-    let gate = NodeMonitor::continuous(&nodes).limits(limits);
-    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 500.0);
+    let admission_check = NodeMonitor::continuous(&nodes).limits(limits);
+    let mut assembler = Assembler::new(writer, admission_check, tree.mesh_id(), 500.0);
     let mut tracker = Tracker::<u16, MAX_STACK, 96>::new(&tree).expect("deep enough");
     let rest = rest(&nodes);
     let (mut good, mut held) = (rest.clone(), rest.clone());

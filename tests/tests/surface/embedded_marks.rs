@@ -34,8 +34,8 @@ fn only_nodes_that_carry_a_vertex_count() {
     let frames: &'static Frames<NODES, 3> = Box::leak(Box::new(Frames::new()));
     let (writer, mut reader) = frames.split().expect("once");
     let limits = SurfaceLimits::reach_mm(500.0).speed(0.1);
-    let gate = NodeMonitor::new(&nodes).limits(limits);
-    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 500.0);
+    let admission_check = NodeMonitor::new(&nodes).limits(limits);
+    let mut assembler = Assembler::new(writer, admission_check, tree.mesh_id(), 500.0);
     let (rest, mut odometer, mut epoch) = (rest(&nodes), nodes.odometer(), 0);
     let mut tracker = Tracker::<u16, MAX_STACK, 96>::new(&tree).expect("deep enough");
     let mut publish = |positions: &[Vec3]| {

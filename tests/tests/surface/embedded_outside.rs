@@ -6,8 +6,8 @@ use dibs_build::{BuildError, Builder, BuiltTree, Mesh, Volume, VolumeError, gene
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::{NodeMonitor, Nodes, NodesError};
 use dibs_nostd::{
-    Admission, FrameExtent, Gate, IncomingSurface, Millis, MovingSurface, Options, Sphere,
-    StretchError, SurfaceLimits, Tracker, Tree, VertexTable,
+    Admission, AdmissionCheck, FrameExtent, IncomingSurface, Millis, MovingSurface, Options,
+    Sphere, StretchError, SurfaceLimits, Tracker, Tree, VertexTable,
 };
 use dibs_tests::embedded::{cover, exact, hull, rest, rows, sections, shrunk};
 use dibs_tests::oracle::{Instrument, exhaustive};

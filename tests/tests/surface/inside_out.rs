@@ -6,7 +6,7 @@ use std::f32::consts::TAU;
 
 use dibs_build::{Builder, Mesh};
 use dibs_nostd::{
-    Admission, FrameExtent, Gate, IncomingSurface, StretchError, StretchMonitor, Tree,
+    Admission, AdmissionCheck, FrameExtent, IncomingSurface, StretchError, StretchMonitor, Tree,
 };
 use dibs_tests::surfaces::{ball, sheet, triangles};
 use glam::{Vec2, Vec3};

@@ -33,7 +33,7 @@ fn a_guard_takes_as_much_as_its_pages_say() {
     assert!(notes < 400 && bus < 3_000 && guard < 500, "{notes} {bus} {guard}");
 }
 
-/// Without its gate and the ends of the buffers.
+/// Without its admission check and the ends of the buffers.
 #[test]
 fn an_assembler_takes_less_than_700_bytes() {
     type Monitor = StretchMonitor<'static, u16>;

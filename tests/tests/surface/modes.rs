@@ -12,7 +12,7 @@ use dibs_build::modes::{FitError, MARGIN, ModalFit, Projector};
 use dibs_build::{Builder, IndexWidth, Motion, MotionStretch, Paths, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::modes::{
-    self, MAX_MODES, ModalGate, ModalReader, ModalSurface, Modes, WeightsError,
+    self, MAX_MODES, ModalAdmissionCheck, ModalReader, ModalSurface, Modes, WeightsError,
 };
 use dibs_nostd::{Frames, Index, Options, Query, StretchError, Tree, VertexTable, measure_stretch};
 use dibs_tests::modal::{anywhere, positions, small};
@@ -149,7 +149,7 @@ fn weights_that_make_no_surface_are_refused() {
     let (_, reader) = frames.split().expect("once");
     let refused = ModalReader::<4>::new(reader, &modes).expect_err("a row is missing");
     assert_eq!(refused, WeightsError::Count { expected: 4, found: 3 });
-    let refused = ModalGate::<_, 3>::new(&modes, &tree).err();
+    let refused = ModalAdmissionCheck::<_, 3>::new(&modes, &tree).err();
     assert_eq!(refused, Some(WeightsError::Count { expected: 4, found: 3 }));
     for mode in 0..4 {
         let [low, high] = modes.range(mode).expect("there");

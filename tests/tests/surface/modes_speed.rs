@@ -4,10 +4,10 @@
 
 use dibs_build::modes::ModalFit;
 use dibs_build::{Builder, BuiltTree};
-use dibs_nostd::modes::{ModalGate, ModalReader, Modes};
+use dibs_nostd::modes::{ModalAdmissionCheck, ModalReader, Modes};
 use dibs_nostd::wire::{Event, FrameId, WeightsEncoder};
 use dibs_nostd::{
-    Advance, Assembler, FrameExtent, Frames, Gate, IncomingSurface, Millis, ReceiveError,
+    AdmissionCheck, Advance, Assembler, FrameExtent, Frames, IncomingSurface, Millis, ReceiveError,
     StretchError, StretchMonitor, SurfaceLimits, Tree, VertexTable,
 };
 use dibs_tests::motions::trembling;
@@ -50,8 +50,9 @@ fn a_modal_surface_that_jumps_is_too_fast() {
     let frames: &'static Frames<MODES> = Box::leak(Box::new(Frames::new()));
     let (writer, reader) = frames.split().expect("new");
     let monitor = StretchMonitor::new(&tree).expect("measurable").limits(limits);
-    let gate = ModalGate::<_, MODES>::new(&modes, monitor).expect("four modes");
-    let mut assembler = Assembler::new(writer, gate, tree.mesh_id(), 1e4);
+    let admission_check =
+        ModalAdmissionCheck::<_, MODES>::new(&modes, monitor).expect("four modes");
+    let mut assembler = Assembler::new(writer, admission_check, tree.mesh_id(), 1e4);
     let mut reader = ModalReader::<MODES>::new(reader, &modes).expect("four modes");
     let mut send = |epoch: u32, weights: &[f32]| {
         let id = FrameId { mesh_id: tree.mesh_id(), session: 1, epoch };
@@ -66,7 +67,7 @@ fn a_modal_surface_that_jumps_is_too_fast() {
             }
         }
         let counted = [Event::TooFast, Event::Stretch].map(|event| assembler.counters().of(event));
-        (outcome, counted, assembler.gate().measured())
+        (outcome, counted, assembler.admission_check().measured())
     };
     let mut measured = 0;
     for (epoch, weights) in (1..).zip(recorded) {
@@ -118,17 +119,18 @@ fn the_limit_on_the_speed_of_modes_is_exact() {
             let limits = SurfaceLimits::reach_mm(1e4).speed(step * share / 5.0);
             let exact = monitor.clone().limits(limits);
             let farthest = exact.farthest(Millis(4));
-            let mut gate = ModalGate::<_, MODES>::new(&modes, exact).expect("four modes");
-            // A gate around it would ask it for the limit.
-            assert!(farthest < f32::INFINITY && gate.farthest(Millis(4)) == farthest);
-            gate.begin(FrameExtent::Whole);
+            let mut admission_check =
+                ModalAdmissionCheck::<_, MODES>::new(&modes, exact).expect("four modes");
+            // An admission check around it would ask it for the limit.
+            assert!(farthest < f32::INFINITY && admission_check.farthest(Millis(4)) == farthest);
+            admission_check.begin(FrameExtent::Whole);
             let before = Some((&before[..], Millis(4)));
-            let verdict = gate
+            let verdict = admission_check
                 .advance(IncomingSurface { before, ..IncomingSurface::new(&now[..], 4) }, u32::MAX);
             let is_fast = matches!(verdict, Err(StretchError::TooFast { .. }));
             assert_eq!(is_fast, !may_pass, "{share} of {step}: {verdict:?}");
             refused += u32::from(is_fast);
-            unmeasured += u32::from(gate.measured() == 0);
+            unmeasured += u32::from(admission_check.measured() == 0);
         }
     }
     println!("{refused} refused, {unmeasured} not measured");

@@ -9,8 +9,9 @@ use dibs_build::{Builder, BuiltTree, Motion, generate};
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{Encoding, Event, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Admission, Advance, Assembler, FrameExtent, FrameReader, Frames, Gate, IncomingSurface, Millis,
-    ReceiveError, StretchError, StretchMonitor, SurfaceLimits, Tree, VertexTable,
+    Admission, AdmissionCheck, Advance, Assembler, FrameExtent, FrameReader, Frames,
+    IncomingSurface, Millis, ReceiveError, StretchError, StretchMonitor, SurfaceLimits, Tree,
+    VertexTable,
 };
 use dibs_tests::bus::collect;
 

@@ -1,4 +1,4 @@
-//! The measured stretch compared with f64, and its use as a gate.
+//! The measured stretch compared with f64, and its use as an admission check.
 
 // Requirement: F-02
 
@@ -7,9 +7,9 @@ use dibs_nostd::format::{Join, MAX_STACK};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId};
 use dibs_nostd::{
-    Assembler, FrameExtent, Frames, Gate, IncomingSurface, MeasuredStretch, Options, Query,
-    QueryError, REGIONS, ReceiveError, Sphere, StretchError, StretchMonitor, Tree, TriangleRow,
-    measure_stretch,
+    AdmissionCheck, Assembler, FrameExtent, Frames, IncomingSurface, MeasuredStretch, Options,
+    Query, QueryError, REGIONS, ReceiveError, Sphere, StretchError, StretchMonitor, Tree,
+    TriangleRow, measure_stretch,
 };
 use dibs_tests::bus::give;
 use dibs_tests::deform::{Deformation, deformed, unit};
@@ -301,7 +301,7 @@ fn a_corner_outside_the_table_is_corrupt() {
     }
 }
 
-/// With a tree as the gate, a frame beyond the stretch limit is refused, and the earlier one stays.
+/// With a tree as the admission check, a frame beyond the stretch limit is refused, and the earlier one stays.
 #[test]
 fn a_surface_beyond_the_stretch_limit_is_refused() {
     let mesh = generate::heart(320).expect("a valid size").mesh;

@@ -4,16 +4,16 @@
 
 use dibs_build::{Builder, Paths, generate};
 use dibs_nostd::{
-    Admission, FrameExtent, Gate, IncomingSurface, MeasuredStretch, Millis, PathKind, REGIONS,
-    StretchError, StretchMonitor, SurfaceLimits, Tree, VertexTable, measure_stretch,
+    Admission, AdmissionCheck, FrameExtent, IncomingSurface, MeasuredStretch, Millis, PathKind,
+    REGIONS, StretchError, StretchMonitor, SurfaceLimits, Tree, VertexTable, measure_stretch,
 };
 use dibs_tests::deform::{Deformation, deformed, unit};
 use fastrand::Rng;
 use glam::Vec3;
 
-/// Passes a frame to a gate as a bus does: packets of rows in some order, and slices of work between them.
+/// Passes a frame to an admission check as a bus does: packets of rows in some order, and slices of work between them.
 fn feed<V: VertexTable + ?Sized>(
-    gate: &mut impl Gate,
+    admission_check: &mut impl AdmissionCheck,
     surface: &V,
     changed: FrameExtent,
     packets: &[std::ops::Range<u32>],
@@ -22,7 +22,7 @@ fn feed<V: VertexTable + ?Sized>(
     let rows = surface.len() as u32;
     let mut come = vec![changed == FrameExtent::Partial; rows as usize];
     packets.iter().cloned().flatten().for_each(|row| come[row as usize] = false);
-    gate.begin(changed);
+    admission_check.begin(changed);
     let most = 1 + rng.u32(..400);
     let (mut ready, mut calls) = (0, 0);
     let mut order: Vec<_> = packets.to_vec();
@@ -36,15 +36,15 @@ fn feed<V: VertexTable + ?Sized>(
         for row in packet.clone().into_iter().flatten() {
             come[row as usize] = true;
         }
-        packet.into_iter().for_each(|rows| gate.moved(rows));
+        packet.into_iter().for_each(|rows| admission_check.moved(rows));
         while ready < rows && come[ready as usize] {
             ready += 1;
         }
         let ready =
             if changed == FrameExtent::Partial && !is_last { ready.min(rows - 1) } else { ready };
         calls += 1;
-        assert!(calls < 10_000, "the gate does not come to an end");
-        match gate.advance(IncomingSurface::new(surface, ready), rng.u32(..=most))? {
+        assert!(calls < 10_000, "the admission check does not come to an end");
+        match admission_check.advance(IncomingSurface::new(surface, ready), rng.u32(..=most))? {
             Admission::Pending => (),
             Admission::Admitted(measured) => {
                 assert!(ready == rows, "admitted before it was complete");
@@ -190,8 +190,8 @@ fn paths_along_edges_are_measured_alike_in_slices() {
     }
 }
 
-/// A gate that is given the published frame compares the rows itself, in slices of any size and as far as they have
-/// arrived: it names the vertex that moved too far, and admits a frame without one.
+/// An admission check that is given the published frame compares the rows itself, in slices of any size and as far as
+/// they have arrived: it names the vertex that moved too far, and admits a frame without one.
 #[test]
 fn rows_are_compared_in_slices_of_any_size() {
     let (mesh, built, _) = deformed(0, 0);
@@ -213,7 +213,7 @@ fn rows_are_compared_in_slices_of_any_size() {
                 let outcome = loop {
                     ready = vertices.min(ready + each);
                     calls += 1;
-                    assert!(calls < 10_000, "the gate does not come to an end");
+                    assert!(calls < 10_000, "the admission check does not come to an end");
                     let before = Some((rest.as_slice(), Millis(9)));
                     let incoming = IncomingSurface::new(moved.as_slice(), ready);
                     match monitor.advance(IncomingSurface { before, ..incoming }, work) {

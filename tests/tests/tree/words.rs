@@ -6,13 +6,13 @@ use std::fmt::Display;
 
 use dibs_build::{Builder, generate};
 use dibs_nostd::constraint::{EnergyAccount, SpringDamper};
-use dibs_nostd::failsafe::{FailSafe, Limits, Watch};
+use dibs_nostd::failsafe::{FailSafe, Limits, ThresholdPair};
 use dibs_nostd::filter::Reason;
 use dibs_nostd::format::Unit;
 use dibs_nostd::wire::{AesCmac, Counters, Event, QuantisedBox, Status, StatusReport};
 use dibs_nostd::{
-    Assembler, Error, Frames, Millis, NoGate, NoSide, OutOfTableError, ReceiveError, Scrub,
-    SurfaceFacts, TriangleRow, VertexNumber,
+    Assembler, Error, Frames, Millis, NoAdmissionCheck, NoSide, OutOfTableError, ReceiveError,
+    Scrub, SurfaceFacts, TriangleRow, VertexNumber,
 };
 use glam::Vec3;
 
@@ -99,7 +99,7 @@ fn errors_that_are_structs_say_their_values() {
     writer.push(Vec3::ZERO).expect("one has a place");
     let full: OutOfTableError = writer.push(Vec3::ZERO).expect_err("two have none");
     states(full, "vertex 1 is outside a table of 1");
-    let watch = Watch::new(Millis(50), Millis(200)).expect("in order");
+    let watch = ThresholdPair::new(Millis(50), Millis(200)).expect("in order");
     let limits = Limits::new(watch, 0.1).expect("a speed").recovery(3).expect("not none");
     let mut machine = FailSafe::new(limits);
     // It starts safe, and waits for frames.
@@ -149,7 +149,7 @@ fn an_end_of_a_bus_says_what_it_saw() {
     assert_eq!(format!("{mac:?}"), "AesCmac { challenge: 702, .. }");
     let frames = Frames::<3>::new();
     let (writer, _reader) = frames.split().expect("the first");
-    let mut assembler = Assembler::new(writer, NoGate, 7, 1e3);
+    let mut assembler = Assembler::new(writer, NoAdmissionCheck, 7, 1e3);
     assert_eq!(assembler.counters().to_string(), "no events");
     for bytes in [&[1_u8, 2, 3][..], &[4, 5, 6]] {
         assembler.accept(bytes, Millis(0)).expect_err("no packet");

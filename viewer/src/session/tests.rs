@@ -28,12 +28,12 @@ fn pack(frames: &[Vec<Vec3>]) -> Vec<u8> {
 }
 
 /// A small heart's session, and its frames.
-fn heart() -> (Running<u16>, Vec<Vec<Vec3>>) {
+fn heart() -> (LoadedSession<u16>, Vec<Vec<Vec3>>) {
     let generate::MovingMesh { mesh, motion } = generate::heart(1_000).unwrap();
     let built = Builder::new().stretch(2.0).build(&mesh).unwrap();
     let frames: Vec<Vec<Vec3>> = motion.frames.iter().map(|frame| built.to_rows(frame)).collect();
     let tree = Tree::from_bytes(built.blob().to_vec().leak()).unwrap();
-    (Running::new(tree, &pack(&frames), 30.0).unwrap(), frames)
+    (LoadedSession::new(tree, &pack(&frames), 30.0).unwrap(), frames)
 }
 
 /// The instrument at a tick: it comes from outside and goes through the wall.
@@ -114,7 +114,7 @@ fn contacts_move_as_the_surface_does() {
     // Beside the wall, in the contraction.
     let pose = [75.0, -10.0, 40.0, 135.0, -20.0, 70.0, 2.5];
     session.settings().margin = 60.0;
-    for between in [Between::Interpolated, Between::Extrapolated] {
+    for between in [Interpolation::Interpolated, Interpolation::Extrapolated] {
         session.settings().between = between;
         session.restart();
         let seconds = |tick: u32| f64::from(tick) / 1e3;
@@ -140,7 +140,7 @@ fn contacts_move_as_the_surface_does() {
             assert!(session.touching().unwrap().contacts.iter().all(|c| c.velocity == Vec3::ZERO));
         }
     }
-    session.settings().between = Between::Held;
+    session.settings().between = Interpolation::Held;
     session.advance(&pose, &pose, [0.110, 0.111], 1).unwrap();
     assert!(session.touching().unwrap().contacts.iter().all(|c| c.velocity == Vec3::ZERO));
     assert!(frames.len() > 4);
@@ -162,9 +162,11 @@ fn nodes_move_the_surface() {
     let frames: Vec<Vec<Vec3>> = (0..8).map(frame).collect();
     let tree: Tree<'_, u16> = Tree::from_bytes(built.blob().to_vec().leak()).unwrap();
     let nodes = Nodes::of(&tree).unwrap();
-    let mut session = Running::new(tree, &pack(&frames), 30.0).unwrap();
+    let mut session = LoadedSession::new(tree, &pack(&frames), 30.0).unwrap();
     for (number, between) in
-        [Between::Held, Between::Interpolated, Between::Extrapolated].into_iter().enumerate()
+        [Interpolation::Held, Interpolation::Interpolated, Interpolation::Extrapolated]
+            .into_iter()
+            .enumerate()
     {
         session.settings().between = between;
         session.restart();
@@ -197,7 +199,7 @@ fn nodes_move_the_surface() {
         }
     }
     assert_eq!(session.positions().len(), 3 * nodes.vertex_count() as usize);
-    let rest = Running::new(tree, &[], 1.0).unwrap();
+    let rest = LoadedSession::new(tree, &[], 1.0).unwrap();
     assert_eq!(rest.motion.frames.len(), 1);
 }
 

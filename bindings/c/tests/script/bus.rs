@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use dibs_build::BuiltTree;
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, SpringDamper, Wrench};
-use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, Watch};
+use dibs_nostd::failsafe::{FailSafe, Limits, LinkStatus, Observation, State, ThresholdPair};
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
@@ -94,12 +94,13 @@ pub fn answers(built: &BuiltTree, events: &[Event]) -> Vec<String> {
         Assembler::for_tree(writer, &tree, SurfaceLimits::reach_mm(300.0)).expect("a metric");
     let link = LinkStatus::new();
     let mut query = Query::<_, 512>::new(&tree).expect("a stack");
-    let watch = |degraded, safe| Watch::new(Millis(degraded), Millis(safe)).expect("limits");
+    let watch =
+        |degraded, safe| ThresholdPair::new(Millis(degraded), Millis(safe)).expect("limits");
     let limits = Limits::new(watch(40, 80), 0.1).and_then(|limits| limits.recovery(2));
     let limits = limits
         .expect("limits")
         .silence(watch(30, 100))
-        .rejections(Watch::count(1, 10).expect("limits"));
+        .rejections(ThresholdPair::count(1, 10).expect("limits"));
     let mut machine = FailSafe::new(limits.without_transit().dwell(3).automatic());
     let spring = SpringDamper::stiffness(1.0).damping(0.002).max_force(5.0);
     let wall = ForbiddenRegion::new(spring, 5.0).expect("a margin");

@@ -1,6 +1,6 @@
 //! Limits on faults that the age alone does not show: transit delay, a source that stopped, forgeries.
 
-use super::{LimitError, Limits, Link, State, Watch};
+use super::{LimitError, Limits, Link, State, ThresholdPair};
 use crate::surface::Millis;
 use crate::unavailable::Unavailable;
 
@@ -10,13 +10,16 @@ use crate::unavailable::Unavailable;
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub(super) struct Freshness {
     transit: Transit,
-    source_age: Watch,
-    forgeries: Watch<u32>,
+    source_age: ThresholdPair,
+    forgeries: ThresholdPair<u32>,
 }
 
 impl Freshness {
-    pub const OFF: Self =
-        Self { transit: Transit::AsAge, source_age: Watch::OFF, forgeries: Watch::OFF };
+    pub const OFF: Self = Self {
+        transit: Transit::AsAge,
+        source_age: ThresholdPair::OFF,
+        forgeries: ThresholdPair::OFF,
+    };
 
     /// The transit time that counts for the margin.
     pub const fn transit(&self, link: &Link) -> Millis {
@@ -27,7 +30,7 @@ impl Freshness {
     }
 
     /// The level that each input requires, and its cause.
-    pub fn levels(&self, link: &Link, age: Watch) -> [(State, Unavailable); 3] {
+    pub fn levels(&self, link: &Link, age: ThresholdPair) -> [(State, Unavailable); 3] {
         let Link { source_age, forgeries, .. } = *link;
         let transit = self.transit(link);
         let watch = match self.transit {
@@ -50,7 +53,7 @@ enum Transit {
     /// In the margin, with the limits on age.
     AsAge,
     /// In the margin, with limits of its own.
-    Watched(Watch),
+    Watched(ThresholdPair),
     /// In neither the margin nor the limits.
     LeftOut,
 }
@@ -63,7 +66,7 @@ impl Limits {
     /// sender is needed. Normally it is the time between two statuses plus the latency in both directions. A frame
     /// without an echo is beyond every limit. By default these are the limits on age. The margin includes this time.
     #[must_use]
-    pub const fn transit(mut self, watch: Watch) -> Self {
+    pub const fn transit(mut self, watch: ThresholdPair) -> Self {
         self.freshness.transit = Transit::Watched(watch);
         self
     }
@@ -81,7 +84,7 @@ impl Limits {
     ///
     /// # Errors
     /// [`LimitError::Untrippable`] if the safe limit is 65,534 ms or more: no frame older than that is published.
-    pub const fn source_age(mut self, watch: Watch) -> Result<Self, LimitError> {
+    pub const fn source_age(mut self, watch: ThresholdPair) -> Result<Self, LimitError> {
         let safe = watch.safe();
         if safe.0 >= OLDEST.0 && safe.0 != Millis::MAX.0 {
             return Err(LimitError::Untrippable { safe: safe.0 });
@@ -95,9 +98,10 @@ impl Limits {
     ///
     /// # Errors
     /// [`LimitError::Untrippable`] if the second limit is at least [`Link::MOST_FORGERIES`], the largest count that a
-    /// link reports. [`Watch::OFF`] is allowed.
-    pub const fn forgeries(mut self, watch: Watch<u32>) -> Result<Self, LimitError> {
-        if watch.safe() >= Link::MOST_FORGERIES && watch.safe() != Watch::<u32>::OFF.safe() {
+    /// link reports. [`ThresholdPair::OFF`] is allowed.
+    pub const fn forgeries(mut self, watch: ThresholdPair<u32>) -> Result<Self, LimitError> {
+        if watch.safe() >= Link::MOST_FORGERIES && watch.safe() != ThresholdPair::<u32>::OFF.safe()
+        {
             return Err(LimitError::Untrippable { safe: watch.safe() });
         }
         self.freshness.forgeries = watch;

@@ -10,7 +10,7 @@ use crate::surface::Millis;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-pub struct Watch<T = Millis> {
+pub struct ThresholdPair<T = Millis> {
     degraded: T,
     safe: T,
 }
@@ -18,7 +18,7 @@ pub struct Watch<T = Millis> {
 /// A time of half the clock's range or more is ambiguous.
 const LONGEST: u32 = i32::MAX as u32;
 
-/// The type of a quantity limited by a [`Watch`].
+/// The type of a quantity limited by a [`ThresholdPair`].
 #[doc(hidden)]
 pub trait Quantity: Copy + PartialOrd + sealed::Sealed {
     /// Its largest value.
@@ -41,7 +41,7 @@ mod sealed {
     impl Sealed for u32 {}
 }
 
-impl<T: Quantity> Watch<T> {
+impl<T: Quantity> ThresholdPair<T> {
     /// An input that is not watched.
     pub const OFF: Self = Self { degraded: T::MOST, safe: T::MOST };
 
@@ -68,7 +68,7 @@ impl<T: Quantity> Watch<T> {
     }
 }
 
-impl Watch {
+impl ThresholdPair {
     /// Limits on a time: a time above `degraded` leads to the degraded state, above `safe` to the safe state.
     ///
     /// # Errors
@@ -81,7 +81,7 @@ impl Watch {
     }
 }
 
-impl Watch<u32> {
+impl ThresholdPair<u32> {
     /// Limits on a count of frames or packets, in the same way.
     ///
     /// # Errors
@@ -113,10 +113,10 @@ const fn check(degraded: u32, safe: u32) -> Result<(), LimitError> {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Limits {
-    pub(super) age: Watch,
-    pub(super) silence: Watch,
-    pub(super) heartbeat: Watch,
-    pub(super) rejections: Watch<u32>,
+    pub(super) age: ThresholdPair,
+    pub(super) silence: ThresholdPair,
+    pub(super) heartbeat: ThresholdPair,
+    pub(super) rejections: ThresholdPair<u32>,
     pub(super) freshness: Freshness,
     tissue_speed: f32,
     recovery_frames: u16,
@@ -133,7 +133,7 @@ impl Limits {
     ///
     /// # Errors
     /// [`LimitError`] if the age is not watched, or the speed is negative or not finite.
-    pub const fn new(age: Watch, tissue_speed: f32) -> Result<Self, LimitError> {
+    pub const fn new(age: ThresholdPair, tissue_speed: f32) -> Result<Self, LimitError> {
         if age.safe.0 == u32::MAX {
             return Err(LimitError::TooLong { safe: age.safe.0 });
         }
@@ -142,9 +142,9 @@ impl Limits {
         }
         Ok(Self {
             age,
-            silence: Watch::OFF,
-            heartbeat: Watch::OFF,
-            rejections: Watch::OFF,
+            silence: ThresholdPair::OFF,
+            heartbeat: ThresholdPair::OFF,
+            rejections: ThresholdPair::OFF,
             freshness: Freshness::OFF,
             tissue_speed,
             recovery_frames: 1,
@@ -155,19 +155,19 @@ impl Limits {
 
     /// Limits on the time since the last good packet.
     #[must_use]
-    pub const fn silence(self, watch: Watch) -> Self {
+    pub const fn silence(self, watch: ThresholdPair) -> Self {
         Self { silence: watch, ..self }
     }
 
     /// Limits on the time since the last heartbeat.
     #[must_use]
-    pub const fn heartbeat(self, watch: Watch) -> Self {
+    pub const fn heartbeat(self, watch: ThresholdPair) -> Self {
         Self { heartbeat: watch, ..self }
     }
 
     /// Limits on the frames refused or abandoned since the last publication, each counted once.
     #[must_use]
-    pub const fn rejections(self, watch: Watch<u32>) -> Self {
+    pub const fn rejections(self, watch: ThresholdPair<u32>) -> Self {
         Self { rejections: watch, ..self }
     }
 
@@ -216,7 +216,7 @@ impl Limits {
 
     /// The limits on age.
     #[must_use]
-    pub const fn age(&self) -> Watch {
+    pub const fn age(&self) -> ThresholdPair {
         self.age
     }
 

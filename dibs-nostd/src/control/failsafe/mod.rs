@@ -17,10 +17,10 @@
 //!
 //! # Transitions
 //!
-//! Each input has two limits, a [`Watch`]. A step is *clear* if every input is within its first limit, there is a
-//! surface, the query gave an answer and the tree is sound. The *run* counts the frames published since the last step
-//! that was not clear; two frames between two steps count as one. The *calm* counts the steps since then, and is *long
-//! enough* once more than [`Limits::dwell`]'s steps were clear.
+//! Each input has two limits, a [`ThresholdPair`]. A step is *clear* if every input is within its first limit, there
+//! is a surface, the query gave an answer and the tree is sound. The *run* counts the frames published since the last
+//! step that was not clear; two frames between two steps count as one. The *calm* counts the steps since then, and is
+//! *long enough* once more than [`Limits::dwell`]'s steps were clear.
 //!
 //! | from | to | when |
 //! |---|---|---|
@@ -60,7 +60,7 @@ use crate::query::Proximity;
 use crate::surface::{FrameAge, Millis};
 use crate::unavailable::Unavailable;
 
-pub use limits::{LimitError, Limits, Quantity, Watch};
+pub use limits::{LimitError, Limits, Quantity, ThresholdPair};
 pub use link::Link;
 #[cfg(feature = "bus")]
 pub use status::LinkStatus;
@@ -131,10 +131,10 @@ impl Verdict {
 ///
 /// ```
 /// use dibs_nostd::{FrameAge, Millis};
-/// use dibs_nostd::failsafe::{FailSafe, Limits, Link, Observation, State, Watch};
+/// use dibs_nostd::failsafe::{FailSafe, Limits, Link, Observation, State, ThresholdPair};
 ///
 /// // Degraded after 50 ms, safe after 200; tissue at up to 0.1 mm a millisecond.
-/// let age = Watch::new(Millis(50), Millis(200))?;
+/// let age = ThresholdPair::new(Millis(50), Millis(200))?;
 /// let limits = Limits::new(age, 0.1)?.recovery(2)?.dwell(1).automatic();
 /// let mut machine = FailSafe::new(limits);
 /// let link = Link::CLEAR;

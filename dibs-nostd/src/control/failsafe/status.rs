@@ -14,7 +14,7 @@ use crate::surface::{Millis, StampAge};
 ///
 /// ```
 /// use dibs_nostd::wire::{FrameId, NoMac, encode_heartbeat};
-/// use dibs_nostd::{Assembler, Frames, Millis, NoGate, failsafe::LinkStatus};
+/// use dibs_nostd::{Assembler, Frames, Millis, NoAdmissionCheck, failsafe::LinkStatus};
 ///
 /// static FRAMES: Frames<3> = Frames::new();
 /// static LINK: LinkStatus = LinkStatus::new();
@@ -22,7 +22,7 @@ use crate::surface::{Millis, StampAge};
 ///
 /// // Bus interrupt: after each call of `accept` or `advance`.
 /// let (writer, _reader) = FRAMES.split().unwrap();
-/// let mut assembler = Assembler::new(writer, NoGate, 0xB0D1, 1000.0);
+/// let mut assembler = Assembler::new(writer, NoAdmissionCheck, 0xB0D1, 1000.0);
 /// let mut buffer = [0; 64];
 /// let id = FrameId { mesh_id: 0xB0D1, session: 1, epoch: 0 };
 /// assembler.accept(encode_heartbeat(&id, 1, None, &NoMac, &mut buffer), Millis(10)).unwrap();

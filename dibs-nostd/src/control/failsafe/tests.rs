@@ -12,31 +12,33 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use super::{FailSafe, LimitError, Limits, Link, LinkStatus, Observation, State, Verdict, Watch};
+use super::{
+    FailSafe, LimitError, Limits, Link, LinkStatus, Observation, State, ThresholdPair, Verdict,
+};
 use crate::receive::BusHealth;
 use crate::surface::{FrameAge, Millis, StampAge};
 use crate::unavailable::{QueryError, Unavailable};
 
 const QUERY: Unavailable = Unavailable::Query(QueryError::Corrupt { row: 7 });
 
-const AGE: Watch = watch(50, 200);
-const SILENCE: Watch = watch(20, 100);
-const HEARTBEAT: Watch = watch(30, 150);
-const REJECTIONS: Watch<u32> = count(3, 9);
-const TRANSIT: Watch = watch(300, 900);
-const SOURCE_AGE: Watch = watch(40, 80);
-const FORGERIES: Watch<u32> = count(5, 50);
+const AGE: ThresholdPair = watch(50, 200);
+const SILENCE: ThresholdPair = watch(20, 100);
+const HEARTBEAT: ThresholdPair = watch(30, 150);
+const REJECTIONS: ThresholdPair<u32> = count(3, 9);
+const TRANSIT: ThresholdPair = watch(300, 900);
+const SOURCE_AGE: ThresholdPair = watch(40, 80);
+const FORGERIES: ThresholdPair<u32> = count(5, 50);
 const SPEED: f32 = 0.125;
 
-const fn watch(degraded: u32, safe: u32) -> Watch {
-    match Watch::new(Millis(degraded), Millis(safe)) {
+const fn watch(degraded: u32, safe: u32) -> ThresholdPair {
+    match ThresholdPair::new(Millis(degraded), Millis(safe)) {
         Ok(watch) => watch,
         Err(_) => panic!("limits in the wrong order"),
     }
 }
 
-const fn count(degraded: u32, safe: u32) -> Watch<u32> {
-    match Watch::count(degraded, safe) {
+const fn count(degraded: u32, safe: u32) -> ThresholdPair<u32> {
+    match ThresholdPair::count(degraded, safe) {
         Ok(watch) => watch,
         Err(_) => panic!("limits in the wrong order"),
     }
@@ -342,18 +344,21 @@ fn a_slow_second_core_is_not_an_old_surface() {
 
 #[test]
 fn limits_that_no_machine_can_have_are_named() {
-    assert_eq!(Watch::count(5, 4), Err(LimitError::Order { degraded: 5, safe: 4 }));
+    assert_eq!(ThresholdPair::count(5, 4), Err(LimitError::Order { degraded: 5, safe: 4 }));
     let long = 1 << 31;
-    assert_eq!(Watch::new(Millis(5), Millis(long)), Err(LimitError::TooLong { safe: long }));
-    assert_eq!(Limits::new(Watch::OFF, 0.0), Err(LimitError::TooLong { safe: u32::MAX }));
+    assert_eq!(
+        ThresholdPair::new(Millis(5), Millis(long)),
+        Err(LimitError::TooLong { safe: long })
+    );
+    assert_eq!(Limits::new(ThresholdPair::OFF, 0.0), Err(LimitError::TooLong { safe: u32::MAX }));
     // No frame is published whose source was older.
     for safe in [65_534, 65_535, 120_000].map(Millis) {
-        let never = Watch::new(Millis(100), safe).unwrap();
+        let never = ThresholdPair::new(Millis(100), safe).unwrap();
         let refused = limits(1, false).source_age(never);
         assert_eq!(refused, Err(LimitError::Untrippable { safe: safe.0 }));
     }
     assert!(limits(1, false).source_age(watch(100, 65_533)).is_ok());
-    assert!(limits(1, false).source_age(Watch::OFF).is_ok());
+    assert!(limits(1, false).source_age(ThresholdPair::OFF).is_ok());
     for tissue_speed in [-1.0, f32::INFINITY] {
         assert_eq!(Limits::new(AGE, tissue_speed), Err(LimitError::Speed { tissue_speed }));
     }
@@ -363,7 +368,7 @@ fn limits_that_no_machine_can_have_are_named() {
     let untrippable = Err(LimitError::Untrippable { safe: most });
     assert_eq!(limits(1, false).forgeries(count(0, most)), untrippable);
     assert!(limits(1, false).forgeries(count(0, most - 1)).is_ok());
-    assert!(limits(1, false).forgeries(Watch::OFF).is_ok());
+    assert!(limits(1, false).forgeries(ThresholdPair::OFF).is_ok());
 }
 
 /// Heartbeats are lost while good frames continue: for more than the clock's whole range the machine stays safe, and a

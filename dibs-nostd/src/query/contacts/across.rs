@@ -20,7 +20,7 @@ use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::query::corners::positions;
 use crate::query::made::Tests;
-use crate::query::search::{Search, WHOLE, Waiting};
+use crate::query::search::{Search, WHOLE, WaitingNode};
 use crate::query::{Options, Proximity};
 use crate::tool::AxisPoint;
 use crate::tree::RootSet;
@@ -39,7 +39,7 @@ const STEP: f32 = 0.75;
 /// The second triangle at a deepest point inside the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub(crate) struct Across {
+pub(crate) struct AcrossPoint {
     /// Its weight in the rate of the depth; 0 if there is none. The closest triangle has the remaining weight.
     pub weight: f32,
     /// Unit vector that leads out through it.
@@ -56,7 +56,7 @@ pub(crate) struct Across {
     pub speed: f32,
 }
 
-impl Across {
+impl AcrossPoint {
     pub const NONE: Self = Self {
         weight: 0.0,
         normal: Vec3::ZERO,
@@ -101,7 +101,11 @@ impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
     /// The closest triangle; `None` if the budget ends.
     #[cold]
     #[inline(never)]
-    fn at(&mut self, stack: &mut [Waiting], point: Vec3) -> Result<Option<Proximity>, QueryError> {
+    fn at(
+        &mut self,
+        stack: &mut [WaitingNode],
+        point: Vec3,
+    ) -> Result<Option<Proximity>, QueryError> {
         let Self { tree, vertices, roots, options, spent } = self;
         let left = options.after(*spent).budget.tests().checked_sub(1 + LOOK_COST);
         let Some(left) = left else { return Ok(None) };
@@ -123,9 +127,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
     pub(super) fn across(
         &self,
         own: &Contact,
-        stack: &mut [Waiting],
+        stack: &mut [WaitingNode],
         options: &Options,
-    ) -> Result<(Across, Tests), QueryError> {
+    ) -> Result<(AcrossPoint, Tests), QueryError> {
         let &Self { tree, vertices, tool, closest, .. } = self;
         let mut look = Look {
             tree,
@@ -146,7 +150,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         let first = ProfilePoint { along: 0.0, depth, slope: growth.abs() };
         let has_inward = first.slope * end > accuracy && depth > NO_DIRECTION * accuracy;
         if !has_inward {
-            return Ok((Across::NONE, look.spent));
+            return Ok((AcrossPoint::NONE, look.spent));
         }
         // Upper bound on the depth of any point of the axis.
         let most = -closest.lower - tool.radius() + accuracy;
@@ -190,22 +194,22 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
                 far = None;
             }
         }
-        let Some((far, other)) = far else { return Ok((Across::NONE, look.spent)) };
+        let Some((far, other)) = far else { return Ok((AcrossPoint::NONE, look.spent)) };
         let (along, _) = near.meeting(&far);
         let point = on_axis + inward * along;
         let corners = positions(vertices, other.corners)?;
         let pair = AxisPoint(point).closest_on_triangle(&corners, f32::INFINITY);
-        let Some(pair) = pair else { return Ok((Across::NONE, look.spent)) };
+        let Some(pair) = pair else { return Ok((AcrossPoint::NONE, look.spent)) };
         let outward = pair.on_surface - point;
         let normal = outward / sqrt(outward.length_squared());
         let fall = normal.dot(inward);
         let weight = first.slope / (first.slope + fall);
         if !(fall > 0.0 && weight < 1.0) {
-            return Ok((Across::NONE, look.spent));
+            return Ok((AcrossPoint::NONE, look.spent));
         }
         let barycentric = pair.barycentric;
         let (on_axis, corners) = (point, other.corners);
-        let across = Across { weight, normal, on_axis, corners, barycentric, speed: 0.0 };
+        let across = AcrossPoint { weight, normal, on_axis, corners, barycentric, speed: 0.0 };
         Ok((across, look.spent))
     }
 }

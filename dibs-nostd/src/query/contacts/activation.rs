@@ -88,7 +88,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> TriangleTester<'_, '_, I, V, T>
 impl<const N: usize> Basins<N> {
     /// The activation of the contact at a triangle, from 0 to 1. It is 1 if memory or budget ran out.
     ///
-    /// Follows the paths out of its valley, the lowest first. `most` limits the ridge below which the activation is 0,
+    /// Follows the paths out of its basin, the lowest first. `most` limits the ridge below which the activation is 0,
     /// for a distant axis; `error` is that of two heights. Triangles that `is_left_out` are not crossed.
     pub fn activation<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,

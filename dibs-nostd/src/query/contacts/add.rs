@@ -11,7 +11,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
 use crate::query::made::Tests;
 use crate::query::prices::LIST;
-use crate::query::search::{Search, Waiting};
+use crate::query::search::{Search, WaitingNode};
 use crate::query::side::{self, OnAxis, Side};
 use crate::query::{NoSide, Options, Proximity};
 use crate::tool::AxisPair;
@@ -79,7 +79,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     pub(super) fn add_from<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         pair: &Pair<'_, I, V, T>,
-        stack: &mut [Waiting],
+        stack: &mut [WaitingNode],
         options: &Options,
         find: impl FnOnce(
             &mut Basins<NEAR>,
@@ -172,7 +172,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         };
         // A search that was not begun has left an earlier one's triangles.
         let missing = if is_begun {
-            basins.each_valley(tree, ridges, is_left_out, &mut tester, visit)?
+            basins.each_basin(tree, ridges, is_left_out, &mut tester, visit)?
         } else {
             None
         };
@@ -210,7 +210,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if !is_side_searched {
             found.lower_bound(f32::NEG_INFINITY);
         } else if from < limit {
-            // A valley's lowest triangle is less than a ridge below the visited low triangle.
+            // A basin's lowest triangle is less than a ridge below the visited low triangle.
             found.lower_bound(from - ridge - tool.radius());
         }
         Ok(made.and(spent))
@@ -300,7 +300,7 @@ pub(super) fn near(row: u32, pair: &AxisPair, accuracy: f32) -> NearTriangle {
     NearTriangle { square: pair.distance_squared, row, place }
 }
 
-/// The pair of a tool and the lowest triangle of a valley.
+/// The pair of a tool and the lowest triangle of a basin.
 fn pair_at<I: Index, V: VertexTable + ?Sized, T: Tool>(
     tree: &Tree<'_, I>,
     vertices: &V,

@@ -1,16 +1,16 @@
 //! Selects the triangles near a tool that are closer than their surroundings.
 //!
-//! The distance from the tool is a height over the surface, and each valley of it is a contact. A flood from each low
+//! The distance from the tool is a height over the surface, and each basin of it is a contact. A flood from each low
 //! triangle, the lowest first, descends to a triangle with no lower neighbour. Then it rises over triangles in nearly
 //! the same direction by a ridge. This is the ridge up to which a contact has activation 0, so no contact ends while it
-//! acts. If it meets the flood of a lower triangle in nearly the same direction, both are one valley: a flat wall along
-//! a capsule is one valley, however many triangles are equally far; two walls are two, however low the ridge between
+//! acts. If it meets the flood of a lower triangle in nearly the same direction, both are one basin: a flat wall along
+//! a capsule is one basin, however many triangles are equally far; two walls are two, however low the ridge between
 //! them.
 //!
 //! Over a triangle the height is convex. So the path from its lowest point to a neighbour crosses no ridge exactly if
 //! that point is on their common edge.
 //!
-//! If memory or budget runs out, a flood does not rise. Then one valley may be reported as two, but none is lost,
+//! If memory or budget runs out, a flood does not rise. Then one basin may be reported as two, but none is lost,
 //! unless the neighbours of a triangle could not be tested.
 //!
 //! One file, because floods and triangles keep their fields private.
@@ -21,7 +21,7 @@ use glam::Vec3;
 
 use super::activation::{self, TriangleTester};
 use crate::math::sqrt::sqrt;
-use crate::query::prices::{EDGE, ENTRY, VALLEY};
+use crate::query::prices::{BASIN, EDGE, ENTRY};
 use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
@@ -167,13 +167,13 @@ impl<const N: usize> Basins<N> {
         low.first().map(|farthest| farthest.square())
     }
 
-    /// Finds the valleys. Between valleys in nearly the same direction, ridges that leave the higher one without
+    /// Finds the basins. Between basins in nearly the same direction, ridges that leave the higher one without
     /// activation are ignored (`ridges`: see [`activation::least_ridge`]). Calls back with the lowest triangle of each,
     /// nearest first. Points that differ by at most the ridges' error count as equally far. Triangles that
     /// `is_left_out` are skipped.
     ///
-    /// Returns the square of the distance beyond which valleys may be missing, if any.
-    pub fn each_valley<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    /// Returns the square of the distance beyond which basins may be missing, if any.
+    pub fn each_basin<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
         ridges: (f32, f32),
@@ -197,10 +197,10 @@ impl<const N: usize> Basins<N> {
         for entry in 0..low {
             match self.flood(tree, entry as u16, ridges, &is_left_out, tester)? {
                 Flood::Ended(lowest, beside) => {
-                    for valley in [Some(lowest), beside].into_iter().flatten() {
-                        match tester.pay_for(VALLEY) {
-                            Some(()) => visit(valley)?,
-                            None => miss(valley.square),
+                    for basin in [Some(lowest), beside].into_iter().flatten() {
+                        match tester.pay_for(BASIN) {
+                            Some(()) => visit(basin)?,
+                            None => miss(basin.square),
                         }
                     }
                 }
@@ -238,7 +238,7 @@ impl<const N: usize> Basins<N> {
             return Ok(Flood::Joined);
         }
         // Numbers of entries whose lower neighbours have been visited, and whose other edges have been crossed. The
-        // flood rises only if no way down is left; otherwise it would take a slope for a valley.
+        // flood rises only if no way down is left; otherwise it would take a slope for a basin.
         let (mut descended, mut risen) = (0, 0);
         for _ in 0..2 * N {
             let rises = descended == count;

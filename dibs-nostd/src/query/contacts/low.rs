@@ -7,7 +7,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::Options;
 use crate::query::made::Tests;
 use crate::query::memory::range::RangeFrontMut;
-use crate::query::search::{Search, Waiting};
+use crate::query::search::{Search, WaitingNode};
 use crate::tool::AxisPair;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
@@ -32,7 +32,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     pub(in crate::query) fn add<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         pair: &Pair<'_, I, V, T>,
-        stack: &mut [Waiting],
+        stack: &mut [WaitingNode],
         options: &Options,
     ) -> Result<Tests, QueryError> {
         self.add_from(pair, stack, options, |basins, search, options, (limit, ridge)| {
@@ -47,7 +47,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     pub(in crate::query) fn add_tracked<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         pair: &Pair<'_, I, V, T>,
-        stack: &mut [Waiting],
+        stack: &mut [WaitingNode],
         options: &Options,
         mut front: RangeFrontMut<'_>,
     ) -> Result<Tests, QueryError> {
@@ -75,7 +75,7 @@ impl<'s, I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'s, I, V, T> {
     #[inline(always)]
     pub(super) fn over_range(
         &self,
-        stack: &'s mut [Waiting],
+        stack: &'s mut [WaitingNode],
         options: &Options,
     ) -> Result<Search<'s, 's, I, V, T>, QueryError> {
         let &Self { tree, vertices, tool, .. } = self;

@@ -16,7 +16,7 @@ use super::{Options, Proximity, Query, Side};
 use crate::math::round::{sum_down, sum_up};
 use crate::unavailable::{QueryError, Unavailable};
 use crate::{Index, Tool, TriangleRow, VertexTable};
-use across::Across;
+use across::AcrossPoint;
 pub(super) use add::Pair;
 use basins::Basins;
 use list::List;
@@ -58,7 +58,7 @@ pub struct Contact {
     pub velocity: Vec3,
     /// The second triangle that bounds the depth, if the tool crosses or is inside.
     #[cfg_attr(feature = "serde", serde(skip))]
-    pub(crate) across: Across,
+    pub(crate) across: AcrossPoint,
     /// 0 where it starts next to a nearer one, 1 beyond a ridge (see `activation`).
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) activation: f32,
@@ -77,7 +77,7 @@ impl Contact {
         corners: [0; 3],
         barycentric: [0.0; 3],
         velocity: Vec3::ZERO,
-        across: Across::NONE,
+        across: AcrossPoint::NONE,
         activation: 1.0,
     };
 }
@@ -327,9 +327,9 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// surface, that pair is the first. An axis that meets the surface in several places may have several parts inside:
     /// only the deepest is a contact, and its separation is the list's [bound](Contacts::bound).
     ///
-    /// Two valleys of the distance in nearly the same direction, within 7 degrees, are one contact unless the ridge
+    /// Two basins of the distance in nearly the same direction, within 7 degrees, are one contact unless the ridge
     /// between them is higher than a 128th of the axis' distance there, or of the margin if that is less. So a flat
-    /// wall along a capsule is one contact; two walls within 15 degrees may be one. In other directions each valley is
+    /// wall along a capsule is one contact; two walls within 15 degrees may be one. In other directions each basin is
     /// a contact of its own if the ridge is higher than a 512th of that distance and a 128th of the margin; with a
     /// lower ridge it may be. Pairs with the inner side of a sheet, such as the far side of an organ, are not contacts.
     /// If the side is undefined, the tool is taken to be outside. If that is because the budget ended, contacts may be

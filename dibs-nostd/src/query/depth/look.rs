@@ -6,7 +6,7 @@
 use super::part::{Fit, Parts, Sample};
 use super::{Depth, EXACT};
 use crate::math::order::smaller;
-use crate::query::memory::depth::Remembered;
+use crate::query::memory::depth::RememberedDepth;
 use crate::query::prices::TIE;
 use crate::query::search::{Search, UNTIL};
 use crate::query::side::{self, COORDINATES, NoSide, OnAxis, PointSide, Side};
@@ -31,7 +31,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     ) -> Result<(), QueryError> {
         let row = last.and_then(|at| parts.row_of(at));
         let length = self.tool.axis_length();
-        if let Some(Remembered { leaves: [best, _], waiting, .. }) = &mut self.remembered {
+        if let Some(RememberedDepth { leaves: [best, _], waiting, .. }) = &mut self.remembered {
             match row {
                 Some(row) => best.move_to(parts.sample(row).parameter, length),
                 None => best.end(waiting),
@@ -62,7 +62,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Drops the search to be continued in the next tick.
     #[cold]
     fn end_search(&mut self) {
-        if let Some(Remembered { leaves: [_, other], waiting, .. }) = &mut self.remembered {
+        if let Some(RememberedDepth { leaves: [_, other], waiting, .. }) = &mut self.remembered {
             other.end(waiting);
         }
     }
@@ -91,7 +91,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             Some(&mut **ties),
         )?;
         let mut limit = enough;
-        if let Some(Remembered { leaves: [best, other], waiting, .. }) = remembered {
+        if let Some(RememberedDepth { leaves: [best, other], waiting, .. }) = remembered {
             for leaves in [&mut *best, &mut *other] {
                 let distance = leaves.distance_to(parameter, length);
                 if search.is_among(leaves, distance) {
@@ -121,7 +121,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         }
         let found = search.run::<UNTIL>(limit)?;
         if found.is_cut_short()
-            && let Some(Remembered { leaves: [_, other], .. }) = remembered
+            && let Some(RememberedDepth { leaves: [_, other], .. }) = remembered
         {
             other.forget_for(parameter);
         }
@@ -224,7 +224,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
 
     /// Ends the completed search of a point. If it is the deepest, its leaves are kept.
     fn end_search_of(&mut self, parameter: f32, is_deepest: bool) {
-        let Some(Remembered { leaves: [best, other], .. }) = &mut self.remembered else { return };
+        let Some(RememberedDepth { leaves: [best, other], .. }) = &mut self.remembered else {
+            return;
+        };
         if other.are_around(parameter) {
             if is_deepest {
                 core::mem::swap(best, other);

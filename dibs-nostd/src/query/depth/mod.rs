@@ -27,9 +27,9 @@ mod walk;
 use glam::Vec3;
 
 use super::corners::positions;
-use super::memory::depth::{Point, Points, Remembered};
+use super::memory::depth::{Point, Points, RememberedDepth};
 use super::prices::TURN;
-use super::search::{Ties, Waiting};
+use super::search::{Ties, WaitingNode};
 use super::side::{self, NoSide, Side};
 use super::{Options, Proximity};
 use crate::math::order::{larger, smaller};
@@ -59,7 +59,7 @@ const BOUND_COST: u32 = MOST_DISTANCES * DISTANCE_COST;
 /// The search for the deepest point of a tool's axis.
 pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     tree: &'s Tree<'t, I>,
-    stack: &'s mut [Waiting],
+    stack: &'s mut [WaitingNode],
     vertices: &'s V,
     tool: &'s T,
     /// With the remaining budget of the query.
@@ -75,7 +75,7 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     /// Its parameter; NaN if no point is inside.
     deepest_at: f32,
     looks: u32,
-    remembered: Option<Remembered<'s>>,
+    remembered: Option<RememberedDepth<'s>>,
     /// Whether a tick's [work besides its tests](super::prices) counts.
     is_priced: bool,
     /// Roots of the shells that decide.
@@ -90,12 +90,12 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
     #[allow(clippy::too_many_arguments)]
     pub fn new(
         tree: &'s Tree<'t, I>,
-        stack: &'s mut [Waiting],
+        stack: &'s mut [WaitingNode],
         vertices: &'s V,
         tool: &'s T,
         options: &Options,
         closest: &'s Proximity,
-        remembered: Option<Remembered<'s>>,
+        remembered: Option<RememberedDepth<'s>>,
         roots: RootSet,
         ties: &'s mut Ties,
     ) -> Self {
@@ -137,7 +137,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         let tolerance = self.options.depth_tolerance.unwrap_or(default);
         let reach = self.reach();
         if reach <= self.enough(tolerance) {
-            if let Some(Remembered { points, .. }) = &mut self.remembered {
+            if let Some(RememberedDepth { points, .. }) = &mut self.remembered {
                 points.forget();
             }
             return self.finish(reach);
@@ -162,14 +162,14 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             let Sample { parameter, depth, triangle, .. } = from;
             Some(Point { parameter, depth, bound, triangle: triangle? })
         };
-        if let Some(Remembered { points, .. }) = &mut self.remembered {
+        if let Some(RememberedDepth { points, .. }) = &mut self.remembered {
             points.keep(parts.in_order().map(point), deepest);
         }
     }
 
     /// The point that a tracker will search next; NaN if there is none.
     fn searched(&self) -> Option<f32> {
-        let Remembered { leaves: [_, other], .. } = self.remembered.as_ref()?;
+        let RememberedDepth { leaves: [_, other], .. } = self.remembered.as_ref()?;
         Some(other.parameter())
     }
 

@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::Tool;
 use crate::math::order::larger;
+use crate::math::round::U;
 use crate::math::sqrt::sqrt;
 use crate::surface::motion::Unit;
 
@@ -23,7 +24,6 @@ impl Axis {
     /// the distance between the axes' points.
     #[inline(always)]
     pub fn step(&self, tool: &impl Tool, unit: Unit) -> u32 {
-        const U: f32 = 1.0 / 16_777_216.0;
         let (start, end) = (tool.axis_start() - self.start, tool.axis_span() - self.span);
         if start == Vec3::ZERO && end == Vec3::ZERO {
             return 0;

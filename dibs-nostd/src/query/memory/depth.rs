@@ -9,8 +9,8 @@ use heapless::{Vec, VecView};
 
 use super::clock::{MotionClock, Reading};
 use super::leaves::Leaves;
-use super::separation::Certain;
-use super::waiting::Waiting;
+use super::separation::CertainInterval;
+use super::waiting::WaitingNode;
 use crate::TriangleRow;
 use crate::tree::RootSet;
 
@@ -34,7 +34,7 @@ pub(in crate::query) struct Point {
 pub(in crate::query) struct KnownDepth<const STACK: usize> {
     state: DepthState,
     /// Subtrees still to be searched for the leaves around one of the two points.
-    waiting: Vec<Waiting, STACK>,
+    waiting: Vec<WaitingNode, STACK>,
 }
 
 #[derive(Clone, Debug)]
@@ -51,18 +51,18 @@ struct DepthState {
 /// The last depth, in a tick.
 pub(in crate::query) struct KnownDepthMut<'m> {
     state: &'m mut DepthState,
-    waiting: &'m mut VecView<Waiting>,
+    waiting: &'m mut VecView<WaitingNode>,
     clock: MotionClock,
-    past: Option<Certain>,
+    past: Option<CertainInterval>,
 }
 
 /// The memory of a depth, updated to now.
-pub(in crate::query) struct Remembered<'m> {
+pub(in crate::query) struct RememberedDepth<'m> {
     pub points: &'m mut Points,
     /// The leaves around the deepest point, and around one that may be deeper.
     pub leaves: &'m mut [Leaves; 2],
     /// Subtrees still to be searched for the leaves around one of the two points.
-    pub waiting: &'m mut VecView<Waiting>,
+    pub waiting: &'m mut VecView<WaitingNode>,
     /// Lower and upper bound on the depth of the deepest point.
     pub between: [f32; 2],
 }
@@ -94,7 +94,7 @@ impl<const STACK: usize> KnownDepth<STACK> {
     }
 
     /// The last depth at a reading, with the certain separation at that time.
-    pub fn at(&mut self, clock: MotionClock, past: Option<Certain>) -> KnownDepthMut<'_> {
+    pub fn at(&mut self, clock: MotionClock, past: Option<CertainInterval>) -> KnownDepthMut<'_> {
         KnownDepthMut { state: &mut self.state, waiting: &mut self.waiting, clock, past }
     }
 }
@@ -118,7 +118,7 @@ impl<'m> KnownDepthMut<'m> {
     }
 
     /// The memory updated to now, if the same shells decide.
-    pub fn now(self, roots: RootSet) -> Remembered<'m> {
+    pub fn now(self, roots: RootSet) -> RememberedDepth<'m> {
         let Self { state, waiting, clock, past } = self;
         if state.shells != roots.key() {
             state.forget();
@@ -143,7 +143,7 @@ impl<'m> KnownDepthMut<'m> {
         // Of several solids another one may be deepest.
         let least = past.filter(|_| roots == RootSet::ALL).map_or(0.0, |past| -past.upper);
         let between = [least, past.map_or(f32::INFINITY, |past| -past.lower)];
-        Remembered { points, leaves, waiting, between }
+        RememberedDepth { points, leaves, waiting, between }
     }
 }
 
@@ -196,7 +196,7 @@ mod tests {
             known.forget();
         }
         clock.advance(1 << 31);
-        let Remembered { points, .. } = known.at(clock, None).now(RootSet::ALL);
+        let RememberedDepth { points, .. } = known.at(clock, None).now(RootSet::ALL);
         assert!(points.known().is_none());
     }
 }

@@ -6,7 +6,7 @@
 
 use heapless::{Vec, VecView};
 
-use super::waiting::Waiting;
+use super::waiting::WaitingNode;
 
 pub(in crate::query) const MOST: usize = 48;
 
@@ -74,7 +74,7 @@ impl Leaves {
     }
 
     /// Clears the leaves, their point, and the subtrees that wait for them.
-    pub fn end(&mut self, waiting: &mut VecView<Waiting>) {
+    pub fn end(&mut self, waiting: &mut VecView<WaitingNode>) {
         if self.is_gathering {
             waiting.clear();
         }

@@ -13,7 +13,7 @@ use crate::query::Side;
 
 /// A certain interval of the axis' signed distance (mm) to the table's positions.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::query) struct Certain {
+pub(in crate::query) struct CertainInterval {
     pub lower: f32,
     pub upper: f32,
     /// The pair that gave the upper end.
@@ -26,7 +26,7 @@ pub(in crate::query) struct Certain {
 /// The last certain interval, and its reading.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::query) struct KnownSeparation {
-    last: Option<(Certain, Reading)>,
+    last: Option<(CertainInterval, Reading)>,
 }
 
 impl KnownSeparation {
@@ -36,25 +36,25 @@ impl KnownSeparation {
         self.last = None;
     }
 
-    pub fn keep(&mut self, certain: Certain, clock: MotionClock) {
+    pub fn keep(&mut self, certain: CertainInterval, clock: MotionClock) {
         self.last = Some((certain, clock.now()));
     }
 
     /// The interval at its reading.
     #[inline(always)]
-    pub fn last(&self) -> Option<&Certain> {
+    pub fn last(&self) -> Option<&CertainInterval> {
         self.last.as_ref().map(|(certain, _)| certain)
     }
 
     /// The interval now, widened by the motion since.
-    pub fn now(&self, clock: MotionClock) -> Option<Certain> {
+    pub fn now(&self, clock: MotionClock) -> Option<CertainInterval> {
         let (certain, at) = self.last?;
         let moved = clock.moved_since(at)?;
         // Rounded outwards.
         let (lower, upper) = (certain.lower - moved, certain.upper + moved);
         let (lower, upper) =
             (lower - lower.abs() * f32::EPSILON, upper + upper.abs() * f32::EPSILON);
-        Some(Certain { lower, upper, ..certain })
+        Some(CertainInterval { lower, upper, ..certain })
     }
 }
 
@@ -71,7 +71,7 @@ mod tests {
         let tree = Tree::<u16>::from_bytes(built.blob()).unwrap();
         let mut clock = MotionClock::new(Unit::of(&tree));
         let mut known = KnownSeparation::NONE;
-        let certain = Certain {
+        let certain = CertainInterval {
             lower: 1.0,
             upper: 2.0,
             side: Side::Outside,

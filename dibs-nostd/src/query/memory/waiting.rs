@@ -2,7 +2,7 @@
 
 /// A subtree that is still to be searched.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::query) struct Waiting {
+pub(in crate::query) struct WaitingNode {
     /// Lower bound on its distance from the tool's axis.
     pub lower: f32,
     /// Link of its node.

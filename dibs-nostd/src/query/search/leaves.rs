@@ -11,7 +11,7 @@
 use heapless::VecView;
 
 use super::node::AROUND;
-use super::{Search, Waiting};
+use super::{Search, WaitingNode};
 use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::query::memory::leaves::{Leaf, Leaves};
@@ -67,7 +67,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     pub fn gather(
         mut self,
         leaves: &mut Leaves,
-        waiting: &mut VecView<Waiting>,
+        waiting: &mut VecView<WaitingNode>,
         is_priced: bool,
     ) -> Result<Proximity, QueryError> {
         let price = if is_priced { 1 + LEAF_PLANE } else { 1 };
@@ -82,7 +82,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         if wider > self.cutoff {
             wider = self.cutoff;
         }
-        while let Some(Waiting { lower, link }) = self.pop() {
+        while let Some(WaitingNode { lower, link }) = self.pop() {
             if lower > self.cutoff + wider {
                 continue;
             }
@@ -90,14 +90,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 Link::Leaf { first, count } => (first, count),
                 Link::Children { first, count } => {
                     if self.meter.nodes(count).is_none() {
-                        return self.leave(Waiting { lower, link }, wider, leaves, waiting);
+                        return self.leave(WaitingNode { lower, link }, wider, leaves, waiting);
                     }
                     self.expand::<AROUND>(lower, first, count, wider)?;
                     continue;
                 }
             };
             let Some(own) = self.leaf_bound(first, count, price)? else {
-                return self.leave(Waiting { lower, link }, wider, leaves, waiting);
+                return self.leave(WaitingNode { lower, link }, wider, leaves, waiting);
             };
             let bound = larger(lower, own) - slack;
             if leaves.is_full() {
@@ -119,14 +119,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     fn resume(
         &mut self,
         leaves: &Leaves,
-        waiting: &mut VecView<Waiting>,
+        waiting: &mut VecView<WaitingNode>,
     ) -> Result<(), QueryError> {
         let moved = leaves.moved(0.0);
         self.waiting = 0;
-        for &Waiting { lower, link } in waiting.iter() {
+        for &WaitingNode { lower, link } in waiting.iter() {
             let lower = lower - moved;
             let lower = lower - lower.abs() * f32::EPSILON;
-            self.push(self.waiting, Waiting { lower, link })
+            self.push(self.waiting, WaitingNode { lower, link })
                 .ok_or(QueryError::Corrupt { row: 0 })?;
         }
         waiting.clear();
@@ -137,17 +137,17 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     #[cold]
     fn leave(
         &mut self,
-        unfinished: Waiting,
+        unfinished: WaitingNode,
         wider: f32,
         leaves: &mut Leaves,
-        waiting: &mut VecView<Waiting>,
+        waiting: &mut VecView<WaitingNode>,
     ) -> Result<Proximity, QueryError> {
         leaves.pass(self.cutoff - self.slack + wider);
         let rest = self.stack.iter().take(self.waiting).chain([&unfinished]);
         // A loop over a chain has two entries, which no proof of its turns takes.
-        rest.for_each(|&Waiting { lower, link }| {
+        rest.for_each(|&WaitingNode { lower, link }| {
             // It has as much room as the stack.
-            let _ = waiting.push(Waiting { lower: leaves.then(lower), link });
+            let _ = waiting.push(WaitingNode { lower: leaves.then(lower), link });
         });
         self.finish(0.0)
     }

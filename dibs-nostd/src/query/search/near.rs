@@ -5,7 +5,7 @@
 use super::heights::{CacheSlot, Heights};
 use super::meter::Meter;
 use super::node::RANGE;
-use super::{Search, Waiting};
+use super::{Search, WaitingNode};
 use crate::math::order::smaller;
 use crate::math::sqrt::sqrt;
 use crate::query::made::Tests;
@@ -107,7 +107,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         heights: &mut Heights,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<Option<f32>, QueryError> {
-        while let Some(Waiting { lower, link }) = self.pop() {
+        while let Some(WaitingNode { lower, link }) = self.pop() {
             if lower > self.cutoff {
                 continue;
             }

@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use super::{Search, Waiting};
+use super::{Search, WaitingNode};
 use crate::math::sqrt::sqrt;
 use crate::tree::format::{Link, Node};
 use crate::unavailable::QueryError;
@@ -20,7 +20,7 @@ pub(super) const AROUND: u8 = 2;
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Removes the nearest subtree from the stack.
     #[inline(always)]
-    pub(super) fn pop(&mut self) -> Option<Waiting> {
+    pub(super) fn pop(&mut self) -> Option<WaitingNode> {
         let top = self.waiting.checked_sub(1)?;
         let &subtree = self.stack.get(top)?;
         self.waiting = top;
@@ -29,7 +29,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     /// Inserts a subtree into the part of the stack from `base` on, nearest on top; `None` if the stack is full.
     #[inline(always)]
-    pub(super) fn push(&mut self, base: usize, subtree: Waiting) -> Option<()> {
+    pub(super) fn push(&mut self, base: usize, subtree: WaitingNode) -> Option<()> {
         let mut at = self.waiting;
         while at > base
             && let Some(&below) = self.stack.get(at - 1)
@@ -105,7 +105,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             }
             let own = distance - radius;
             let lower = if own > parent { own } else { parent };
-            self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;
+            self.push(base, WaitingNode { lower, link: node.link }).ok_or(corrupt)?;
         }
         Ok(())
     }

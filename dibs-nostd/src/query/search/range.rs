@@ -7,7 +7,7 @@ mod tests;
 
 use super::heights::Heights;
 use super::near::least_standing;
-use super::{Search, Waiting};
+use super::{Search, WaitingNode};
 use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
 use crate::query::Options;
@@ -108,7 +108,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                             opened |= bit;
                             continue;
                         }
-                        let subtree = Waiting { lower: own, link: child.link };
+                        let subtree = WaitingNode { lower: own, link: child.link };
                         self.push(0, subtree).ok_or(corrupt)?;
                     }
                     // Without a test of its plane it counts as near.

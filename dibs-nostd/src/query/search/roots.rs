@@ -5,7 +5,7 @@
 
 // Requirement: A-08
 
-use super::{NearestPin, Waiting};
+use super::{NearestPin, WaitingNode};
 use crate::math::sqrt::sqrt;
 use crate::tool::Tool;
 use crate::tree::RootSet;
@@ -30,7 +30,7 @@ impl Roots {
     pub fn with_others<I: Index, V: VertexTable + ?Sized, T: Tool>(
         mut self,
         tree: &Tree<'_, I>,
-        stack: &mut [Waiting],
+        stack: &mut [WaitingNode],
         vertices: &V,
         tool: &T,
         radius_scale: f32,
@@ -56,13 +56,13 @@ impl Roots {
             if distance < self.nearest.distance {
                 self.nearest = NearestPin { row: root.pin, distance };
             }
-            let subtree = Waiting { lower: distance - radius, link: root.link };
+            let subtree = WaitingNode { lower: distance - radius, link: root.link };
             self.push(stack, subtree).ok_or(QueryError::Corrupt { row })?;
         }
         Ok(self)
     }
 
-    fn push(&mut self, stack: &mut [Waiting], subtree: Waiting) -> Option<()> {
+    fn push(&mut self, stack: &mut [WaitingNode], subtree: WaitingNode) -> Option<()> {
         let mut at = self.waiting;
         while let Some(below) = at.checked_sub(1)
             && let Some(&nearer) = stack.get(below)

@@ -7,10 +7,8 @@
 
 // Requirement: A-01
 
+use crate::math::round::U;
 use crate::tool::ACCURACY as KERNEL;
-
-/// Half a unit in the last place of 1.
-const U: f32 = 1.0 / 16_777_216.0;
 
 /// Error of a bound `d - R`, in units of `S`: 8 `u` of the pin's distance, 4 `u` of the radius and the difference.
 const BOUND: f32 = 12.0 * U;

@@ -15,7 +15,7 @@ use glam::Vec3;
 
 use facing::FacingPlane;
 
-use super::{Expansion, Search, Waiting};
+use super::{Expansion, Search, WaitingNode};
 use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::query::Budget;
@@ -178,7 +178,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         }
         while let Some(top) = self.search.waiting.checked_sub(1) {
             let corrupt = QueryError::Corrupt { row: top as u32 };
-            let &Waiting { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;
+            let &WaitingNode { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;
             let place = ChildSlot::from_word(word);
             if lower > self.search.cutoff {
                 self.search.waiting = top;
@@ -282,7 +282,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             }
             opened.apart |= 1 << slot;
             let link = ChildSlot { node: at, slot }.to_word();
-            search.push(base, Waiting { lower: own, link }).ok_or(corrupt)?;
+            search.push(base, WaitingNode { lower: own, link }).ok_or(corrupt)?;
         }
         Ok(Expansion::Done)
     }

@@ -11,7 +11,7 @@ use heapless::Vec;
 
 use super::node::RANGE;
 use super::slack::{ACCURACY, FLOOR, TIE};
-use super::{Search, Waiting};
+use super::{Search, WaitingNode};
 use crate::math::sqrt::sqrt;
 use crate::query::made::Tests;
 use crate::tool::Tool;
@@ -163,7 +163,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         mut visit: impl FnMut(u32) -> Result<bool, QueryError>,
     ) -> Result<(bool, Tests), QueryError> {
         let limit = limit_of(sqrt(self.best_squared), self.scale);
-        while let Some(Waiting { lower, link }) = self.pop() {
+        while let Some(WaitingNode { lower, link }) = self.pop() {
             if lower > self.cutoff {
                 continue;
             }

@@ -15,7 +15,7 @@ mod order;
 
 use glam::Vec4;
 
-use super::{Expansion, Search, Waiting};
+use super::{Expansion, Search, WaitingNode};
 use crate::math::sqrt::sqrt;
 use crate::math::vec3x4::{Vec3x4, roots};
 use crate::tree::format::several::four_nodes;
@@ -68,7 +68,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
     pub fn run(mut self) -> Result<Proximity, QueryError> {
         while let Some(top) = self.search.waiting.checked_sub(1) {
             let corrupt = QueryError::Corrupt { row: top as u32 };
-            let &Waiting { lower, link } = self.search.stack.get(top).ok_or(corrupt)?;
+            let &WaitingNode { lower, link } = self.search.stack.get(top).ok_or(corrupt)?;
             let step = match Link::decode(link) {
                 Link::Children { .. } => self.expand_batch(),
                 Link::Leaf { .. } if lower > self.search.cutoff => {
@@ -112,7 +112,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         let Self { search, room, records, parents, .. } = self;
         let (mut subtrees, mut children) = (0, 0);
         let from = search.waiting.saturating_sub(SUBTREES);
-        for &Waiting { lower, link } in search.stack.get(from..search.waiting)?.iter().rev() {
+        for &WaitingNode { lower, link } in search.stack.get(from..search.waiting)?.iter().rev() {
             let Link::Children { first, count } = Link::decode(link) else { break };
             let all = children + count as usize;
             if subtrees > 0 && search.waiting + all > *room + subtrees + 1 {

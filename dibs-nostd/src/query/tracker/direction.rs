@@ -13,7 +13,7 @@ use super::kept::DIRECTED;
 use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
-use crate::query::memory::separation::Certain;
+use crate::query::memory::separation::CertainInterval;
 use crate::query::plane::least;
 use crate::query::{Budget, Options, Proximity, Side};
 use crate::tool::{AxisPoint, Tool};
@@ -54,7 +54,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
         found: &mut Proximity,
-        last: &Certain,
+        last: &CertainInterval,
     ) -> Result<(), QueryError> {
         let tree = &self.tree;
         let (Some(TriangleRow(row)), Some(TriangleRow(other))) = (last.triangle, found.triangle)

@@ -16,7 +16,7 @@ use crate::math::order::larger;
 use crate::math::round::{sum_down, sum_up};
 use crate::math::sqrt::sqrt;
 use crate::query::corners::corners;
-use crate::query::memory::separation::Certain;
+use crate::query::memory::separation::CertainInterval;
 use crate::query::{Budget, NoSide, Options, Proximity, Side};
 use crate::tool::AxisPoint;
 use crate::unavailable::QueryError;
@@ -56,11 +56,12 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
                     found.direction = last.direction;
                     found.point_on_tool -= last.direction * tool.radius();
                 }
-                let own = Certain::of(found, tool.radius());
+                let own = CertainInterval::of(found, tool.radius());
                 // A smaller gain is the rounding of two answers.
                 let gain = 2.0 * found.accuracy;
-                let is_narrower =
-                    |last: &Certain| last.lower > own.lower + gain || last.upper < own.upper - gain;
+                let is_narrower = |last: &CertainInterval| {
+                    last.lower > own.lower + gain || last.upper < own.upper - gain
+                };
                 match last.filter(|last| self.tree.is_closed() && is_narrower(last)) {
                     Some(last) => Some(self.narrow(vertices, tool, options, found, own, last)?),
                     None => Some(own),
@@ -82,9 +83,9 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
         found: &mut Proximity,
-        own: Certain,
-        last: Certain,
-    ) -> Result<Certain, QueryError> {
+        own: CertainInterval,
+        last: CertainInterval,
+    ) -> Result<CertainInterval, QueryError> {
         let mut both = own;
         if last.lower > own.lower {
             both.lower = last.lower;
@@ -112,12 +113,12 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
         found: &mut Proximity,
-        last: Certain,
+        last: CertainInterval,
         nearest: f32,
-    ) -> Result<Option<Certain>, QueryError> {
-        let own = Certain::of(found, tool.radius());
+    ) -> Result<Option<CertainInterval>, QueryError> {
+        let own = CertainInterval::of(found, tool.radius());
         let has_depth = found.lower < nearest;
-        let unsigned = Certain::of(&Proximity { lower: nearest, ..*found }, tool.radius());
+        let unsigned = CertainInterval::of(&Proximity { lower: nearest, ..*found }, tool.radius());
         let nearest = larger(0.0, unsigned.lower);
         let mut both = last;
         if own.upper < both.upper {
@@ -176,7 +177,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         tool: &T,
         options: &Options,
         found: &mut Proximity,
-        last: &Certain,
+        last: &CertainInterval,
     ) -> Result<(), QueryError> {
         let on_axis = tool.axis_point(last.axis_parameter);
         found.axis_parameter = last.axis_parameter;
@@ -206,7 +207,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
 /// Rounding of the two sums from a separation to the axis and back, with slack for the rounding of the bound itself.
 const SUMS: f32 = 4.0 / 16_777_216.0;
 
-impl Certain {
+impl CertainInterval {
     /// The certain interval of an answer for the axis.
     #[inline(always)]
     fn of(found: &Proximity, radius: f32) -> Self {

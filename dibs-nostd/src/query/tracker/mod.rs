@@ -15,9 +15,9 @@ mod tests;
 use super::made::Tests;
 use super::memory::Memory;
 use super::memory::clock::Reading;
-use super::memory::separation::Certain;
+use super::memory::separation::CertainInterval;
 use super::prices::QUERY;
-use super::search::{Outcome, Search, Tick, Ties, WHOLE, Waiting};
+use super::search::{Outcome, Search, Tick, Ties, WHOLE, WaitingNode};
 use super::{Budget, NoSide, Options, Proximity, Side, signed};
 use crate::surface::motion::Unit;
 #[cfg(feature = "control")]
@@ -38,7 +38,7 @@ pub use answer::{Fallback, TrackerAnswer};
 /// structures; Barbič & James 2010.)
 ///
 /// The surface carries its motion, as [`MovingSurface::motion`]; where it was not measured, the tick is a whole query.
-/// An [`Assembler`](crate::Assembler) with a tree's gate measures it for the frames that it publishes, an
+/// An [`Assembler`](crate::Assembler) with a tree's admission check measures it for the frames that it publishes, an
 /// [`Odometer`](crate::Odometer) for other tables. Another tool counts as a step to its position. The stretch in the
 /// options may change from tick to tick: remembered bounds hold for any stretch.
 ///
@@ -85,7 +85,7 @@ pub struct Tracker<'t, I, const STACK: usize, const OPENED: usize, const RANGE: 
     tree: Tree<'t, I>,
     #[cfg(feature = "control")]
     labels: LabelSet,
-    stack: [Waiting; STACK],
+    stack: [WaitingNode; STACK],
     memory: Memory<STACK, OPENED, RANGE>,
     last: Option<LastTick>,
     ties: Ties,
@@ -144,7 +144,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             tree: *tree,
             #[cfg(feature = "control")]
             labels: tree.labels(),
-            stack: [Waiting { lower: 0.0, link: 0 }; STACK],
+            stack: [WaitingNode { lower: 0.0, link: 0 }; STACK],
             memory: Memory::new(Unit::of(tree)),
             last: None,
             ties: Ties::new(),
@@ -320,7 +320,7 @@ const fn for_whole(budget: Budget, is_priced: bool, made: Tests) -> u32 {
 
 /// The closest pair's part of a tick's budget: the rest is for the depth of an axis that may be inside. Where no depth is
 /// known and the last tick did not find the axis inside, the closest pair comes first, because a depth begins from it.
-fn share_of_pair(budget: Budget, past: &Certain, is_depth_known: bool) -> Budget {
+fn share_of_pair(budget: Budget, past: &CertainInterval, is_depth_known: bool) -> Budget {
     let was_inside = matches!(past.side, Side::Inside | Side::Crossing);
     if past.upper < 0.0 {
         Budget::new(budget.tests() / 8 * 3)

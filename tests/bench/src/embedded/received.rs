@@ -3,7 +3,8 @@
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::wire::{Encoding, FrameEncoder, FrameId, QuantisedBox};
 use dibs_nostd::{
-    Advance, Assembler, Buffer, Buffers, FrameReader, Head, Millis, NoGate, Position, VertexTable,
+    Advance, Assembler, Buffer, Buffers, FrameReader, Head, Millis, NoAdmissionCheck, Position,
+    VertexTable,
 };
 use glam::Vec3;
 
@@ -21,7 +22,7 @@ pub struct Line {
     mesh_id: u32,
     epoch: u32,
     waiting: Vec<Vec<u8>>,
-    assembler: Assembler<'static, NoGate>,
+    assembler: Assembler<'static, NoAdmissionCheck>,
     reader: FrameReader<'static>,
 }
 
@@ -35,7 +36,7 @@ impl Line {
         let state = Box::leak(Box::default());
         let (writer, reader) = Buffers::new(state, [buffer(), buffer()], None).ends();
         let mesh_id = nodes.mesh_id();
-        let assembler = Assembler::new(writer, NoGate, mesh_id, REACH);
+        let assembler = Assembler::new(writer, NoAdmissionCheck, mesh_id, REACH);
         Self { mesh_id, epoch: 0, waiting: Vec::new(), assembler, reader }
     }
 

@@ -3,8 +3,8 @@
 use dibs_build::BuiltTree;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Admission, FrameExtent, Gate, IncomingSurface, Index, MeasuredStretch, MovingSurface, Odometer,
-    Options, Proximity, Query, StretchMonitor, Tracker, TrackerAnswer, Tree, VertexTable,
+    Admission, AdmissionCheck, FrameExtent, IncomingSurface, Index, MeasuredStretch, MovingSurface,
+    Odometer, Options, Proximity, Query, StretchMonitor, Tracker, TrackerAnswer, Tree, VertexTable,
 };
 use dibs_tests::method::{Found, Probe};
 use glam::Vec3;

@@ -89,7 +89,7 @@ const HALVING_DISTANCE: Count = Count::Calls(
 const WALK_DISTANCE: Count = Count::Calls(&[Function("descend")], "closest_to_point");
 
 const GATHER_POPS: &[Within] = &[Line(AROUND, POPS)];
-const RESUMED: &[Within] = &[Line(AROUND, "self.push(self.waiting, Waiting { lower, link })")];
+const RESUMED: &[Within] = &[Line(AROUND, "self.push(self.waiting, WaitingNode { lower, link })")];
 const LEFT: &[Within] = &[Function("leave")];
 const STEPS: &[Within] = &[Line(WALK, "for _ in 0..walk.steps {")];
 const NEIGHBOURS: &[Within] = &[Line(WALK, "for row in neighbours.filter(")];

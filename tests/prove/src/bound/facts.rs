@@ -127,13 +127,13 @@ pub(super) const TEST: Count =
 pub(super) const WARM: Count =
     Count::Calls(&[Function("start"), Function("test_triangle")], "closest_to_");
 const POP: Count =
-    Count::Heads(&[Line(SEARCH, "while let Some(Waiting { lower, link }) = self.pop() {")]);
+    Count::Heads(&[Line(SEARCH, "while let Some(WaitingNode { lower, link }) = self.pop() {")]);
 pub(super) const PUSH: Count = Count::Passes(&[
-    Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
+    Line(NODE, "self.push(base, WaitingNode { lower, link: node.link }).ok_or(corrupt)?;"),
     Line(NODE, "*self.stack.get_mut(at)? = subtree;"),
 ]);
 const SHIFT: Count = Count::Passes(&[
-    Line(NODE, "self.push(base, Waiting { lower, link: node.link }).ok_or(corrupt)?;"),
+    Line(NODE, "self.push(base, WaitingNode { lower, link: node.link }).ok_or(corrupt)?;"),
     Line(NODE, "*self.stack.get_mut(at)? = below;"),
 ]);
 pub(super) const OTHERS: Count = Count::Calls(&[], "Roots::with_others");

@@ -56,7 +56,7 @@ const SIDE: &str = "dibs-nostd/src/query/side.rs";
 const EXACT: &str = "dibs-nostd/src/query/exact.rs";
 const NORMAL: &str = "dibs-nostd/src/query/normal.rs";
 
-pub(super) const POPS: &str = "while let Some(Waiting { lower, link }) = self.pop() {";
+pub(super) const POPS: &str = "while let Some(WaitingNode { lower, link }) = self.pop() {";
 pub(super) const SEARCH_POPS: &[Within] = &[Line(SEARCH, POPS)];
 pub(super) const TIE_POPS: &[Within] = &[Line(TIES, POPS)];
 const SEARCHED: Count = Count::Entries(SEARCH_POPS);

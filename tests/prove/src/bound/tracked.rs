@@ -52,11 +52,11 @@ pub(super) const DUE_TRIANGLE: Count =
     Count::Passes(&[Line(FILE, "if facing > self.facing.within {")]);
 pub(super) const DUE_TEST: Count = Count::Calls(&[Function("test_triangles")], "closest_to_");
 const DUE_PUSH: Count = Count::Passes(&[
-    Line(FILE, "search.push(base, Waiting { lower: own, link }).ok_or(corrupt)?;"),
+    Line(FILE, "search.push(base, WaitingNode { lower: own, link }).ok_or(corrupt)?;"),
     Line(super::facts::NODE, "*self.stack.get_mut(at)? = subtree;"),
 ]);
 const DUE_SHIFT: Count = Count::Passes(&[
-    Line(FILE, "search.push(base, Waiting { lower: own, link }).ok_or(corrupt)?;"),
+    Line(FILE, "search.push(base, WaitingNode { lower: own, link }).ok_or(corrupt)?;"),
     Line(super::facts::NODE, "*self.stack.get_mut(at)? = below;"),
 ]);
 pub(super) const CLOSED_SLOT: Count = Count::Passes(&[Line(
@@ -71,7 +71,10 @@ pub(super) const WHOLE_VISIT: Count =
 pub(super) const WHOLE_TRIANGLE: Count = Count::Passes(&[Of("run", "Capsule"), TRIANGLE_LINE]);
 const WAITING: &[Within] = &[
     Function("visit"),
-    Line(FILE, "let &Waiting { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;"),
+    Line(
+        FILE,
+        "let &WaitingNode { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;",
+    ),
 ];
 const EIGHTS: &[Within] =
     &[Line(FRONT, "let passed = 8 * eights.iter().take_while(waits).count();")];

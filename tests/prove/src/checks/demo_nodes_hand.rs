@@ -7,7 +7,6 @@ use xtask::steps::Outcome;
 
 use super::demo::{Run, keep, report_of};
 use super::demo_hand;
-use crate::demo::hand::GIVEN;
 use crate::harness::figures::Figures;
 use crate::harness::promise::{
     Bound, Promise,
@@ -58,7 +57,7 @@ pub const CHECK: Check = Check {
             id: "demo.nodes.hand.given",
             says: "The wall that nodes move gives the hand no more energy than its account",
             criterion: FLOW,
-            bound: Bound::AtMost(GIVEN),
+            bound: Bound::AtMost(1.0),
             unit: "mJ at any time, beyond what the hand gave",
             limits: "As above.",
         },

@@ -12,8 +12,8 @@ use dibs_nostd::wire::{
     Encoding, FrameEncoder, FrameId, Freshness, NoMac, encode_heartbeat, enframe, framed_bytes,
 };
 use dibs_nostd::{
-    Admission, Budget, Cost, FrameExtent, Gate, IncomingSurface, MeasuredStretch, Options, Query,
-    StretchMonitor, SurfaceLimits,
+    Admission, AdmissionCheck, Budget, Cost, FrameExtent, IncomingSurface, MeasuredStretch,
+    Options, Query, StretchMonitor, SurfaceLimits,
 };
 use dibs_tests::deform::{Deformation, unit};
 use fastrand::Rng;

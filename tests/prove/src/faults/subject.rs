@@ -223,8 +223,9 @@ impl<'f, M: Mac> Controller<'f, M> {
         mac: M,
     ) -> Self {
         let (writer, reader) = frames.split().expect("new frames");
-        let gate = probe::bus::gate(tree, poses).expect("a tree with a metric");
-        let assembler = Assembler::with_mac(writer, gate, tree.mesh_id(), LIMIT, mac);
+        let admission_check =
+            probe::bus::admission_check(tree, poses).expect("a tree with a metric");
+        let assembler = Assembler::with_mac(writer, admission_check, tree.mesh_id(), LIMIT, mac);
         Self { deframer: Deframer::new(), assembler, reader, poses, published: 0, wrong: 0, now: 0 }
     }
 

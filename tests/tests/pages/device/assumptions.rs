@@ -79,7 +79,7 @@ pub const ASSUMPTIONS: &[Assumption] = &[
     yours(
         "U-08",
         "The source does not repeat old images with noise, and states no age below the true one.",
-        "Watch the age when sent (`failsafe::Limits::source_age`): it shows a source that stands still.",
+        "ThresholdPair the age when sent (`failsafe::Limits::source_age`): it shows a source that stands still.",
     ),
     by(
         "U-09",

@@ -14,7 +14,7 @@ use super::Search;
 use crate::query::distances::{distance, least};
 use crate::query::memory::Memory;
 use crate::query::memory::clock::MotionClock;
-use crate::query::search::Waiting;
+use crate::query::search::WaitingNode;
 use crate::surface::motion::Unit;
 use crate::tree::RootSet;
 use crate::tree::format::Link;
@@ -75,7 +75,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
     let mut odometer = Odometer::new(&tree);
     let mut rng = Rng::with_seed(16);
     let mut vector = |size: f32| Vec3::from([(); 3].map(|()| (rng.f32() - 0.5) * size));
-    let mut stack = [Waiting { lower: 0.0, link: 0 }; 128];
+    let mut stack = [WaitingNode { lower: 0.0, link: 0 }; 128];
     let mut memory = Memory::<1, 1, 256>::new(Unit::of(&tree));
     // Deadlines wrap early.
     memory.clock = MotionClock::wrapping_after(Unit::of(&tree), 1 << 22);
@@ -147,7 +147,7 @@ fn a_node_that_no_search_reaches_stays_due() {
     let at = |tip: Vec3, out: Vec3| Capsule::new(tip + out, tip + out * 9.0, 0.5);
     let first = at(by_x[by_x.len() - 1], Vec3::X).expect("a valid capsule");
     let last = at(by_x[0], -Vec3::X).expect("a valid capsule");
-    let mut stack = [Waiting { lower: 0.0, link: 0 }; 128];
+    let mut stack = [WaitingNode { lower: 0.0, link: 0 }; 128];
     let mut memory = Memory::<1, 1, 256>::new(Unit::of(&tree));
     let mut visited = 0;
     for tick in 0..=6_000 {

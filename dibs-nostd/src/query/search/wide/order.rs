@@ -4,7 +4,7 @@ use core::array;
 use core::hint::black_box;
 
 use super::{WideSearch, next};
-use crate::query::search::Waiting;
+use crate::query::search::WaitingNode;
 use crate::tree::format::{Link, whole_node};
 use crate::{Index, Tool, VertexTable};
 
@@ -60,7 +60,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
                 // Out of range where the block is longer than the stack.
                 if let Some(place) = stack.get_mut(place as usize) {
                     let link = whole_node::<I>(records, at)?.link;
-                    *place = Waiting { lower: *lowers.get(at as usize)?, link };
+                    *place = WaitingNode { lower: *lowers.get(at as usize)?, link };
                 }
             }
         }

@@ -25,7 +25,8 @@ use dibs_nostd::wire::{AesCmac, Deframer, Mac, NoMac, encode_status, enframe, fr
 use dibs_nostd::{Advance, Assembler, FrameReader, FrameWriter, Frames, Millis, Tree};
 use exit::exit;
 use probe::bus::{
-    HEAD_BYTES, KEY, MTU, PoseCheck, RECEIVER, REPORT_MTU, VERTICES, WORK, gate, published_words,
+    HEAD_BYTES, KEY, MTU, PoseCheck, RECEIVER, REPORT_MTU, VERTICES, WORK, admission_check,
+    published_words,
 };
 
 static FRAMES: Frames<VERTICES, 3> = Frames::new();
@@ -77,7 +78,8 @@ impl<'t, M: Mac> Receiver<'t, M> {
         mac: M,
     ) -> Option<Self> {
         let mesh_id = tree.mesh_id();
-        let assembler = Assembler::with_mac(writer, gate(tree, &POSES)?, mesh_id, limit, mac);
+        let assembler =
+            Assembler::with_mac(writer, admission_check(tree, &POSES)?, mesh_id, limit, mac);
         let deframer = Deframer::new();
         let [received, published, epoch, digest] = [0; 4];
         Some(Self { mesh_id, deframer, assembler, reader, received, published, epoch, digest })

@@ -2,22 +2,22 @@
 
 use super::reach::Reach;
 use super::{ModalSurface, Modes, WeightsError};
-use crate::stretch::{Admission, FrameExtent, Gate, IncomingSurface, StretchError};
+use crate::stretch::{Admission, AdmissionCheck, FrameExtent, IncomingSurface, StretchError};
 use crate::surface::{Millis, VertexTable};
 use crate::tree::SurfaceFacts;
 
-/// Admits weights within their ranges whose surface stays within the stretch limit and a speed limit: the [`Gate`] of
-/// an [`Assembler`](crate::Assembler) of modal frames.
+/// Admits weights within their ranges whose surface stays within the stretch limit and a speed limit: the
+/// [`AdmissionCheck`] of an [`Assembler`](crate::Assembler) of modal frames.
 ///
 /// [`Modes::stretch_bound`] and a bound on the vertices' motion decide in O(modes), for any number of triangles. If a
-/// bound exceeds its limit, another gate `G` measures the surface, in slices if it is a
+/// bound exceeds its limit, another admission check `G` measures the surface, in slices if it is a
 /// [`StretchMonitor`](crate::StretchMonitor). So no frame within the limits is refused, and no frame stretched or moved
 /// beyond them is admitted.
 ///
 /// The limits on speed and recovery are `G`'s: [`StretchMonitor::limits`](crate::StretchMonitor::limits). Its limits on
 /// size and on the sign of the volume apply only to frames that it measures.
 #[derive(Clone, Debug)]
-pub struct ModalGate<'a, G, const K: usize> {
+pub struct ModalAdmissionCheck<'a, G, const K: usize> {
     modes: Modes<'a>,
     reach: Reach<K>,
     exact: G,
@@ -26,9 +26,9 @@ pub struct ModalGate<'a, G, const K: usize> {
     measured: u32,
 }
 
-impl<'a, G, const K: usize> ModalGate<'a, G, K> {
-    /// A gate for surfaces of exactly `K` modes. `exact`, the tree or a monitor of it, measures the surfaces that the
-    /// bounds cannot admit. Only a monitor limits the speed.
+impl<'a, G, const K: usize> ModalAdmissionCheck<'a, G, K> {
+    /// An admission check for surfaces of exactly `K` modes. `exact`, the tree or a monitor of it, measures the
+    /// surfaces that the bounds cannot admit. Only a monitor limits the speed.
     ///
     /// Cost: two passes over the displacements of all vertices.
     ///
@@ -43,7 +43,7 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
         Ok(Self { modes: *modes, reach, exact, surface: None, measured: 0 })
     }
 
-    /// Frames measured by the inner gate since the start; saturates.
+    /// Frames measured by the inner admission check since the start; saturates.
     #[must_use]
     pub const fn measured(&self) -> u32 {
         self.measured
@@ -59,7 +59,7 @@ impl<'a, G, const K: usize> ModalGate<'a, G, K> {
     }
 }
 
-impl<G: Gate, const K: usize> Gate for ModalGate<'_, G, K> {
+impl<G: AdmissionCheck, const K: usize> AdmissionCheck for ModalAdmissionCheck<'_, G, K> {
     fn begin(&mut self, _: FrameExtent) {
         self.surface = None;
     }

@@ -20,7 +20,7 @@ pub const LIKE: f32 = 0.11;
 
 /// A basin of the distance over the surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Valley {
+pub struct Basin {
     pub distance: f64,
     /// Height of the lowest ridge to a lower basin, relative to this basin's minimum.
     pub ridge: f64,
@@ -29,11 +29,7 @@ pub struct Valley {
 }
 
 /// Every basin in f64, and the basin of every triangle. Ridges up to [`least_ridge`] do not separate basins.
-pub fn valleys(
-    rows: &[Vec3],
-    triangles: &[[u32; 3]],
-    tool: [Vec3; 2],
-) -> (Vec<Valley>, Vec<usize>) {
+pub fn basins(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Basin>, Vec<usize>) {
     let mut across = HashMap::new();
     for (row, &[a, b, c]) in triangles.iter().enumerate() {
         for edge in [(a, b), (b, c), (c, a)] {
@@ -66,26 +62,26 @@ pub fn valleys(
         all[row] = lowest;
         let near = known.iter().find(|&&other| bottom(&all, other) == lowest);
         one[row] = bottom(&one, *near.expect("it is known"));
-        for &valley in &bottoms[1..] {
-            let ridge = pairs[row].distance - pairs[valley].distance;
-            ridges.insert(valley, ridge);
-            all[valley] = lowest;
-            if ridge <= least_ridge(pairs[valley].distance) {
+        for &basin in &bottoms[1..] {
+            let ridge = pairs[row].distance - pairs[basin].distance;
+            ridges.insert(basin, ridge);
+            all[basin] = lowest;
+            if ridge <= least_ridge(pairs[basin].distance) {
                 let into = bottom(&one, row);
-                one[valley] = into;
+                one[basin] = into;
             }
         }
     }
     let lowest: Vec<usize> = (0..triangles.len()).filter(|&row| one[row] == row).collect();
     let labels = (0..triangles.len())
-        .map(|row| lowest.iter().position(|&l| l == bottom(&one, row)).expect("a valley"))
+        .map(|row| lowest.iter().position(|&l| l == bottom(&one, row)).expect("a basin"))
         .collect();
     let found = lowest.iter().map(|&row| {
         let [a, b, c] = at(row);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let towards = (pairs[row].on_axis - pairs[row].on_surface).normalize_or_zero();
         let ridge = ridges.get(&row).copied().unwrap_or(f64::INFINITY);
-        Valley { distance: pairs[row].distance, ridge, up: normal.dot(towards) }
+        Basin { distance: pairs[row].distance, ridge, up: normal.dot(towards) }
     });
     (found.collect(), labels)
 }

@@ -81,13 +81,13 @@ impl<'a, V: ?Sized> IncomingSurface<'a, V> {
 /// [`advance`](Self::advance) as often as there is time, until it admits or refuses the frame. A frame may be abandoned
 /// at any time, and another begun. [`published`](Self::published) follows once an admitted frame is published.
 ///
-/// A user's gate wraps the library's: in this example whole frames wait until somebody has confirmed them.
+/// A user's admission check wraps the library's: in this example whole frames wait until somebody has confirmed them.
 ///
 /// ```
 /// use core::ops::Range;
 /// use dibs_build::{Builder, generate};
 /// use dibs_nostd::{
-///     Admission, FrameExtent, Gate, IncomingSurface, StretchError, StretchMonitor, Tree, VertexTable,
+///     Admission, FrameExtent, AdmissionCheck, IncomingSurface, StretchError, StretchMonitor, Tree, VertexTable,
 /// };
 ///
 /// struct Confirmed<G> {
@@ -95,7 +95,7 @@ impl<'a, V: ?Sized> IncomingSurface<'a, V> {
 ///     is_confirmed: bool,
 /// }
 ///
-/// impl<G: Gate> Gate for Confirmed<G> {
+/// impl<G: AdmissionCheck> AdmissionCheck for Confirmed<G> {
 ///     fn begin(&mut self, changed: FrameExtent) {
 ///         self.is_confirmed |= changed == FrameExtent::Partial;
 ///         self.measured.begin(changed);
@@ -121,17 +121,17 @@ impl<'a, V: ?Sized> IncomingSurface<'a, V> {
 /// let built = Builder::new().build(&heart)?;
 /// let tree = Tree::<u16>::from_bytes(built.blob())?;
 /// let rows = built.to_rows(&heart.positions);
-/// let mut gate = Confirmed { measured: StretchMonitor::new(&tree)?, is_confirmed: false };
+/// let mut admission_check = Confirmed { measured: StretchMonitor::new(&tree)?, is_confirmed: false };
 ///
-/// gate.begin(FrameExtent::Whole);
-/// gate.moved(0..tree.vertex_count());
+/// admission_check.begin(FrameExtent::Whole);
+/// admission_check.moved(0..tree.vertex_count());
 /// let arriving = || IncomingSurface::new(rows.as_slice(), tree.vertex_count());
-/// assert_eq!(gate.advance(arriving(), u32::MAX)?, Admission::Pending);
-/// gate.is_confirmed = true;
-/// assert!(matches!(gate.advance(arriving(), u32::MAX)?, Admission::Admitted(Some(_))));
+/// assert_eq!(admission_check.advance(arriving(), u32::MAX)?, Admission::Pending);
+/// admission_check.is_confirmed = true;
+/// assert!(matches!(admission_check.advance(arriving(), u32::MAX)?, Admission::Admitted(Some(_))));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub trait Gate {
+pub trait AdmissionCheck {
     /// A frame begins; the previous one is discarded unless it was published. O(1).
     fn begin(&mut self, changed: FrameExtent);
 
@@ -167,9 +167,9 @@ pub trait Gate {
     /// The admitted frame is now the published one.
     fn published(&mut self) {}
 
-    /// Smallest and largest admitted weight of a mode. With `None`, as for most gates, the receiver takes frames of
-    /// vertices; with a range it takes only modal frames. The rows of a modal frame are [`Vec3`](crate::glam::Vec3)s
-    /// with one weight each, as `x`.
+    /// Smallest and largest admitted weight of a mode. With `None`, as for most admission checks, the receiver takes
+    /// frames of vertices; with a range it takes only modal frames. The rows of a modal frame are
+    /// [`Vec3`](crate::glam::Vec3)s with one weight each, as `x`.
     fn weight_range(&self, mode: u32) -> Option<[f32; 2]> {
         let _ = mode;
         None
@@ -177,7 +177,7 @@ pub trait Gate {
 
     /// Upper bound (mm) on the distance of any vertex from its position in a surface captured this much earlier: see
     /// [`SurfaceLimits::speed`](crate::SurfaceLimits::speed) and [`recovery_mm`](crate::SurfaceLimits::recovery_mm).
-    /// Infinite for a gate that compares no frames.
+    /// Infinite for an admission check that compares no frames.
     fn farthest(&self, elapsed: Millis) -> f32 {
         let _ = elapsed;
         f32::INFINITY
@@ -196,14 +196,14 @@ pub trait Gate {
         true
     }
 
-    /// The stretch at the end of the frame's extrapolation, once the frame is admitted. `None` if the gate does not
-    /// measure it, or it is beyond the limit.
+    /// The stretch at the end of the frame's extrapolation, once the frame is admitted. `None` if the admission check
+    /// does not measure it, or it is beyond the limit.
     #[doc(hidden)]
     fn ahead(&self) -> Option<f32> {
         None
     }
 
-    /// The facts of the gate's surface; the default has none.
+    /// The facts of the admission check's surface; the default has none.
     fn surface_facts(&self) -> SurfaceFacts {
         SurfaceFacts::default()
     }
@@ -217,9 +217,9 @@ pub trait Gate {
 /// Admits every surface, unmeasured. Answers then rely on the paper's assumption that the tissue stays within the
 /// tree's stretch limit.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct NoGate;
+pub struct NoAdmissionCheck;
 
-impl Gate for NoGate {
+impl AdmissionCheck for NoAdmissionCheck {
     fn begin(&mut self, _: FrameExtent) {}
 
     fn advance<V: VertexTable + ?Sized>(
@@ -233,7 +233,7 @@ impl Gate for NoGate {
 
 /// A tree admits surfaces within its stretch limit, by one [`measure_stretch`] once the frame is complete. Not sliced:
 /// that call's cost is linear in the triangles, whatever `work` is.
-impl<I: Index> Gate for &Tree<'_, I> {
+impl<I: Index> AdmissionCheck for &Tree<'_, I> {
     fn begin(&mut self, _: FrameExtent) {}
 
     fn advance<V: VertexTable + ?Sized>(

@@ -1,4 +1,4 @@
-//! The check of a frame with a pose: the rows by their own gate, and both together by the limit on speed.
+//! The check of a frame with a pose: the rows by their own admission check, and both together by the limit on speed.
 
 // Requirement: F-08
 
@@ -8,17 +8,19 @@ use glam::Vec3;
 
 use super::poses::Poses;
 use crate::math::sqrt::sqrt;
-use crate::stretch::{Admission, Comparison, FrameExtent, Gate, IncomingSurface, StretchError};
+use crate::stretch::{
+    Admission, AdmissionCheck, Comparison, FrameExtent, IncomingSurface, StretchError,
+};
 use crate::surface::{MotionUnit, PoseStep};
 use crate::tree::SurfaceFacts;
 use crate::{Millis, RigidPose, VertexTable};
 
 const BUFFERS: u32 = 3;
 
-/// The gate of rows with poses.
+/// The admission check of rows with poses.
 #[doc(hidden)]
 #[derive(Debug)]
-pub struct PoseGate<'s, G> {
+pub struct PoseAdmissionCheck<'s, G> {
     rows: G,
     poses: &'s Poses,
     centre: Vec3,
@@ -35,7 +37,7 @@ pub struct PoseGate<'s, G> {
     buffer: u32,
 }
 
-impl<'s, G> PoseGate<'s, G> {
+impl<'s, G> PoseAdmissionCheck<'s, G> {
     pub(super) fn new(rows: G, poses: &'s Poses, centre: Vec3, amplification: f32) -> Self {
         Self {
             rows,
@@ -91,7 +93,7 @@ impl<'s, G> PoseGate<'s, G> {
     }
 }
 
-impl<G: Gate> PoseGate<'_, G> {
+impl<G: AdmissionCheck> PoseAdmissionCheck<'_, G> {
     /// A vertex moves by at most its row's step in the mesh plus the step of the pose, turned and shifted, at its
     /// current position.
     fn check_speed(&self, compared: &Comparison, elapsed: Millis) -> Result<(), StretchError> {
@@ -108,7 +110,7 @@ impl<G: Gate> PoseGate<'_, G> {
     }
 }
 
-impl<G: Gate> Gate for PoseGate<'_, G> {
+impl<G: AdmissionCheck> AdmissionCheck for PoseAdmissionCheck<'_, G> {
     fn begin(&mut self, changed: FrameExtent) {
         let kept = match changed {
             FrameExtent::Whole => None,
@@ -191,7 +193,7 @@ mod tests {
     /// Admits rows without work, up to this distance (mm).
     struct AtOnce(f32);
 
-    impl Gate for AtOnce {
+    impl AdmissionCheck for AtOnce {
         fn begin(&mut self, _: FrameExtent) {}
 
         fn advance<V: VertexTable + ?Sized>(
@@ -210,19 +212,20 @@ mod tests {
     /// The verdict on a frame that turns by a tenth of a radian, row by row, and the number of slices.
     fn turned(rows: &[Vec3], limit: f32) -> (Result<Admission, StretchError>, usize) {
         let poses = Poses::NEW;
-        let mut gate = PoseGate::new(AtOnce(limit), &poses, Vec3::ZERO, 1.0);
+        let mut admission_check = PoseAdmissionCheck::new(AtOnce(limit), &poses, Vec3::ZERO, 1.0);
         let count = rows.len() as u32;
-        gate.begin(FrameExtent::Whole);
-        let first = gate.advance(IncomingSurface::new(rows, count), 1);
+        admission_check.begin(FrameExtent::Whole);
+        let first = admission_check.advance(IncomingSurface::new(rows, count), 1);
         assert_eq!(first, Ok(Admission::Admitted(None)));
-        gate.published();
-        gate.begin(FrameExtent::Whole);
-        gate.place(RigidPose::new(Quat::from_rotation_z(0.1), Vec3::ZERO).expect("a rotation"));
+        admission_check.published();
+        admission_check.begin(FrameExtent::Whole);
+        admission_check
+            .place(RigidPose::new(Quat::from_rotation_z(0.1), Vec3::ZERO).expect("a rotation"));
         let compared = Some(Comparison { largest: 0.0, rows: [0, 0], t: f32::NAN });
         let before = Some((rows, Millis(30)));
         let mut verdicts = (1..=rows.len()).map(|slices| {
             let next = IncomingSurface { before, compared, ..IncomingSurface::new(rows, count) };
-            (gate.advance(next, 1), slices)
+            (admission_check.advance(next, 1), slices)
         });
         verdicts.find(|(verdict, _)| *verdict != Ok(Admission::Pending)).expect("all is examined")
     }
