@@ -56,8 +56,9 @@ enum Command {
     /// Write a web page in which the surface moves and the query runs
     View(view::Args),
     /// Send a motion, recorded or live, to a controller, over a serial line or a socket
-    #[command(visible_alias = "bridge")]
     Stream(stream::Args),
+    /// The same by another name, for a live source of other programs
+    Bridge(stream::Args),
     /// Generate a procedural heart or brain
     Generate(generate::Args),
     /// Print the completion script of a shell
@@ -103,7 +104,7 @@ fn main() -> ExitCode {
         Command::Track(args) => track::run(&args),
         Command::Filter(args) => filter::run(&args),
         Command::View(args) => view::run(&args),
-        Command::Stream(args) => stream::run(&args),
+        Command::Stream(args) | Command::Bridge(args) => stream::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Completions(args) => manual::complete(&args),
         Command::Man(args) => manual::write(&args),

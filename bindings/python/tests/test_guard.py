@@ -408,6 +408,15 @@ class Guards(unittest.TestCase):
         self.assertTrue(lower < truth < upper < lower + 150, said)
         self.assertAlmostEqual(separation, truth, delta=0.01)
 
+    def test_the_example_takes_a_solver_s_frames(self):
+        example = pathlib.Path(__file__).parents[3] / "examples/python/solver.py"
+        said = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, check=True, timeout=60).stdout
+        # The least and largest separation in a beat, with a millimetre for the extrapolation.
+        mesh, motion = dibs.generate("heart", 1_000)
+        tree = dibs.build(mesh, stretch=1.5)
+        truth = [tree.query([0, 0, 90, 0, 0, 150, 2.5], surface=frame)["separation"] for frame in motion.frames]
+        self.assertTrue(min(truth) - 1 < float(said) < max(truth) + 1, f"{said} {truth}")
+
     def test_the_readme_has_the_loop(self):
         readme = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
         block = next(block for block in re.findall(r"```python\n(.*?)```", readme, re.DOTALL) if "Guard(" in block)
