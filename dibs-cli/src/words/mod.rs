@@ -49,13 +49,20 @@ fn arguments() -> Vec<(String, Arg)> {
     commands().into_iter().flat_map(of).collect()
 }
 
+/// The name of a command by which the table has it: two are one.
+fn listed(name: &str) -> &str {
+    if name == "bridge" { "stream" } else { name }
+}
+
 #[test]
 fn every_command_has_the_words_of_the_table() {
     let top = crate::command();
     for command in top.get_subcommands() {
-        assert_eq!(of_clap(command), of_table(command.get_name()), "{}", command.get_name());
+        let name = command.get_name();
+        assert_eq!(of_clap(command), of_table(listed(name)), "{name}");
     }
-    let known: BTreeSet<&str> = top.get_subcommands().map(Command::get_name).collect();
+    let known = top.get_subcommands().map(|command| listed(command.get_name()));
+    let known: BTreeSet<&str> = known.collect();
     let named = WORDS.iter().flat_map(|row| row.3.split(' ')).filter(|name| *name != "demo");
     assert_eq!(named.collect::<BTreeSet<_>>(), known);
 }
@@ -127,7 +134,7 @@ fn earlier_words_are_hidden() {
         assert_eq!(arg.get_visible_aliases().unwrap_or_default(), [""; 0], "{}", arg.get_id());
         let aliases = arg.get_all_aliases().unwrap_or_default().into_iter().map(str::to_owned);
         let own = arg.is_hide_set().then(|| word(&arg));
-        hidden.extend(aliases.chain(own).map(|word| (command.clone(), word)));
+        hidden.extend(aliases.chain(own).map(|word| (listed(&command).to_owned(), word)));
     }
     let expected = [
         ("filter", "motion"),
