@@ -101,8 +101,9 @@ pub struct Tally {
     pub too_fast: u64,
     /// Ticks by reason: commanded, nearest, shortened, stopped, retreating.
     pub reasons: [u64; 5],
-    /// Largest shortfall (mm) from the stand-off in ticks whose reason promised otherwise.
-    pub worst: f64,
+    /// Largest shortfall (mm) from the stand-off in ticks whose reason promised otherwise, negative where it was kept;
+    /// none without such a tick.
+    pub worst: Option<f64>,
 }
 
 impl AddAssign for Tally {
@@ -123,7 +124,7 @@ impl AddAssign for Tally {
         for (one, more) in self.reasons.iter_mut().zip(other.reasons) {
             *one += more;
         }
-        self.worst = self.worst.max(other.worst);
+        self.worst = self.worst.into_iter().chain(other.worst).reduce(f64::max);
     }
 }
 
@@ -365,7 +366,7 @@ impl Tally {
         let lacks = stand_off - least.room;
         self.below += u64::from(says && lacks > SLACK);
         if !says {
-            self.worst = self.worst.max(lacks);
+            self.worst = self.worst.into_iter().chain([lacks]).reduce(f64::max);
             self.violations += u64::from(lacks > SLACK + 1e-3);
         }
     }

@@ -11,6 +11,7 @@ mod differential;
 mod few_places;
 mod filter;
 mod filter_budget;
+mod filter_climb;
 mod filter_of_labels;
 mod filter_of_scene;
 mod flat;

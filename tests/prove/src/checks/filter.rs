@@ -124,7 +124,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("filter.most", f64::from(sum.most_instructions));
     figures.note("filter.ticks", sum.ticks as f64);
     figures.note("filter.near", sum.near as f64);
-    figures.note("filter.worst", thousandths(sum.worst));
+    figures.note("filter.worst", thousandths(sum.worst.map_or(0.0, |worst| worst.max(0.0))));
     figures.note("filter.unsafe", sum.unsafe_ticks as f64);
     figures.note("filter.below", sum.below as f64);
 
