@@ -26,6 +26,7 @@ mod proximity;
 mod search;
 mod separation;
 mod side;
+mod sides;
 mod solids;
 mod swept;
 mod tracker;
@@ -37,7 +38,7 @@ pub use options::{Budget, Options};
 pub use proximity::{Interval, Proximity};
 #[cfg(feature = "control")]
 pub(crate) use search::LabelDistance;
-pub use side::{NoSide, Side};
+pub use sides::{NoSide, Side};
 pub use swept::{Sweep, SweepAnswer};
 pub use tracker::{Fallback, Tracker, TrackerAnswer};
 

@@ -10,7 +10,7 @@ use super::Proximity;
 use super::memory::depth::KnownDepthMut;
 use super::search::{Search, Ties, WHOLE, WaitingNode};
 use super::separation::Request;
-use super::side::{NoSide, Side};
+use super::sides::{NoSide, Side};
 use crate::math::order::smaller;
 use crate::math::sqrt::sqrt;
 use crate::tree::RootSet;
