@@ -93,6 +93,8 @@ pub struct Tally {
     pub near_label: u64,
     /// Most instructions of a tick.
     pub most_instructions: u32,
+    /// Ticks that count more instructions than their budget.
+    pub over_budget: u64,
     /// Sum of the instructions.
     pub instructions: u64,
     /// Number of queries.
@@ -118,6 +120,7 @@ impl AddAssign for Tally {
         self.near_label += other.near_label;
         self.cries += other.cries;
         self.most_instructions = self.most_instructions.max(other.most_instructions);
+        self.over_budget += other.over_budget;
         self.instructions += other.instructions;
         self.queries += other.queries;
         self.too_fast += other.too_fast;
@@ -329,6 +332,7 @@ impl Tally {
         self.ticks += 1;
         self.instructions += u64::from(admitted.instructions);
         self.most_instructions = self.most_instructions.max(admitted.instructions);
+        self.over_budget += u64::from(admitted.instructions > episode.instructions);
         self.queries += u64::from(admitted.queries);
         let most = episode.robot * episode.period as f32;
         let motion = &admitted.motion;

@@ -195,10 +195,10 @@ impl<const LABELS: usize> Filter<LABELS> {
         Ok(Self { approach: checked("approach", time, time >= 0.0)?, ..self })
     }
 
-    /// The same with a budget: the instructions of all searches of a tick, 200,000 by default. If it runs out, motions that
-    /// are not verified are not admitted, and the next tick's searches continue where they stopped. It must cover the
-    /// [cost](Self::cost)'s base (some 10,000) for each pair: a pair that is never searched has no answer, and then no
-    /// motion is admitted.
+    /// The same with a budget: the instructions of all searches and solutions of a tick, 200,000 by default. If it runs out,
+    /// motions that are not verified are not admitted, and the next tick's searches continue where they stopped. It must
+    /// cover 500, and for each pair 600 and the [cost](Self::cost)'s base (some 10,000): a pair that is never searched has no
+    /// answer, and then no motion is admitted.
     #[must_use]
     pub const fn budget(self, instructions: u32) -> Self {
         Self { instructions, ..self }
@@ -222,9 +222,7 @@ impl<const LABELS: usize> Filter<LABELS> {
     /// The pairs are the current parts of one rigid instrument, each with its own surface and tracker: a chain of two
     /// tools in a scene of two surfaces has four pairs. `rows` are up to 8 additional limits.
     ///
-    /// Cost: the [budget](Self::budget) at most, and for each tried motion a solution of up to 16 rows: usually 1,000
-    /// instructions, at most 40,000; and one comparison for each opened node, up to nine more if the budget does not
-    /// cover the motion.
+    /// Cost: the [budget](Self::budget) at most.
     ///
     /// # Errors
     /// [`FilterError`]: an argument that is not finite or out of range, or a query without an answer. The tool must

@@ -16,6 +16,10 @@ pub(super) type Vector = [f32; UNKNOWNS];
 /// Most steps, each of which adds or drops a row.
 const STEPS: u32 = 64;
 
+/// Products and sums of a step, and of each active row in it.
+const STEP: u32 = 5;
+const ACTIVE: u32 = 7;
+
 /// Violation (mm) that is ignored.
 const TOLERANCE: f32 = 1e-5;
 
@@ -40,8 +44,10 @@ impl HalfSpace {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nearest {
     pub point: Vector,
-    /// Whether it is in every half-space. If not, either no point is, or none was found in [`STEPS`] steps.
+    /// Whether it is in every half-space. If not, either no point is, or none was found in [`STEPS`] steps or the work.
     pub is_inside: bool,
+    /// Products and sums of two vectors.
+    pub work: u32,
 }
 
 struct Active {
@@ -50,20 +56,31 @@ struct Active {
     multiplier: f32,
 }
 
-/// The point nearest to `wanted` in all half-spaces.
+/// The point nearest to `wanted` in all of `count` half-spaces, with at most this work.
 pub(super) fn nearest(
     rows: &(impl Iterator<Item = HalfSpace> + Clone),
+    count: u32,
     wanted: &Vector,
+    most: u32,
 ) -> Nearest {
     let mut active: Vec<Active, UNKNOWNS> = Vec::new();
     let mut point = *wanted;
     let mut steps = 0..STEPS;
-    while let Some(row) = most_violated(rows.clone(), &point) {
+    let mut work = 0_u32;
+    loop {
+        // Written so that a sum never overflows.
+        if most.saturating_sub(work) < count {
+            return Nearest { point, is_inside: false, work };
+        }
+        work += count;
+        let Some(row) = most_violated(rows.clone(), &point) else { break };
         let mut multiplier = 0.0;
         loop {
-            if steps.next().is_none() {
-                return Nearest { point, is_inside: false };
+            let step = STEP + ACTIVE * active.len() as u32;
+            if steps.next().is_none() || most.saturating_sub(work) < step {
+                return Nearest { point, is_inside: false, work };
             }
+            work += step;
             // The component of the row's factors that is orthogonal to all active rows.
             let mut free = row.factors;
             for one in &active {
@@ -80,7 +97,7 @@ pub(super) fn nearest(
                 }
             }
             if !(step < f32::INFINITY) {
-                return Nearest { point, is_inside: false };
+                return Nearest { point, is_inside: false, work };
             }
             for one in &mut active {
                 one.multiplier -= step * dot(&one.dual, &row.factors);
@@ -104,7 +121,7 @@ pub(super) fn nearest(
             }
         }
     }
-    Nearest { point, is_inside: true }
+    Nearest { point, is_inside: true, work }
 }
 
 /// The row that a point violates most; `None` if it violates none, or is NaN.
@@ -165,6 +182,14 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    /// With all work that it takes.
+    fn nearest(
+        rows: &(impl ExactSizeIterator<Item = HalfSpace> + Clone),
+        wanted: &Vector,
+    ) -> Nearest {
+        super::nearest(rows, rows.len() as u32, wanted, u32::MAX)
+    }
 
     fn unit(factors: Vector) -> Option<Vector> {
         let length = dot(&factors, &factors).sqrt();

@@ -15,6 +15,9 @@ pub(super) trait Pair {
 
     fn radius(&self) -> f32;
 
+    /// Number of the tracker's opened nodes.
+    fn opened(&self) -> u32;
+
     /// Number of the tracker's nodes with a bound that a search within a distance (mm) of the axis would test.
     fn due_within(&self, distance: f32) -> u32;
 
@@ -41,6 +44,10 @@ where
 
     fn radius(&self) -> f32 {
         self.2.radius()
+    }
+
+    fn opened(&self) -> u32 {
+        self.0.opened()
     }
 
     fn due_within(&self, distance: f32) -> u32 {

@@ -2,9 +2,6 @@
 
 use super::nearest::{Vector, add};
 
-/// Least fractions.
-const LEAST: f32 = 1.0 / 16.0;
-
 pub(super) struct Proposal {
     /// The smallest motion that the rows allow.
     pub least: Vector,
@@ -14,14 +11,10 @@ pub(super) struct Proposal {
     pub is_command: bool,
 }
 
-/// How far a proposal is shortened.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) struct Extent {
-    /// The fraction of the path from the smallest motion to the whole one.
-    pub fraction: f32,
-    /// The fraction of the smallest motion.
-    scale: f32,
-}
+/// How far a proposal is shortened: first the path from the smallest motion to the whole one is halved, to a sixteenth
+/// and then to nothing, then the smallest motion to a sixteenth.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Extent(u8);
 
 impl Proposal {
     pub fn at(&self, extent: Extent) -> Vector {
@@ -30,36 +23,50 @@ impl Proposal {
         }
         let mut step = self.whole;
         add(&mut step, &self.least, -1.0);
-        let mut point = self.least.map(|part| part * extent.scale);
-        add(&mut point, &step, extent.fraction);
+        let mut point = self.least.map(|part| part * extent.scale());
+        add(&mut point, &step, extent.fraction());
         point
     }
 }
 
 impl Extent {
-    pub const WHOLE: Self = Self { fraction: 1.0, scale: 1.0 };
+    pub const WHOLE: Self = Self(0);
 
-    /// Number of extents shorter than the whole.
-    pub const SHORTER: u32 = 9;
+    /// The smallest motion, without the path to the whole one.
+    pub const SMALLEST: Self = Self(5);
 
-    /// The next shorter one.
-    pub fn shorter(self) -> Option<Self> {
-        let Self { fraction, scale } = self;
-        if fraction > LEAST {
-            Some(Self { fraction: fraction * 0.5, scale })
-        } else if fraction > 0.0 {
-            Some(self.to_smallest())
-        } else if scale > LEAST {
-            Some(Self { fraction, scale: scale * 0.5 })
-        } else {
-            None
-        }
+    /// The shortest.
+    pub const LAST: Self = Self(9);
+
+    /// The next shorter one, or the shortest.
+    pub fn shorter(self) -> Self {
+        self.shortened_by(1)
     }
 
-    /// Without the path to the whole motion.
-    pub fn to_smallest(self) -> Self {
-        Self { fraction: 0.0, ..self }
+    /// The one in the middle of this one and one that is shorter by at least two; `None` if there is none between.
+    pub fn middle(self, shorter: Self) -> Option<Self> {
+        let by = shorter.0.saturating_sub(self.0) / 2;
+        (by > 0).then(|| self.shortened_by(by))
     }
+
+    fn shortened_by(self, by: u8) -> Self {
+        Self(self.0.saturating_add(by)).min(Self::LAST)
+    }
+
+    /// The fraction of the path from the smallest motion to the whole one.
+    fn fraction(self) -> f32 {
+        if self < Self::SMALLEST { halved(self.0) } else { 0.0 }
+    }
+
+    /// The fraction of the smallest motion.
+    fn scale(self) -> f32 {
+        halved(self.0.saturating_sub(Self::SMALLEST.0))
+    }
+}
+
+/// 1 halved this often.
+fn halved(times: u8) -> f32 {
+    1.0 / f32::from(1_u8 << (times & 7))
 }
 
 #[cfg(test)]
@@ -72,12 +79,12 @@ mod tests {
         let (mut least, mut whole) = ([0.0; 6], [0.0; 6]);
         (least[1], whole[0]) = (1.0, 4.0);
         let proposal = Proposal { least, whole, is_command: false };
-        let extents = || core::iter::successors(Some(Extent::WHOLE), |extent| extent.shorter());
-        assert_eq!(extents().count() as u32, 1 + Extent::SHORTER);
-        let at = |number| proposal.at(extents().nth(number).expect("an extent"));
+        let at =
+            |number| proposal.at((0..number).fold(Extent::WHOLE, |extent, _| extent.shorter()));
         assert_eq!(at(0), whole);
         assert_eq!((at(1)[0], at(1)[1]), (2.0, 0.5));
         assert_eq!(at(5), least);
         assert_eq!((at(9)[0], at(9)[1]), (0.0, 1.0 / 16.0));
+        assert_eq!(at(10), at(9));
     }
 }

@@ -135,13 +135,14 @@ impl Rows {
         }
     }
 
-    /// The motion nearest to a wanted one, with every pair at least at its wanted distance.
-    pub fn nearest(&self, wanted: &Vector, distances: &[f32]) -> Nearest {
+    /// The motion nearest to a wanted one, with every pair at least at its wanted distance, with at most this work.
+    pub fn nearest(&self, wanted: &Vector, distances: &[f32], most: u32) -> Nearest {
         let walls = self.walls.iter().map(|wall| {
             let distance = distances.get(wall.pair).copied().unwrap_or(0.0);
             HalfSpace { factors: wall.factors, least: wall.zero + distance / wall.length }
         });
-        nearest(&self.own.iter().copied().chain(walls), wanted)
+        let count = (self.own.len() + self.walls.len()) as u32;
+        nearest(&self.own.iter().copied().chain(walls), count, wanted, most)
     }
 
     /// Whether a motion keeps the caller's rows.

@@ -7,7 +7,7 @@ use heapless::Vec;
 
 use super::known::{PairState, PoseDistance};
 use super::motion::{inside, most_turn, shortened};
-use super::nearest::{Vector, add};
+use super::nearest::{Nearest, Vector, add};
 use super::pair::{ClosestPair, Pair};
 use super::part::Part;
 use super::proposal::{Extent, Proposal};
@@ -36,6 +36,15 @@ const TESTS_OF_DUE: u64 = 10;
 
 /// Motions (mm) of a period within which a wall is near.
 const NEAR: f32 = 4.0;
+
+/// Instructions of work besides searches: a product or sum of two vectors, a pair's path, and a look at an opened node. Each
+/// is at least what the emulated board takes.
+const PRODUCT: u32 = 32;
+const PATH: u32 = 300;
+const LOOK: u32 = 6;
+
+/// Instructions of the first motion's rows, which the searches at the start leave, and the paths of its pairs.
+const ROWS: u32 = 500;
 
 /// A motion, and its distances from the tissue.
 #[derive(Clone, Copy)]
@@ -112,11 +121,13 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<AdmittedMotion, FilterError> {
         let rest = RigidMotion { about: self.about, ..RigidMotion::translation(Vec3::ZERO) };
+        let first = ROWS + (2 * PATH).saturating_mul(pairs.len() as u32);
         for part in self.filter.layers() {
             let mut to_come = pairs.len() as u32;
             for (number, pair) in pairs.iter_mut().enumerate() {
                 to_come -= 1;
-                self.start(pair, (number, part), to_come, &rest)?;
+                let reserved = to_come.saturating_mul(self.cost.base).saturating_add(first);
+                self.start(pair, (number, part), reserved, &rest)?;
             }
         }
         let stand_still = self.verify(pairs, &rest)?;
@@ -124,9 +135,12 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let mut extent = Extent::WHOLE;
         for attempt in 0..=WHOLE + SHORTENED {
             if attempt == WHOLE + SHORTENED {
-                extent = extent.to_smallest();
+                extent = extent.max(Extent::SMALLEST);
             } else if attempt >= WHOLE {
-                extent = extent.shorter().unwrap_or(extent);
+                extent = extent.shorter();
+            }
+            if !self.pay(PATH.saturating_mul(pairs.len() as u32)) {
+                break;
             }
             let proposal = self.propose();
             let is_covered = self.shorten(pairs, &proposal, &mut extent);
@@ -145,7 +159,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
                     Reason::Commanded
                 } else if point == [0.0; 6] {
                     Reason::Stopped
-                } else if extent.fraction == 0.0 || self.command == [0.0; 6] {
+                } else if extent >= Extent::SMALLEST || self.command == [0.0; 6] {
                     Reason::Retreating
                 } else if is_whole {
                     Reason::Nearest
@@ -178,13 +192,13 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         }
     }
 
-    /// Searches a pair at its current pose, or a part of its surface. As many pairs are still `to_come`, and each of them
-    /// gets an answer, if only the last tick's.
+    /// Searches a pair at its current pose, or a part of its surface. The instructions that are `reserved` cover the pairs to
+    /// come, each of which gets an answer, if only the last tick's, and the first motion.
     fn start<P: Pair>(
         &mut self,
         pair: &mut P,
         (number, part): (usize, Option<Part>),
-        to_come: u32,
+        reserved: u32,
         rest: &RigidMotion,
     ) -> Result<(), FilterError> {
         let (ends, radius) = (pair.ends(), pair.radius());
@@ -206,10 +220,10 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
                     .transpose()?
             }
             (Some(_), _) => None,
-            (None, _) => {
-                let left = self.left(to_come.saturating_mul(self.cost.base));
-                left.map(|left| self.search(pair, ends, false, None, left)).transpose()?
-            }
+            (None, _) => self
+                .left(reserved)
+                .map(|left| self.search(pair, ends, false, None, left))
+                .transpose()?,
         };
         let least_known = whole.filter(|_| part.is_some()).unwrap_or(f32::NEG_INFINITY);
         let distance = found.map_or(least_known, |found| larger(found.distance, least_known));
@@ -250,11 +264,29 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         self.rows.add_wall(number, on_axis, found.direction, distance, at);
     }
 
+    /// The motion nearest to a wanted one within the rows, as far as the budget lasts.
+    fn solve(&mut self, wanted: &Vector) -> Nearest {
+        let left = self.filter.instructions.saturating_sub(self.instructions);
+        let found = self.rows.nearest(wanted, &self.wanted, left / PRODUCT);
+        self.instructions = self.instructions.saturating_add(found.work.saturating_mul(PRODUCT));
+        found
+    }
+
+    /// Pays for work besides searches. Returns whether the budget covers it.
+    fn pay(&mut self, price: u32) -> bool {
+        let paid = self.instructions.saturating_add(price);
+        let is_paid = paid <= self.filter.instructions;
+        if is_paid {
+            self.instructions = paid;
+        }
+        is_paid
+    }
+
     /// The smallest motion that the rows allow, and the nearest one.
-    fn propose(&self) -> Proposal {
-        let least = self.rows.nearest(&[0.0; 6], &self.wanted).point;
+    fn propose(&mut self) -> Proposal {
+        let least = self.solve(&[0.0; 6]).point;
         let least = self.within_speed(&least);
-        let nearest = self.rows.nearest(&self.command, &self.wanted);
+        let nearest = self.solve(&self.command.clone());
         if nearest.point == self.command {
             return Proposal { least, whole: self.command, is_command: !self.is_cut };
         }
@@ -273,15 +305,21 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     /// Shortens a proposal until the budget left probably covers its searches: one that the budget ends admits nothing,
     /// and its way there and back makes the next tick's dearer. Returns whether it does.
-    fn shorten<P: Pair>(&self, pairs: &[P], proposal: &Proposal, extent: &mut Extent) -> bool {
-        for _ in 0..Extent::SHORTER {
-            if self.covers(pairs, &proposal.at(*extent)) {
-                return true;
-            }
-            let Some(shorter) = extent.shorter() else { return false };
-            *extent = shorter;
+    fn shorten<P: Pair>(&mut self, pairs: &[P], proposal: &Proposal, extent: &mut Extent) -> bool {
+        if self.covers(pairs, &proposal.at(*extent)) {
+            return true;
         }
-        self.covers(pairs, &proposal.at(*extent))
+        // What a motion needs falls with its length.
+        let (mut longer, mut shorter, mut is_covered) = (*extent, Extent::LAST, false);
+        while let Some(middle) = longer.middle(shorter) {
+            if self.covers(pairs, &proposal.at(middle)) {
+                (shorter, is_covered) = (middle, true);
+            } else {
+                longer = middle;
+            }
+        }
+        *extent = shorter;
+        is_covered || self.covers(pairs, &proposal.at(shorter))
     }
 
     /// The motion, limited to the robot's speed.
@@ -377,22 +415,31 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     }
 
     /// Whether the budget left probably covers the searches at a motion's end.
-    fn covers<P: Pair>(&self, pairs: &[P], point: &Vector) -> bool {
+    fn covers<P: Pair>(&mut self, pairs: &[P], point: &Vector) -> bool {
         let motion = RigidMotion::from_vector(self.about, point, self.lever);
-        let mut needed = u64::from(self.instructions);
-        for (pair, state) in pairs.iter().zip(&self.states) {
+        let mut needed = 0_u64;
+        for (number, pair) in pairs.iter().enumerate() {
+            let Some(&state) = self.states.get(number) else { break };
+            if !self.pay(PATH) {
+                return false;
+            }
             let (ends, moved, arc) = self.path(&state.start, &motion);
             let last = state.distance_at(&ends);
             let nearest = path::least(state.start.distance, last, moved, self.grow) - arc;
             if nearest >= state.least - EPSILON {
                 continue;
             }
+            if !self.pay(pair.opened().saturating_mul(LOOK)) {
+                return false;
+            }
             // Each bound falls by the motion, and the distance may grow by it.
             let due = pair.due_within(state.axis_distance + 2.0 * moved);
             let tests = TESTS_OF_DUE * u64::from(due);
             needed += u64::from(self.cost.base) + tests * u64::from(self.cost.node_test);
         }
-        needed <= u64::from(self.filter.instructions)
+        // Where no search is needed, none has to be paid.
+        let spent = u64::from(self.instructions);
+        needed == 0 || needed + spent <= u64::from(self.filter.instructions)
     }
 
     /// An axis' ends after a motion, an upper bound (mm) on the motion of its points, and the height of their arcs.

@@ -154,6 +154,11 @@ impl<const OPENED: usize> Front<OPENED> {
 
 #[cfg(feature = "control")]
 impl<const OPENED: usize> Front<OPENED> {
+    /// Number of slots that [`count_due`](Self::count_due) looks at.
+    pub fn opened(&self) -> usize {
+        self.end
+    }
+
     /// Number of nodes due.
     pub fn count_due(&self, threshold: Deadline) -> usize {
         due(self.due.get(..self.end).unwrap_or_default(), threshold)

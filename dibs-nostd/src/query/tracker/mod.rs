@@ -158,6 +158,12 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         self.labels.contains(label)
     }
 
+    /// Number of the front's nodes.
+    #[cfg(feature = "control")]
+    pub(crate) fn opened(&self) -> u32 {
+        self.memory.front.opened() as u32
+    }
+
     /// Number of the front's nodes that a search within a distance (mm) of the axis would test, if the tool moved there.
     #[cfg(feature = "control")]
     pub(crate) fn due_within(&self, distance: f32) -> u32 {
