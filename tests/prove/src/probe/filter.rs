@@ -9,12 +9,17 @@ use probe::filter::{ADMITTED_WORDS, ANSWER_WORDS, HELD, command, words};
 /// A script of walks on one tree, and the host's answers to it.
 pub struct Script {
     words: Vec<u32>,
-    expected: Vec<[u32; ADMITTED_WORDS]>,
+    /// The instructions that a tick may take.
+    budget: u32,
+    /// Of each tick, with its budget.
+    expected: Vec<(u32, [u32; ADMITTED_WORDS])>,
 }
 
 /// One tick on the board.
 pub struct Tick {
     pub instructions: u32,
+    /// The instructions that it may take.
+    pub budget: u32,
     /// Whether its answer equals the host's, to the bit.
     pub is_same: bool,
 }
@@ -25,7 +30,7 @@ impl Script {
         let blob = built.blob();
         let mut words = vec![u32::from(is_large), blob.len() as u32];
         words.extend(super::padded(blob));
-        Self { words, expected: Vec::new() }
+        Self { words, budget: 0, expected: Vec::new() }
     }
 
     pub fn bytes(&self) -> Vec<u8> {
@@ -41,9 +46,10 @@ impl Script {
         );
         let pairs = answers.iter().zip(&self.expected);
         Ok(pairs
-            .map(|([took, admitted @ ..], expected)| Tick {
+            .map(|([took, admitted @ ..], (budget, expected))| Tick {
                 // The board's clock counts 1.6 for each instruction.
                 instructions: (u64::from(*took) * 5 / 8) as u32,
+                budget: *budget,
                 is_same: admitted == expected,
             })
             .collect())
@@ -64,6 +70,7 @@ impl Listener for Script {
         self.words.push(command::WALK);
         self.put(&[stand_off, robot, approach]);
         self.words.push(instructions);
+        self.budget = instructions;
         self.put(&[period]);
         self.words.push(u32::from(is_measured));
     }
@@ -80,6 +87,6 @@ impl Listener for Script {
         self.put(radii);
         self.put_points(&[motion.translation, motion.rotation]);
         self.put(tissue);
-        self.expected.push(words(admitted));
+        self.expected.push((self.budget, words(admitted)));
     }
 }
