@@ -5,11 +5,11 @@
 
 use anyhow::{Context, Result};
 use dibs_nostd::format::MAX_STACK;
-use dibs_nostd::{Budget, Contacts, Tracker};
+use dibs_nostd::{Budget, ContactIter, Contacts, Tracker};
 use probe::track::OPENED;
 use xtask::steps::Outcome;
 
-use super::bounded::rows::LISTED;
+use super::bounded::rows::{DEAREST, LISTED};
 use super::bounded::scene::{Scene, Truth, truth};
 use super::bounded::{MARGIN, Settling, largest};
 use crate::harness::figures::Figures;
@@ -38,8 +38,10 @@ pub const CHECK: Check = Check {
         complete(
             "listed.40k.complete",
             "The list is complete to 5 mm",
-            "% of these ticks; without a budget: {listed.whole} %",
+            "% of these ticks; without a budget: {listed.whole} %; of those with a complete list then: {listed.40k.kept} %",
         ),
+        note("listed.40k.kept"),
+        idle("listed.40k.idle"),
         note("listed.whole"),
         largest(
             "listed.40k.instructions",
@@ -58,8 +60,10 @@ pub const CHECK: Check = Check {
         complete(
             "listed.60k.complete",
             "The list is complete to 5 mm",
-            "% of these ticks; without a budget: {listed.whole} %",
+            "% of these ticks; without a budget: {listed.whole} %; of those with a complete list then: {listed.60k.kept} %",
         ),
+        note("listed.60k.kept"),
+        idle("listed.60k.idle"),
         largest(
             "listed.60k.instructions",
             "On the board the largest of these ticks takes",
@@ -73,8 +77,10 @@ pub const CHECK: Check = Check {
         complete(
             "listed.100k.complete",
             "The list is complete to 5 mm",
-            "% of these ticks; without a budget: {listed.whole} %",
+            "% of these ticks; without a budget: {listed.whole} %; of those with a complete list then: {listed.100k.kept} %",
         ),
+        note("listed.100k.kept"),
+        idle("listed.100k.idle"),
         largest(
             "listed.100k.instructions",
             "On the board the largest of these ticks takes",
@@ -106,6 +112,22 @@ const fn complete(id: &'static str, says: &'static str, unit: &'static str) -> P
     Promise { id, says, criterion: TIMING, bound: Bound::Informs, unit, limits }
 }
 
+/// The ticks whose list could have been longer.
+const fn idle(id: &'static str) -> Promise {
+    Promise {
+        id,
+        says: "No list is incomplete with budget left",
+        criterion: TIMING,
+        bound: Bound::Is(0.0),
+        unit: "of {listed.near} ticks within 5 mm",
+        limits: "Where the list is complete without a budget, and as much is left as the begin of a list and the dearest step take: \
+                 120 tests, and one for each two nodes that the list's front remembers.",
+    }
+}
+
+/// Node tests that a list takes before its first triangle, besides one for each two opened nodes of its front.
+const LIST: u32 = 80;
+
 /// Results of the ticks with one budget.
 #[derive(Default)]
 struct Tally {
@@ -114,6 +136,12 @@ struct Tally {
     near: u32,
     without: u32,
     complete: u32,
+    /// Of the ticks whose list is complete without a budget, those where it is complete, and those where it is not with budget
+    /// left.
+    kept: u32,
+    idle: u32,
+    /// Of each tick, whether its list is complete.
+    is_complete: Vec<bool>,
     /// Work of each tick, in node tests.
     work: Vec<u32>,
 }
@@ -121,13 +149,16 @@ struct Tally {
 impl Tally {
     /// The share of ticks near the wall whose list is complete, in per cent.
     fn share(&self) -> f64 {
-        let share = f64::from(self.complete) / f64::from(self.near.max(1)) * 100.0;
-        (share * 10.0).round() / 10.0
+        per_cent(self.complete, self.near)
     }
 }
 
-/// Runs a tracker with contacts over the path within a budget.
-fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
+fn per_cent(part: u32, of: u32) -> f64 {
+    (f64::from(part) / f64::from(of.max(1)) * 1_000.0).round() / 10.0
+}
+
+/// Runs a tracker with contacts over the path within a budget. `whole`: which lists are complete without one.
+fn run(scene: &Scene, truth: &[Truth], budget: Budget, whole: &[bool]) -> Tally {
     let tree = scene.tree();
     let mut tracker =
         Tracker::<_, MAX_STACK, OPENED, OPENED>::with_range(&tree).expect("enough for any tree");
@@ -140,14 +171,20 @@ fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
         let is_settled = settling.is_settled(tracked.moved);
         tally.wrong += u32::from(truth[tick].is_missed_by(&tracked.closest));
         tally.work.push(tracked.closest.work());
+        let list = contacts.within(MARGIN);
+        let is_complete = list.as_ref().is_ok_and(ContactIter::is_complete);
+        tally.is_complete.push(is_complete);
         if truth[tick].lower >= MARGIN || !is_settled {
             return;
         }
         tally.near += 1;
-        match contacts.within(MARGIN) {
-            Ok(list) => tally.complete += u32::from(list.is_complete()),
-            Err(_) => tally.without += 1,
-        }
+        tally.without += u32::from(list.is_err());
+        tally.complete += u32::from(is_complete);
+        let begin = LIST + tracker.opened_in_range().div_ceil(2);
+        let is_left = tracked.closest.work() + begin + DEAREST <= budget.tests();
+        let is_whole = whole.get(tick).is_some_and(|&is_whole| is_whole);
+        tally.kept += u32::from(is_whole && is_complete);
+        tally.idle += u32::from(is_whole && !is_complete && is_left);
     });
     tally
 }
@@ -156,13 +193,15 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let [row, ..] = LISTED;
     let scene = row.scene()?.context("a generated scene")?;
     let truth = truth(&scene);
-    let whole = run(&scene, &truth, Budget::UNLIMITED);
+    let whole = run(&scene, &truth, Budget::UNLIMITED, &[]);
     let mut wrong = whole.wrong;
     for row in LISTED {
-        let tally = run(&scene, &truth, row.budget()?);
+        let tally = run(&scene, &truth, row.budget()?, &whole.is_complete);
         wrong += tally.wrong;
         figures.note(&format!("{}.without", row.name), tally.without.into());
         figures.note(&format!("{}.complete", row.name), tally.share());
+        figures.note(&format!("{}.kept", row.name), per_cent(tally.kept, whole.complete));
+        figures.note(&format!("{}.idle", row.name), tally.idle.into());
         row.note_board(&scene, &tally.work, figures)?;
     }
     figures.note("listed.ticks", scene.ticks() as f64);

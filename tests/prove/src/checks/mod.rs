@@ -40,6 +40,7 @@ mod receive;
 mod rot;
 mod rounding;
 mod sanitizers;
+mod shaft;
 mod sides;
 mod signed;
 mod stack;
@@ -58,6 +59,7 @@ pub const CHECKS: &[Check] = &[
     anytime::CHECK,
     bounded::CHECK,
     dearer::CHECK,
+    shaft::CHECK,
     dearer::OF_HUMAN,
     listed::CHECK,
     sides::CHECK,

@@ -8,6 +8,9 @@ pub const TESTS: &[(&str, u32)] = &[
     ("bounded.100k", 867),
     ("dearer.fast", 487),
     ("dearer.large", 468),
-    ("dearer.through", 501),
+    ("shaft.20k", 125),
+    ("shaft.40k", 325),
+    ("shaft.60k", 525),
+    ("shaft.100k", 890),
     ("dearer.human", 463),
 ];
