@@ -46,8 +46,8 @@ pub struct Args {
     ticks: Option<PathBuf>,
     #[command(flatten)]
     motion_rate: MotionRate,
-    /// The page without data; by default dibs-viewer.html beside this program. If it is missing, a program in a
-    /// checkout makes it, for which Node.js is needed
+    /// The page without data; by default dibs-viewer.html beside this program. If it is missing, it is made
+    /// in the checkout where the program was compiled, for which Node.js is needed
     #[arg(long, value_name = "PAGE")]
     page: Option<PathBuf>,
     #[command(flatten)]

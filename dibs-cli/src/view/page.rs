@@ -1,6 +1,7 @@
 //! The page without data: found beside this program, or made once by the checkout that this program was built in.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use dibs_build::write_atomically;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -45,7 +46,7 @@ fn read(path: &Path) -> Result<String> {
     let page = std::fs::read_to_string(path)
         .with_context(|| format!("{name}: cannot be read; `{MAKER}` in the repository writes it, and --page names another"));
     // One sentence that ends with the system's reason.
-    let page = page.map_err(|error| anyhow::anyhow!("{error:#}"))?;
+    let page = page.map_err(|error| anyhow!("{error:#}"))?;
     ensure!(
         page.contains(MARK),
         "{name}: no page without data; give the {PAGE} that `{MAKER}` writes"
@@ -53,13 +54,14 @@ fn read(path: &Path) -> Result<String> {
     Ok(page)
 }
 
-/// Makes the page in the checkout that contains this program. It appears completely or not at all.
+/// Makes the page in the checkout whose target folder this program is in, or else in the one where it was compiled. The
+/// page appears completely or not at all.
 fn make(program: &Path, page: &Path) -> Result<()> {
     let name = page.display();
-    // Neither the current folder nor any folder above this program's may decide which program is run: only the
-    // checkout in which it was compiled.
+    // Neither the current folder nor any other folder above this program's may decide which program is run.
     let is_own = |folder: &&Path| is_checkout(folder) && program.starts_with(folder.join("target"));
     let compiled = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
+    // That folder may be another project's by now.
     let compiled = compiled.filter(|folder| is_checkout(folder));
     let Some(root) = program.ancestors().find(is_own).or(compiled) else {
         bail!(
@@ -72,24 +74,43 @@ fn make(program: &Path, page: &Path) -> Result<()> {
             "{name} is missing, and making it needs `{needed}`: install Node.js with npm, and Rust, or give a page with --page"
         );
     }
+    let checkout = root.display();
     eprintln!(
-        "making {name}, once: `{MAKER}` compiles the query for WebAssembly, and fetches the page's libraries by npm"
+        "making {name}, once: `{MAKER}` in {checkout} compiles the query for WebAssembly, and fetches the page's libraries by npm"
     );
     let mut maker = Command::new("cargo");
     maker.args(["xtask", "viewer"]).current_dir(root);
     // Standard output is reserved for this command's results.
     let status = maker.stdin(Stdio::null()).stdout(io::stderr()).status();
     let status = status.with_context(|| format!("`{MAKER}` did not start"))?;
+    if status.success() {
+        put(&target(root).join("viewer").join(PAGE), page)?;
+    }
     ensure!(
         status.success() && page.is_file(),
-        "`{MAKER}` in {} did not write {name}: see above, or give a page with --page",
-        root.display()
+        "`{MAKER}` in {checkout} did not write {name}: see above, or give a page with --page"
     );
     Ok(())
 }
 
+/// Copies the page that was made to its place. The command itself puts it beside the programs in the checkout's target
+/// folder only, and not beside an installed one.
+fn put(made: &Path, page: &Path) -> Result<()> {
+    if page.is_file() || !made.is_file() {
+        return Ok(());
+    }
+    let text = read(made)?;
+    write_atomically(page, |out| out.write_all(text.as_bytes()))
+        .map_err(|error| anyhow!("{error}, or give the made page with --page {}", made.display()))
+}
+
+/// Cargo's target folder in a checkout, as `cargo xtask` has it.
+fn target(root: &Path) -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |dir| root.join(dir))
+}
+
 fn is_checkout(folder: &Path) -> bool {
-    ["viewer/build.mjs", "xtask/Cargo.toml", "dibs-nostd/Cargo.toml"]
+    ["Cargo.toml", "viewer/build.mjs", "xtask/Cargo.toml", "dibs-nostd/Cargo.toml"]
         .iter()
         .all(|file| folder.join(file).is_file())
 }

@@ -12,15 +12,17 @@ use crate::program::succeeds;
 /// A copy of the program in a folder of its own, and stand-ins for the programs that it starts.
 struct Copy {
     folder: tempfile::TempDir,
+    /// The program's folder.
+    place: &'static str,
 }
 
 impl Copy {
-    fn new() -> Self {
+    fn new(place: &'static str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let copy = Self { folder };
-        fs::create_dir_all(copy.path("target/release")).unwrap();
+        let copy = Self { folder, place };
+        fs::create_dir_all(copy.path(place)).unwrap();
         fs::create_dir(copy.path("bin")).unwrap();
-        fs::copy(env!("CARGO_BIN_EXE_dibs"), copy.path("target/release/dibs")).unwrap();
+        fs::copy(env!("CARGO_BIN_EXE_dibs"), copy.path(place).join("dibs")).unwrap();
         succeeds(copy.folder.path(), "generate heart --triangles 320 -o heart.ply");
         succeeds(copy.folder.path(), "build heart.ply -o heart.dibs");
         copy
@@ -31,7 +33,8 @@ impl Copy {
     }
 
     fn checkout(&self) {
-        for file in ["viewer/build.mjs", "xtask/Cargo.toml", "dibs-nostd/Cargo.toml"] {
+        for file in ["Cargo.toml", "viewer/build.mjs", "xtask/Cargo.toml", "dibs-nostd/Cargo.toml"]
+        {
             let path = self.path(file);
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::write(path, "").unwrap();
@@ -46,9 +49,11 @@ impl Copy {
     }
 
     fn view(&self) -> Output {
-        let mut view = Command::new(self.path("target/release/dibs"));
+        let mut view = Command::new(self.path(self.place).join("dibs"));
         view.args(["view", "heart.dibs", "-o", "heart.html", "--json"]);
-        view.current_dir(self.folder.path()).env("PATH", self.path("bin")).output().unwrap()
+        // The target folder is this one's, also where the checkout is the real one.
+        view.env("PATH", self.path("bin")).env("CARGO_TARGET_DIR", self.path("target"));
+        view.current_dir(self.folder.path()).output().unwrap()
     }
 
     /// What it says where it fails, which leaves nothing.
@@ -61,7 +66,7 @@ impl Copy {
     }
 
     fn page(&self) -> PathBuf {
-        self.path("target/release/dibs-viewer.html")
+        self.path(self.place).join("dibs-viewer.html")
     }
 }
 
@@ -71,7 +76,7 @@ fn is_one_sentence(error: &str) -> bool {
 
 #[test]
 fn a_missing_page_is_made_once_or_its_remedy_is_named() {
-    let copy = Copy::new();
+    let copy = Copy::new("target/release");
     let error = copy.fails();
     assert!(is_one_sentence(&error) && error.contains("--page"), "{error}");
     copy.checkout();
@@ -101,4 +106,28 @@ fn a_missing_page_is_made_once_or_its_remedy_is_named() {
     let output = copy.view();
     assert!(output.status.success() && output.stderr.is_empty());
     assert!(Path::new(&copy.page()).is_file());
+}
+
+/// `cargo xtask viewer` writes the page into the target folder, where an installed program is not.
+#[test]
+fn an_installed_program_has_the_page_of_the_checkout_in_which_it_was_compiled() {
+    let copy = Copy::new("installed");
+    fs::create_dir_all(copy.path("target/viewer")).unwrap();
+    for program in ["node", "npm"] {
+        copy.program(program, "exit 0");
+    }
+    let writes = "[ \"$*\" = 'xtask viewer' ] && echo '<p>made<!--data-->' > \"$CARGO_TARGET_DIR/viewer/dibs-viewer.html\"; exit 0";
+    copy.program("cargo", writes);
+    let output = copy.view();
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{told}");
+    let checkout = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    assert!(told.contains(&format!("in {} ", checkout.display())), "it says where: {told}");
+    assert!(fs::read_to_string(copy.path("heart.html")).unwrap().starts_with("<p>made<script"));
+    // Beside the program is the page, and nothing else.
+    assert_eq!(fs::read_to_string(copy.page()).unwrap(), "<p>made<!--data-->\n");
+    let files = fs::read_dir(copy.path("installed")).unwrap();
+    let mut files: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
+    files.sort_unstable();
+    assert_eq!(files, ["dibs", "dibs-viewer.html"]);
 }
