@@ -26,9 +26,11 @@ const SLACK: f64 = 0.02;
 /// faster than 25 mm/s towards a push of 4.5 N catches up with it.
 const YIELDS: f64 = 1.0;
 
-/// Largest energy (mJ) that the wall may give to the hand, with an allowance of 1 microjoule for the rounding of sums over
-/// a run, and largest step of its force (N): the controller's limits.
-pub const GIVEN: f64 = ((ACCOUNT.most(PERIOD) * 1e3) as u32 + 1) as f64 / 1e3;
+/// Largest energy (mJ) that the wall may give to the hand, whatever the mesh: the controller's tank and what its force
+/// gives while it falls, with an allowance of 1 microjoule for the rounding of sums over a run. The checks hold the
+/// generated heart, where the force need not fall, to the tank alone.
+const GIVEN: f64 = ((ACCOUNT.most(PERIOD) * 1e3) as u32 + 1) as f64 / 1e3;
+/// Largest step of its force (N): the controller's limit.
 const STEP: f32 = 0.5;
 
 /// Names of the codes of [`controller::telemetry::reason_code`].

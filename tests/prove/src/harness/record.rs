@@ -181,7 +181,7 @@ pub fn compare(measured: &Measured) -> Result<()> {
         != markdown::render(&before)?
     {
         broken.push(
-            "docs/evidence/guarantees.md is not made from guarantees.json: run with --render"
+            "docs/evidence/guarantees.md is not made from guarantees.json: run `cargo xtask guarantees --render`"
                 .into(),
         );
     }

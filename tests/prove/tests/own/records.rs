@@ -129,7 +129,10 @@ fn a_check_is_recorded_once_all_of_its_figures_are_of_the_run() {
 fn the_committed_head_says_what_the_rows_say() {
     let records = committed().expect("records");
     let text = fs::read_to_string(json().with_extension("md")).expect("a document");
-    assert!(text == markdown::render(&records).expect("text"), "run with --render");
+    assert!(
+        text == markdown::render(&records).expect("text"),
+        "docs/evidence/guarantees.md is not made from guarantees.json: run `cargo xtask guarantees --render`"
+    );
     let says_whole = text.contains("All of it was measured at commit");
     let mut commits: Vec<&str> = records.iter().map(|r| r.run.commit.as_str()).collect();
     commits.sort_unstable();
