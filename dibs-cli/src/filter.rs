@@ -67,7 +67,7 @@ pub struct Args {
     /// Time constant of the approach to the stand-off, which avoids jumps; 0 for none
     #[arg(long, value_name = "MS", default_value_t = 0.0)]
     approach: f32,
-    /// Instructions of a Cortex-M7 that the searches of a tick may take
+    /// Instructions of a Cortex-M7 that a tick may take
     #[arg(long, value_name = "N", default_value_t = 200_000)]
     budget: u32,
     /// Print a JSON object a line, and one with the totals on standard error

@@ -1634,7 +1634,7 @@ typedef struct {
    */
   float approach;
   /**
-   * Most instructions of all searches of a tick, by `cost`.
+   * Most instructions of a tick, searches, rows and all, by `cost`.
    */
   uint32_t instructions;
   /**
@@ -1731,7 +1731,7 @@ typedef struct {
    */
   uint32_t queries;
   /**
-   * Instructions of the queries, by the filter's cost model.
+   * Instructions of the tick, by the filter's cost model.
    */
   uint32_t instructions;
 } dibs_admitted_motion;
@@ -2538,8 +2538,7 @@ dibs_filter dibs_filter_of(float stand_off, float speed);
  * its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
  * its tracker continues in the next tick.
  *
- * Cost: at most the filter's instructions for the searches, and for each motion that is tried usually 1,000, at most
- * 40,000.
+ * Cost: at most the filter's instructions.
  *
  * @param filter       The filter.
  * @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.

@@ -46,7 +46,7 @@ pub struct dibs_filter {
     /// A tool approaches its stand-off no faster than its distance from it divided by this time (s), at least 0; 0 for
     /// no such limit.
     pub approach: f32,
-    /// Most instructions of all searches of a tick, by `cost`.
+    /// Most instructions of a tick, searches, rows and all, by `cost`.
     pub instructions: u32,
     /// `DIBS_COST_M7_TICK`, which is `DIBS_COST_M7_NODES_TICK` for a tree with nodes; not a query's.
     pub cost: u32,
@@ -208,7 +208,7 @@ pub struct dibs_admitted_motion {
     pub reason: dibs_reason,
     /// Number of queries.
     pub queries: u32,
-    /// Instructions of the queries, by the filter's cost model.
+    /// Instructions of the tick, by the filter's cost model.
     pub instructions: u32,
 }
 
@@ -250,8 +250,7 @@ impl Command<'_> {
 /// its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
 /// its tracker continues in the next tick.
 ///
-/// Cost: at most the filter's instructions for the searches, and for each motion that is tried usually 1,000, at most
-/// 40,000.
+/// Cost: at most the filter's instructions.
 ///
 /// @param filter       The filter.
 /// @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.

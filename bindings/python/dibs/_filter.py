@@ -149,7 +149,7 @@ class AdmittedMotion(NamedTuple):
     queries: int
     """Number of queries."""
     instructions: int
-    """Instructions of these queries on a Cortex-M7, by the fitted cost model."""
+    """Instructions of the tick on a Cortex-M7, by the fitted cost model."""
 
 
 class Filter(Remade):
@@ -159,8 +159,8 @@ class Filter(Remade):
     `stand_off_of`, up to 7, say `{VESSEL: 3.0}`: each of these counts as one more tool for every tool. It is for a robot
     that moves its reference point with at most `speed` (mm/s). A rotation by one radian counts as a translation by the
     `lever` arm (mm), by default the distance from the reference point to the farthest end of a tool's axis. If `approach` (s) is not 0, a tool approaches its
-    stand-off no faster than its distance from it divided by `approach`. `instructions` limits the searches of a tick, in
-    instructions of a Cortex-M7 by the fitted cost model. A motion that is not verified within the limit is not admitted.
+    stand-off no faster than its distance from it divided by `approach`. `instructions` limits a tick, in instructions of a
+    Cortex-M7 by the fitted cost model. A motion that is not verified within the limit is not admitted.
     """
 
     def __init__(

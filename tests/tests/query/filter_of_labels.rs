@@ -52,7 +52,7 @@ fn no_walk_comes_nearer_than_a_label_s_stand_off() {
     tallies.into_iter().for_each(|one| all += one);
     println!("{all:?}");
     assert_eq!((all.violations, all.uncertain, all.too_fast), (0, 0, 0));
-    assert!(all.most_instructions <= 200_000);
+    assert_eq!(all.over_budget, 0);
     let admitted: u64 = all.reasons.iter().sum();
     assert!(all.near_label > all.ticks / 5 && admitted > all.ticks / 3);
 }
@@ -104,7 +104,8 @@ fn ask<const LABELS: usize>(
 fn a_larger_stand_off_elsewhere_takes_no_speed() {
     let wall = wall();
     let filter = Filter::new(1.0, 200.0).expect("in range");
-    let by_label = filter.stand_off_of([(VESSEL, 3.0)]).expect("in range");
+    // Enough for trackers that start anew at each tick.
+    let by_label = filter.stand_off_of([(VESSEL, 3.0)]).expect("in range").budget(400_000);
     let for_all = Filter::new(3.0, 200.0).expect("in range");
     let mut rng = Rng::with_seed(37);
     for _ in 0..200 {

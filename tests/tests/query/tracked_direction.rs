@@ -2,10 +2,11 @@
 
 // Requirement: T-03
 
-use dibs_build::{Builder, Mesh, generate};
+use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{
-    Capsule, MovingTable, Odometer, Options, Proximity, Query, Side, Tool, Tracker, glam::Vec3,
+    Capsule, Contacts, MovingTable, Odometer, Options, Proximity, Query, Side, Tool, Tracker,
+    Unavailable, glam::Vec3,
 };
 use dibs_tests::deform::unit;
 use dibs_tests::surfaces::Inexact;
@@ -168,10 +169,8 @@ fn no_direction_turns_to_and_fro_at_a_tie() {
     assert!(kept > most && beyond > most, "{kept} {beyond}");
 }
 
-/// Where the axis meets an edge whose two triangles face away from each other, there is no normal.
-#[test]
-fn an_axis_at_an_edge_without_a_normal_keeps_the_last_direction() {
-    // Two pyramids on one base, onto which they collapse.
+/// Two pyramids on one base, at rest and collapsed onto it.
+fn pyramids() -> (BuiltTree, [Vec<Vec3>; 2]) {
     let rim = [[-8.0, -8.0], [8.0, -8.0], [8.0, 8.0], [-8.0, 8.0]];
     let mut positions = rim.map(|[x, y]| Vec3::new(x, y, 0.0)).to_vec();
     positions.extend([Vec3::Z, Vec3::NEG_Z]);
@@ -179,13 +178,23 @@ fn an_axis_at_an_edge_without_a_normal_keeps_the_last_direction() {
     let triangles = edges.flat_map(|[a, b]| [[a, b, 4], [b, a, 5]]).collect();
     let mesh = Mesh { positions, triangles, ..Mesh::default() };
     let built = Builder::new().build(&mesh).expect("a valid mesh");
-    let tree = built.tree::<u16>().expect("16-bit indices");
     let thick = built.to_rows(&mesh.positions);
-    let flat: Vec<Vec3> = thick.iter().map(|at| at.with_z(0.0)).collect();
-    let tool = |x: f32| {
-        let [start, end] = [-5.0, 5.0].map(|z| Vec3::new(x, 1.0, z));
-        Capsule::new(start, end, 0.5).expect("finite")
-    };
+    let flat = thick.iter().map(|at| at.with_z(0.0)).collect();
+    (built, [thick, flat])
+}
+
+/// An axis of 10 mm along z.
+fn upright(x: f32, lowest: f32) -> Capsule {
+    let [start, end] = [lowest, lowest + 10.0].map(|z| Vec3::new(x, 1.0, z));
+    Capsule::new(start, end, 0.5).expect("finite")
+}
+
+/// Where the axis meets an edge whose two triangles face away from each other, there is no normal.
+#[test]
+fn an_axis_at_an_edge_without_a_normal_keeps_the_last_direction() {
+    let (built, [thick, flat]) = pyramids();
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let tool = |x: f32| upright(x, -5.0);
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let whole = query.closest(flat.as_slice(), &tool(8.0), &Options::cold()).expect("an answer");
     assert_eq!((whole.side, whole.direction), (Side::Crossing, Vec3::ZERO));
@@ -199,4 +208,25 @@ fn an_axis_at_an_edge_without_a_normal_keeps_the_last_direction() {
     assert_eq!(met.side, Side::Crossing);
     assert!(met.direction.dot(Vec3::X) > 0.999, "{met:?}");
     assert!(met.point_on_tool.distance(Vec3::new(7.5, 1.0, 0.0)) < 1e-3, "{met:?}");
+}
+
+/// A tool that began at such an edge never had a direction. Above the collapsed walls it may be inside, and no contact
+/// says how deep.
+#[test]
+fn contacts_have_no_side_where_no_tick_had_a_direction() {
+    let (built, [_, flat]) = pyramids();
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let surface = Odometer::new(&tree).start(flat.as_slice());
+    let mut tracker = Tracker::<u16, MAX_STACK, 64>::new(&tree).expect("deep enough");
+    let met = tracker.closest(&surface, &upright(8.0, -5.0), &Options::new()).expect("an answer");
+    assert_eq!((met.closest.side, met.closest.direction), (Side::Crossing, Vec3::ZERO));
+    let mut contacts = Contacts::<4>::new();
+    let above = upright(5.0, 1.0);
+    let found = tracker.contacts(&surface, &above, 5.0, &Options::new(), &mut contacts);
+    let found = found.expect("an answer");
+    assert!(found.is_kept, "{found:?}");
+    assert_eq!((found.closest.side, found.closest.direction), (Side::Either, Vec3::ZERO));
+    let wall = contacts.within(5.0).expect("a wall to act on").next().expect("the upper wall");
+    assert!((wall.separation - 0.5).abs() < 1e-3 && wall.normal.z > 0.999, "{wall:?}");
+    assert_eq!(contacts.within(0.25).err(), Some(Unavailable::NoSide));
 }

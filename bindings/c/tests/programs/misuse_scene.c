@@ -181,6 +181,14 @@ static void trackers(const float *positions, uint32_t vertices) {
     EXPECT_THAT(admitted.queries == 77);
     ADMIT(OK, both, NULL, tools, 2, 0.001f, NULL, 0);
     EXPECT_THAT(admitted.queries >= 2 && admitted.instructions <= 200000);
+    /* A stand-off beyond any room, and a tool that starts in the surface: said, and no pass. */
+    dibs_filter beyond = dibs_filter_of(1e6f, 200.0f);
+    EXPECT(OK, dibs_filter_admit(&beyond, both, NULL, tools, 2, &command, 0.001f, &still, NULL, 0, &admitted));
+    EXPECT_THAT(admitted.reason == DIBS_REASON_NO_SAFE_MOTION);
+    dibs_tool within[2] = {tools[0], tools[1]};
+    within[0].start = (dibs_vec3){positions[0], positions[1], positions[2]};
+    EXPECT(OK, dibs_filter_admit(&filter, both, NULL, within, 2, &command, 0.001f, &still, NULL, 0, &admitted));
+    EXPECT_THAT(admitted.reason == DIBS_REASON_NO_SAFE_MOTION && admitted.least_separation < 0.0f);
     /* No budget: what is not verified is not admitted. */
     filter.instructions = 0;
     ADMIT(OK, both, NULL, tools, 2, 0.001f, NULL, 0);

@@ -20,7 +20,7 @@ pub struct AdmittedMotion {
     pub reason: Reason,
     /// Number of queries made.
     pub queries: u32,
-    /// Instructions of the queries, by the filter's [`Cost`](crate::Cost).
+    /// Instructions of the tick, by the filter's [`Cost`](crate::Cost).
     pub instructions: u32,
 }
 

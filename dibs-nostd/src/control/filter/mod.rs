@@ -96,7 +96,7 @@ const EPSILON: f32 = 0.01;
 
 const LEAST_LEVER: f32 = 1.0;
 
-/// Instructions of a tick's queries by default.
+/// Instructions of a tick by default.
 const INSTRUCTIONS: u32 = 200_000;
 
 /// A filter of commands. See the [module](self). `LABELS` is the number of [stand-offs of labels](Self::stand_off_of).
@@ -195,10 +195,10 @@ impl<const LABELS: usize> Filter<LABELS> {
         Ok(Self { approach: checked("approach", time, time >= 0.0)?, ..self })
     }
 
-    /// The same with a budget: the instructions of all searches and solutions of a tick, 200,000 by default. If it runs out,
-    /// motions that are not verified are not admitted, and the next tick's searches continue where they stopped. It must
-    /// cover 500, and for each pair 600 and the [cost](Self::cost)'s base (some 10,000): a pair that is never searched has no
-    /// answer, and then no motion is admitted.
+    /// The same with a budget: the instructions of a tick, searches, rows and all, 200,000 by default. If it runs out, motions
+    /// that are not verified are not admitted, and the next tick's searches continue where they stopped. It must cover 800,
+    /// for each row 64, for each pair, and each label's part of one, 1,000, and for each pair the [cost](Self::cost)'s base
+    /// (some 10,000): a pair that is never searched has no answer, and then no motion is admitted.
     #[must_use]
     pub const fn budget(self, instructions: u32) -> Self {
         Self { instructions, ..self }

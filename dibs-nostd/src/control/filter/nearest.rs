@@ -229,6 +229,21 @@ mod tests {
         assert!(!from(-1e9, -3e8).is_inside);
     }
 
+    /// With less work than it takes, no point counts as inside, and none of the limit is exceeded.
+    #[test]
+    fn a_solution_ends_with_its_work() {
+        let row = |x: f32, y: f32, least| HalfSpace { factors: [x, y, 0.0, 0.0, 0.0, 0.0], least };
+        let rows = [row(1.0, 0.0, 1.0), row(0.0, 1.0, 2.0), row(0.6, 0.8, -9.0)].into_iter();
+        let wanted = [-3.0, -4.0, 5.0, 0.0, 0.0, 0.0];
+        let whole = nearest(&rows, &wanted);
+        assert!(whole.is_inside && whole.work > 20, "{whole:?}");
+        for most in 0..=whole.work {
+            let found = super::nearest(&rows, 3, &wanted, most);
+            assert!(found.work <= most, "{most}: {found:?}");
+            assert_eq!(found.is_inside, most == whole.work, "{most}: {found:?}");
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 4_000, failure_persistence: None, ..ProptestConfig::default() })]
 

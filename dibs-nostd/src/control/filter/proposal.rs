@@ -87,4 +87,14 @@ mod tests {
         assert_eq!((at(9)[0], at(9)[1]), (0.0, 1.0 / 16.0));
         assert_eq!(at(10), at(9));
     }
+
+    /// So that a search by halves comes to its end.
+    #[test]
+    fn a_middle_is_between_two_extents_that_are_not_neighbours() {
+        for (longer, shorter) in (0..=9).flat_map(|one| (0..=9).map(move |other| (one, other))) {
+            let middle = Extent(longer).middle(Extent(shorter));
+            assert_eq!(middle.is_some(), longer + 1 < shorter, "{longer} {shorter}");
+            assert!(middle.is_none_or(|Extent(middle)| longer < middle && middle < shorter));
+        }
+    }
 }

@@ -100,6 +100,11 @@ impl Rows {
         Ok(rows)
     }
 
+    /// Number of the caller's rows.
+    pub fn own(&self) -> u32 {
+        self.own.len() as u32
+    }
+
     /// Adds the wall of a pair whose point `on_axis` was `distance` from the surface, along `normal`, after the motion
     /// `at`. Without a free slot it replaces the wall farthest from `at`.
     pub fn add_wall(

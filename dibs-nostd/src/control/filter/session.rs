@@ -31,6 +31,9 @@ const ROUNDING: f32 = 16.0 / 16_777_216.0;
 /// interval, less the motion since.
 const LEAST_TESTS: u32 = 32;
 
+/// The same of a label's part, whose search takes 80 before the first.
+const LEAST_TESTS_OF_PART: u32 = 112;
+
 /// Node tests for each bound that runs out. With fewer, the budget ends more searches, and those admit nothing.
 const TESTS_OF_DUE: u64 = 10;
 
@@ -43,8 +46,9 @@ const PRODUCT: u32 = 32;
 const PATH: u32 = 300;
 const LOOK: u32 = 6;
 
-/// Instructions of the first motion's rows, which the searches at the start leave, and the paths of its pairs.
-const ROWS: u32 = 500;
+/// Instructions that the searches at the start leave for the rows of the first motion, besides those for each row: a few
+/// steps of the active set.
+const STEPS: u32 = 24 * PRODUCT;
 
 /// A motion, and its distances from the tissue.
 #[derive(Clone, Copy)]
@@ -121,15 +125,19 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<AdmittedMotion, FilterError> {
         let rest = RigidMotion { about: self.about, ..RigidMotion::translation(Vec3::ZERO) };
-        let first = ROWS + (2 * PATH).saturating_mul(pairs.len() as u32);
+        let first = self.first(pairs.len() * self.filter.layers().count());
         for part in self.filter.layers() {
             let mut to_come = pairs.len() as u32;
             for (number, pair) in pairs.iter_mut().enumerate() {
                 to_come -= 1;
-                let reserved = to_come.saturating_mul(self.cost.base).saturating_add(first);
+                // A part goes without a search.
+                let others = if part.is_none() { to_come } else { 0 };
+                let reserved = others.saturating_mul(self.cost.base).saturating_add(first);
                 self.start(pair, (number, part), reserved, &rest)?;
             }
         }
+        let paths = PATH.saturating_mul(self.states.len() as u32);
+        self.pay(paths);
         let stand_still = self.verify(pairs, &rest)?;
         let mut best = stand_still;
         let mut extent = Extent::WHOLE;
@@ -139,12 +147,12 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             } else if attempt >= WHOLE {
                 extent = extent.shorter();
             }
-            if !self.pay(PATH.saturating_mul(pairs.len() as u32)) {
+            if !self.pay(paths) {
                 break;
             }
             let proposal = self.propose();
             let is_covered = self.shorten(pairs, &proposal, &mut extent);
-            if !is_covered && self.worthwhile().is_none() {
+            if !is_covered && self.worthwhile(0, LEAST_TESTS).is_none() {
                 break;
             }
             let point = proposal.at(extent);
@@ -159,7 +167,10 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
                     Reason::Commanded
                 } else if point == [0.0; 6] {
                     Reason::Stopped
-                } else if extent >= Extent::SMALLEST || self.command == [0.0; 6] {
+                } else if extent >= Extent::SMALLEST
+                    || proposal.whole == proposal.least
+                    || self.command == [0.0; 6]
+                {
                     Reason::Retreating
                 } else if is_whole {
                     Reason::Nearest
@@ -215,7 +226,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let found = match (part, whole) {
             (Some(part), Some(whole)) if whole > 0.0 && whole < near => {
                 let near = Some((part.label, near));
-                self.worthwhile()
+                self.worthwhile(reserved, LEAST_TESTS_OF_PART)
                     .map(|left| self.search(pair, ends, false, near, left))
                     .transpose()?
             }
@@ -272,6 +283,14 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         found
     }
 
+    /// The instructions of the first motion besides its searches, for so many pairs and parts: its rows, and the paths at
+    /// rest, of the look and of the motion.
+    fn first(&self, pairs: usize) -> u32 {
+        let walls = pairs as u32;
+        let rows = (self.rows.own() + walls).saturating_mul(2 * PRODUCT);
+        STEPS.saturating_add(rows).saturating_add(walls.saturating_mul(3 * PATH))
+    }
+
     /// Pays for work besides searches. Returns whether the budget covers it.
     fn pay(&mut self, price: u32) -> bool {
         let paid = self.instructions.saturating_add(price);
@@ -287,7 +306,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let least = self.solve(&[0.0; 6]).point;
         let least = self.within_speed(&least);
         let nearest = self.solve(&self.command.clone());
-        if nearest.point == self.command {
+        if nearest.is_inside && nearest.point == self.command {
             return Proposal { least, whole: self.command, is_command: !self.is_cut };
         }
         let mut whole = least;
@@ -306,20 +325,27 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     /// Shortens a proposal until the budget left probably covers its searches: one that the budget ends admits nothing,
     /// and its way there and back makes the next tick's dearer. Returns whether it does.
     fn shorten<P: Pair>(&mut self, pairs: &[P], proposal: &Proposal, extent: &mut Extent) -> bool {
-        if self.covers(pairs, &proposal.at(*extent)) {
-            return true;
+        let before = self.instructions;
+        let needed = self.needed(pairs, &proposal.at(*extent));
+        let look = u64::from(self.instructions - before);
+        let last = if proposal.least == [0.0; 6] { Extent::SMALLEST } else { Extent::LAST };
+        if needed.is_some_and(|needed| self.covers(needed)) || *extent >= last {
+            return needed.is_some_and(|needed| self.covers(needed));
         }
-        // What a motion needs falls with its length.
-        let (mut longer, mut shorter, mut is_covered) = (*extent, Extent::LAST, false);
+        // A shorter motion mostly needs less. A look leaves what the longest covered one needs.
+        let (mut longer, mut shorter, mut kept) = (*extent, last, None);
         while let Some(middle) = longer.middle(shorter) {
-            if self.covers(pairs, &proposal.at(middle)) {
-                (shorter, is_covered) = (middle, true);
-            } else {
-                longer = middle;
+            if !self.covers(kept.unwrap_or(0) + look) {
+                break;
+            }
+            match self.needed(pairs, &proposal.at(middle)) {
+                Some(needed) if self.covers(needed) => (shorter, kept) = (middle, Some(needed)),
+                _ => longer = middle,
             }
         }
         *extent = shorter;
-        is_covered || self.covers(pairs, &proposal.at(shorter))
+        kept.or_else(|| self.needed(pairs, &proposal.at(shorter)))
+            .is_some_and(|needed| self.covers(needed))
     }
 
     /// The motion, limited to the robot's speed.
@@ -382,10 +408,11 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let mut nearest = on_path(last);
         // From there on the path is far enough, whatever is between its ends.
         let near = part.map(|part| (part.label, least + moved + 2.0 * (grow + arc)));
+        let least_tests = if part.is_some() { LEAST_TESTS_OF_PART } else { LEAST_TESTS };
         // At rest the start's search suffices.
         if !is_enough(nearest)
             && moved > 0.0
-            && let Some(left) = self.worthwhile()
+            && let Some(left) = self.worthwhile(0, least_tests)
         {
             let searched = self.search(pair, ends, start.distance > 0.0, near, left)?;
             last = larger(last, searched.distance);
@@ -414,32 +441,30 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         Ok(())
     }
 
-    /// Whether the budget left probably covers the searches at a motion's end.
-    fn covers<P: Pair>(&mut self, pairs: &[P], point: &Vector) -> bool {
+    /// Instructions that the searches at a motion's end probably take; `None` if the budget does not cover the look.
+    fn needed<P: Pair>(&mut self, pairs: &[P], point: &Vector) -> Option<u64> {
         let motion = RigidMotion::from_vector(self.about, point, self.lever);
         let mut needed = 0_u64;
         for (number, pair) in pairs.iter().enumerate() {
             let Some(&state) = self.states.get(number) else { break };
-            if !self.pay(PATH) {
-                return false;
-            }
+            self.pay(PATH).then_some(())?;
             let (ends, moved, arc) = self.path(&state.start, &motion);
             let last = state.distance_at(&ends);
             let nearest = path::least(state.start.distance, last, moved, self.grow) - arc;
             if nearest >= state.least - EPSILON {
                 continue;
             }
-            if !self.pay(pair.opened().saturating_mul(LOOK)) {
-                return false;
-            }
+            self.pay(pair.opened().saturating_mul(LOOK)).then_some(())?;
             // Each bound falls by the motion, and the distance may grow by it.
             let due = pair.due_within(state.axis_distance + 2.0 * moved);
             let tests = TESTS_OF_DUE * u64::from(due);
             needed += u64::from(self.cost.base) + tests * u64::from(self.cost.node_test);
         }
-        // Where no search is needed, none has to be paid.
-        let spent = u64::from(self.instructions);
-        needed == 0 || needed + spent <= u64::from(self.filter.instructions)
+        Some(needed)
+    }
+
+    fn covers(&self, instructions: u64) -> bool {
+        u64::from(self.instructions) + instructions <= u64::from(self.filter.instructions)
     }
 
     /// An axis' ends after a motion, an upper bound (mm) on the motion of its points, and the height of their arcs.
@@ -464,8 +489,8 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     }
 
     /// The same, if a query is worth its base cost.
-    fn worthwhile(&self) -> Option<Budget> {
-        self.left(0).filter(|left| left.tests() >= LEAST_TESTS)
+    fn worthwhile(&self, reserved: u32, least_tests: u32) -> Option<Budget> {
+        self.left(reserved).filter(|left| left.tests() >= least_tests)
     }
 
     /// The closest pair with the axis at these ends, or that of a label's triangles within a distance, within a budget. A

@@ -87,3 +87,23 @@ impl<const N: usize> List<N> {
         let _ = self.list.push(last);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// In whatever order they come.
+    #[test]
+    fn a_full_list_keeps_the_deepest_and_is_bounded_by_the_next() {
+        for order in [[1.0, 2.0, 3.0, 4.0], [4.0, 3.0, 2.0, 1.0], [3.0, 1.0, 4.0, 2.0]] {
+            let mut kept = List::<2>::new();
+            kept.begin(9.0);
+            for separation in order {
+                kept.insert(Contact { separation, ..Contact::NONE });
+            }
+            let separations = kept.list.iter().map(|contact| contact.separation);
+            assert!(separations.eq([1.0, 2.0]), "{order:?}: {:?}", kept.list);
+            assert_eq!((kept.bound, kept.is_full), (3.0, true), "{order:?}");
+        }
+    }
+}

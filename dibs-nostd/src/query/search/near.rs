@@ -71,7 +71,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// The closest of a label's triangles within `limit`.
     #[cfg(feature = "control")]
     #[cold]
-    pub fn closest_of_label(self, label: u8, limit: f32) -> Result<LabelDistance, QueryError> {
+    pub fn closest_of_label(
+        mut self,
+        (label, limit): (u8, f32),
+        options: &Options,
+    ) -> Result<LabelDistance, QueryError> {
         let (accuracy, tilt) = (self.accuracy(), self.tilt_slack);
         let limit = limit + 2.0 * accuracy;
         let (mut nearest, mut closest) = (limit, None);
@@ -82,8 +86,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             }
             nearest
         };
-        let (beyond, tests) =
-            self.each_low(limit, (0.0, &Options::new().contacts_of(label)), visit)?;
+        // Its other work is in its tests' price: unlike a list's search, it leaves most triangles out by their label.
+        let (beyond, tests) = match self.pay(options.is_priced, LIST) {
+            Some(()) => self.each_low(limit, (0.0, &Options::new().contacts_of(label)), visit)?,
+            None => (0.0, self.meter.made()),
+        };
         // A triangle that stands for its lowest corner may be lower by the rounding of its tilt.
         let square = beyond * beyond - tilt;
         // A bound below zero is none, and neither is one that is not a number.
@@ -166,4 +173,40 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 /// Lower bound on the distances of the triangles that represent a vertex: they reach at most half a ridge below it.
 pub(super) fn least_standing(heights: &Heights, ridge: f32) -> f32 {
     sqrt(heights.least_standing()) - 0.5 * ridge
+}
+
+#[cfg(test)]
+mod tests {
+    use dibs_build::{Builder, generate};
+
+    use super::*;
+    use crate::format::MAX_STACK;
+    use crate::tree::RootSet;
+    use crate::{Sphere, Tree};
+
+    /// No leaf is within the range, so that only children are tested.
+    #[test]
+    fn within_a_budget_a_child_costs_more_than_its_test() {
+        let mesh = generate::heart(5_000).expect("a valid size").mesh;
+        let built = Builder::new().stretch(1.1).build(&mesh).expect("builds");
+        let tree = Tree::<u16>::from_bytes(built.blob()).expect("valid");
+        let rows = built.to_rows(&mesh.positions);
+        let (pin, ..) = tree.node(0).expect("a root");
+        let centre = rows[pin as usize].normalize() * 1_000.0;
+        let nearest = rows.iter().map(|row| row.distance(centre)).fold(f32::INFINITY, f32::min);
+        let limit = nearest - 40.0;
+        let tool = Sphere::new(centre, 1.0).expect("finite");
+        let mut stack = [WaitingNode { lower: 0.0, link: 0 }; MAX_STACK];
+        let mut made = |options: &Options| {
+            let (all, rows) = (RootSet::ALL, rows.as_slice());
+            let search = Search::start(all, &tree, &mut stack, rows, &tool, options, None, None);
+            let found = search.expect("valid").each_low(limit, (0.1, options), |_, _| limit);
+            found.expect("an answer").1
+        };
+        let tests = made(&Options::cold());
+        assert!(tests.node_tests > 0 && tests.triangle_tests == 0, "{tests:?}");
+        let paid = made(&Options::cold().budget(Budget::new(1_000_000)));
+        let node_tests = LIST + (1 + CHILD) * tests.node_tests;
+        assert_eq!(paid, Tests { node_tests, ..tests });
+    }
 }

@@ -20,13 +20,13 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         &mut self,
         surface: &S,
         tool: &T,
-        (label, limit): (u8, f32),
+        within: (u8, f32),
         options: &Options,
     ) -> Result<LabelDistance, QueryError> {
         let (tree, stack) = (&self.tree, &mut self.stack);
         let all = RootSet::ALL;
         let search = Search::start(all, tree, stack, surface, tool, options, None, None)?;
-        let mut found = search.over_range(options).closest_of_label(label, limit)?;
+        let mut found = search.over_range(options).closest_of_label(within, options)?;
         found.distance = sum_down(found.distance, -surface.position_error());
         Ok(found)
     }
