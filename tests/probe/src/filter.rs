@@ -18,7 +18,8 @@ pub mod command {
     /// End of the script.
     pub const END: u32 = 0;
     /// A walk, whose trackers start anew: stand-off (mm), the robot's speed (mm/s), the approach's time constant (s),
-    /// instructions of a tick, period (s), and 1 for queries with the measured stretch.
+    /// instructions of a tick, period (s), 1 for queries with the measured stretch, and a label with its stand-off (mm),
+    /// or [`UNLABELLED`](super::UNLABELLED).
     pub const WALK: u32 = 1;
     /// The next frame: three `f32` for each of the tree's vertices.
     pub const FRAME: u32 = 2;
@@ -30,6 +31,9 @@ pub mod command {
 
 /// The share of a surface that is the last frame.
 pub const HELD: u32 = u32::MAX;
+
+/// Instead of a label: no label has a stand-off of its own.
+pub const UNLABELLED: u32 = u32::MAX;
 
 /// Words of an answer: the clock's counts, then [`words`] of what was admitted.
 pub const ANSWER_WORDS: usize = 1 + ADMITTED_WORDS;
@@ -97,16 +101,17 @@ pub fn run(
 }
 
 /// A walk's numbers.
-struct Walk {
-    filter: Filter,
+struct Walk<const LABELS: usize> {
+    filter: Filter<LABELS>,
     period: f32,
+    is_measured: bool,
 }
 
 /// Follows a walk. Returns the first other command.
 fn walk<const OPENED: usize>(
     tree: &Tree<'static, u16>,
-    [before, after]: &mut [&mut [Vec3]; 2],
-    Trackers(trackers): &mut Trackers<OPENED>,
+    frames: &mut [&mut [Vec3]; 2],
+    trackers: &mut Trackers<OPENED>,
     machine: &mut impl Machine,
 ) -> Result<u32, Fault> {
     let [stand_off, robot, approach] = [number(machine)?, number(machine)?, number(machine)?];
@@ -114,8 +119,27 @@ fn walk<const OPENED: usize>(
     let filter = Filter::new(stand_off, robot).map_err(|_| Fault)?;
     let filter = filter.approach(approach).map_err(|_| Fault)?;
     let filter = filter.budget(instructions);
-    let walk = Walk { filter, period: number(machine)? };
-    let is_measured = word(machine)? == 1;
+    let (period, is_measured) = (number(machine)?, word(machine)? == 1);
+    match word(machine)? {
+        UNLABELLED => {
+            follow(tree, frames, trackers, &Walk { filter, period, is_measured }, machine)
+        }
+        label => {
+            let label = label.try_into().map_err(|_| Fault)?;
+            let filter = filter.stand_off_of([(label, number(machine)?)]).map_err(|_| Fault)?;
+            follow(tree, frames, trackers, &Walk { filter, period, is_measured }, machine)
+        }
+    }
+}
+
+/// Follows the frames and ticks of a walk.
+fn follow<const OPENED: usize, const LABELS: usize>(
+    tree: &Tree<'static, u16>,
+    [before, after]: &mut [&mut [Vec3]; 2],
+    Trackers(trackers): &mut Trackers<OPENED>,
+    walk: &Walk<LABELS>,
+    machine: &mut impl Machine,
+) -> Result<u32, Fault> {
     for tracker in &mut *trackers {
         place(tree, tracker)?;
     }
@@ -128,8 +152,8 @@ fn walk<const OPENED: usize>(
         for row in after.iter_mut() {
             *row = point(machine)?;
         }
-        let mut walk = Walk { ..walk };
-        if is_measured {
+        let mut walk = Walk { ..*walk };
+        if walk.is_measured {
             let measured = measure_stretch(tree, &**after).map_err(|_| Fault)?;
             let both = stretch.unwrap_or(measured).or_larger(measured).ok_or(Fault)?;
             walk.filter = walk.filter.options(Options::new().stretch(both));
@@ -161,7 +185,7 @@ fn walk<const OPENED: usize>(
     Ok(next)
 }
 
-impl Walk {
+impl<const LABELS: usize> Walk<LABELS> {
     fn tick<const OPENED: usize>(
         &self,
         surface: &impl MovingSurface,

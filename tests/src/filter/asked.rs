@@ -5,14 +5,16 @@ use glam::Vec3;
 
 /// The settings of a walk.
 #[derive(Clone, Copy, Debug)]
-pub struct Settings {
+pub struct Settings<'a> {
     /// Stand-off (mm).
     pub stand_off: f32,
+    /// Labels with a stand-off (mm) of their own.
+    pub labels: &'a [(u8, f32)],
     /// The robot's largest speed (mm/s).
     pub robot: f32,
     /// Time constant of the approach (s).
     pub approach: f32,
-    /// Instruction budget of a tick's queries.
+    /// Instruction budget of a tick.
     pub instructions: u32,
     /// Period (s).
     pub period: f32,
@@ -40,7 +42,7 @@ pub struct Asked {
 /// Receives the inputs of a walk.
 pub trait Listener {
     /// A walk starts.
-    fn walk(&mut self, settings: &Settings);
+    fn walk(&mut self, settings: &Settings<'_>);
     /// A new frame, in the tree's order.
     fn frame(&mut self, rows: &[Vec3]);
     /// A tick.
@@ -49,7 +51,7 @@ pub trait Listener {
 
 /// Ignores all inputs.
 impl Listener for () {
-    fn walk(&mut self, _: &Settings) {}
+    fn walk(&mut self, _: &Settings<'_>) {}
     fn frame(&mut self, _: &[Vec3]) {}
     fn tick(&mut self, _: &Asked) {}
 }

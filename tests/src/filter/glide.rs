@@ -79,6 +79,7 @@ pub fn glide_told(
     let filter = filter.budget(INSTRUCTIONS);
     listener.walk(&Settings {
         stand_off: STAND_OFF,
+        labels: &[],
         robot: ROBOT,
         approach: 0.0,
         instructions: INSTRUCTIONS,

@@ -166,14 +166,6 @@ pub fn walk_by_label<const LABELS: usize>(
     seed: u64,
     listener: &mut impl Listener,
 ) -> Tally {
-    listener.walk(&Settings {
-        stand_off: episode.stand_off,
-        robot: episode.robot,
-        approach: episode.approach,
-        instructions: episode.instructions,
-        period: episode.period as f32,
-        is_measured: false,
-    });
     let mut rng = Rng::with_seed(seed);
     let tree = scene.tree.tree::<u16>().expect("16-bit indices");
     let filter = Filter::new(episode.stand_off, episode.robot).expect("in range");
@@ -183,6 +175,15 @@ pub fn walk_by_label<const LABELS: usize>(
     let labels =
         labels.map(|(label, more)| (label, if tree.has_label(label) { more } else { 0.0 }));
     let stand_offs = labels.map(|(label, more)| (label, episode.stand_off + more));
+    listener.walk(&Settings {
+        stand_off: episode.stand_off,
+        labels: &stand_offs,
+        robot: episode.robot,
+        approach: episode.approach,
+        instructions: episode.instructions,
+        period: episode.period as f32,
+        is_measured: false,
+    });
     let filter = filter.stand_off_of(stand_offs).expect("in range");
     let labels = labels.map(|(label, more)| (label, f64::from(more)));
     let most_more = labels.iter().fold(0.0, |most: f64, &(_, more)| most.max(more));

@@ -4,7 +4,9 @@
 
 use anyhow::Result;
 use dibs_build::{Builder, generate};
-use dibs_tests::filter::{Episode, Tally, glide_told, scenes, walk_told};
+use dibs_tests::filter::{
+    Episode, Scene, Tally, glide_told, labelled_scenes, scenes, walk_by_label, walk_told,
+};
 use fastrand::Rng;
 use rayon::prelude::*;
 use xtask::steps::Outcome;
@@ -71,7 +73,8 @@ pub const CHECK: Check = Check {
             bound: Bound::Is(0.0),
             unit: "of {filter.board.ticks} ticks, with budgets of 30,000, 60,000 and 200,000 instructions; at most {filter.board.share} % \
                    of one",
-            limits: "The same walks and glides, their first ticks included.",
+            limits: "The same walks and glides, their first ticks included; a sixth of the walks with a label whose stand-off is 2 mm larger. Without \
+                     rows of the caller.",
         },
         note("filter.board.share"),
     ],
@@ -79,6 +82,9 @@ pub const CHECK: Check = Check {
 
 /// Number of ticks in which the trackers of a glide start.
 const START: usize = 100;
+
+/// A label with a stand-off of its own.
+const VESSEL: u8 = 2;
 
 /// Triangles and stretch of the heart.
 const HEART: (u32, f32) = (10_272, 1.5);
@@ -138,20 +144,31 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     Ok(Outcome::Passed)
 }
 
-/// The same number of walks on each scene.
+/// The same number of walks on each scene; and of these scenes with a label, a fifth as many.
 fn walks(effort: &Effort) -> Vec<Walked> {
-    let scenes = scenes();
-    let each = effort.board_walks.div_ceil(scenes.len() as u64);
-    let walked = scenes.par_iter().enumerate().map(|(number, scene)| {
-        let mut walked =
-            Walked { script: Script::new(&scene.tree, false), tally: Tally::default() };
-        for walk in 0..each {
-            // Seeds that the check on the host does not use.
-            let seed = 1_000_000 + walk * scenes.len() as u64 + number as u64;
-            let episode = Episode::any(&mut Rng::with_seed(seed));
-            walked.tally += walk_told(scene, &episode, seed, &mut walked.script);
-        }
-        walked
-    });
-    walked.collect()
+    let plain = scenes();
+    let labelled = labelled_scenes(|from_middle| if from_middle.x > 2.0 { VESSEL } else { 0 });
+    let each = effort.board_walks.div_ceil(plain.len() as u64);
+    let on = |scenes: &[Scene], each: u64, is_labelled: bool| {
+        let walked = scenes.par_iter().enumerate().map(|(number, scene)| {
+            let mut walked =
+                Walked { script: Script::new(&scene.tree, false), tally: Tally::default() };
+            for walk in 0..each {
+                // Seeds that the check on the host does not use.
+                let seed = 1_000_000 + walk * scenes.len() as u64 + number as u64;
+                let episode = Episode::any(&mut Rng::with_seed(seed));
+                let told = &mut walked.script;
+                walked.tally += if is_labelled {
+                    walk_by_label(scene, &episode, [(VESSEL, 2.0)], seed, told)
+                } else {
+                    walk_told(scene, &episode, seed, told)
+                };
+            }
+            walked
+        });
+        walked.collect::<Vec<_>>()
+    };
+    let mut walked = on(&plain, each, false);
+    walked.extend(on(&labelled, each.div_ceil(5), true));
+    walked
 }

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use dibs_build::BuiltTree;
 use dibs_tests::filter::{Asked, Listener, Settings};
 use glam::Vec3;
-use probe::filter::{ADMITTED_WORDS, ANSWER_WORDS, HELD, command, words};
+use probe::filter::{ADMITTED_WORDS, ANSWER_WORDS, HELD, UNLABELLED, command, words};
 
 /// A script of walks on one tree, and the host's answers to it.
 pub struct Script {
@@ -65,14 +65,23 @@ impl Script {
 }
 
 impl Listener for Script {
-    fn walk(&mut self, settings: &Settings) {
-        let &Settings { stand_off, robot, approach, instructions, period, is_measured } = settings;
+    fn walk(&mut self, settings: &Settings<'_>) {
+        let &Settings { stand_off, labels, robot, approach, instructions, period, is_measured } =
+            settings;
         self.words.push(command::WALK);
         self.put(&[stand_off, robot, approach]);
         self.words.push(instructions);
         self.budget = instructions;
         self.put(&[period]);
         self.words.push(u32::from(is_measured));
+        assert!(labels.len() <= 1, "the probe has no more than one label");
+        match labels.first() {
+            Some(&(label, of_label)) => {
+                self.words.push(label.into());
+                self.put(&[of_label]);
+            }
+            None => self.words.push(UNLABELLED),
+        }
     }
 
     fn frame(&mut self, rows: &[Vec3]) {
