@@ -110,8 +110,9 @@ pub const CHECKS: &[Check] = &[
 
 /// Checks that `cargo xtask test` runs only with `--whole`: each builds one more program, or takes half a minute in
 /// addition to checks of the same parts, or runs the tests again under a sanitizer.
-pub const ON_REQUEST: [&str; 14] = [
+pub const ON_REQUEST: [&str; 15] = [
     dearer::CHECK.name,
+    shaft::CHECK.name,
     dearer::OF_HUMAN.name,
     listed::CHECK.name,
     tick_cost::CHECK.name,

@@ -28,7 +28,7 @@ macro_rules! promises {
             note("shaft.near"),
             $(
                 Promise {
-                    limits: concat!("The goals were ", $goals, ": not reached. The axis crosses the surface or is inside at every tick near it, so that each also needs a depth."),
+                    limits: concat!("The goals were ", $goals, ": not reached. The axis crosses the surface or is inside at every tick near it, so that each also needs a depth. Tried: as for the ticks within a budget."),
                     ..width(
                         concat!("shaft.", $row, ".95"),
                         concat!("A shaft of 120 mm through a whole heart, then one of 6 mm wholly inside its wall, within ", $instructions, " instructions: the interval's width at 95 % of the ticks near the wall"),
