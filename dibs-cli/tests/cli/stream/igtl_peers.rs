@@ -77,7 +77,7 @@ pub fn pyigtl() -> Peer {
         server
     };
     ["POLYDATA", "POINT"].iter().for_each(|kind| arrive(&mut server(), kind));
-    answered(&mut server());
+    answered(&mut server(), "TRANSFORM", "100,-20,30,100,20.5,80,2.5");
     let version = "import importlib.metadata as found; print(found.version('pyigtl'))";
     let version = said(Command::new(&python).args(["-c", version]));
     Peer { name: "pyigtl", version, kinds: &["POLYDATA", "POINT", "TRANSFORM"] }
@@ -90,8 +90,14 @@ pub fn cpp_library() -> Peer {
     compiler.args(["-std=c++17", "-I/usr/include/openigtlink", "-o"]);
     compiler.args([&server, &own("igtl_server.cpp")]);
     assert!(compiler.arg("-lOpenIGTLink").status().unwrap().success());
-    let kinds = &["POLYDATA", "POINT", "NDARRAY"];
-    kinds.iter().for_each(|kind| arrive(&mut Command::new(&server), kind));
+    ["POLYDATA", "POINT", "NDARRAY"]
+        .iter()
+        .for_each(|kind| arrive(&mut Command::new(&server), kind));
+    let turned = "100,-20,30,59.5,-20,80,2.5";
+    ["TRANSFORM", "TDATA", "QTDATA"]
+        .iter()
+        .for_each(|kind| answered(&mut Command::new(&server), kind, turned));
+    let kinds = &["POLYDATA", "POINT", "NDARRAY", "TRANSFORM", "TDATA", "QTDATA"];
     let version =
         said(Command::new("dpkg-query").args(["-W", "-f", "${Version}", "libopenigtlink-dev"]));
     Peer { name: "Debian's libopenigtlink", version, kinds }
@@ -138,15 +144,15 @@ fn arrive(server: &mut Command, kind: &str) {
     assert_eq!(seen.error, 0.0, "{kind}");
 }
 
-/// Each pose of a tool, a quarter turn about z and a shift, is answered as `dibs query` does about a frame, and the server
-/// reads that.
-fn answered(server: &mut Command) {
+/// Each pose of a tool, a turn about z and a shift, is answered as `dibs query` does about a frame with the tool `turned`, and
+/// the server reads that.
+fn answered(server: &mut Command, kind: &str, turned: &str) {
     let folder = heart();
     let folder = folder.path();
-    let asked = |frame| queried(folder, "100,-20,30,100,20.5,80,2.5", frame);
+    let asked = |frame| queried(folder, turned, frame);
     let asked: Vec<Value> = (0..FRAMES).map(asked).collect();
     let line = "--tool 0,0,0,40.5,0,50,2.5 --tool-device pointer --tool-age 60000";
-    let (seen, output, said) = served(folder, line, server, "TRANSFORM");
+    let (seen, output, said) = served(folder, line, server, kind);
     assert_eq!((seen.published, seen.error), (FRAMES as u32, 0.0));
     let lines = String::from_utf8(output.stdout).unwrap();
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();

@@ -1,5 +1,6 @@
 // A server by the C++ library OpenIGTLink: PORT FRAMES TRIANGLES KIND. Standard input has the triangles as big-endian u32,
-// and the frames as big-endian f32.
+// and the frames as big-endian f32. For TRANSFORM, TDATA and QTDATA a tool's pose comes before each, and the answers are
+// printed.
 
 #include <array>
 #include <chrono>
@@ -14,7 +15,11 @@
 #include <igtlNDArrayMessage.h>
 #include <igtlPointMessage.h>
 #include <igtlPolyDataMessage.h>
+#include <igtlQuaternionTrackingDataMessage.h>
 #include <igtlServerSocket.h>
+#include <igtlStringMessage.h>
+#include <igtlTrackingDataMessage.h>
+#include <igtlTransformMessage.h>
 
 using Point = std::array<float, 3>;
 using Face = std::array<igtlUint32, 3>;
@@ -63,6 +68,74 @@ static igtl::MessageBase::Pointer nd_array(const std::vector<Point> &points) {
     return message.GetPointer();
 }
 
+// The tool's pose: half a turn about z, and a shift. None for another kind.
+static igtl::MessageBase::Pointer pose(const std::string &kind) {
+    igtl::Matrix4x4 matrix = {{-1, 0, 0, 100}, {0, -1, 0, -20}, {0, 0, 1, 30}, {0, 0, 0, 1}};
+    if (kind == "TRANSFORM") {
+        auto message = igtl::TransformMessage::New();
+        message->SetDeviceName("pointer");
+        message->SetMatrix(matrix);
+        return message.GetPointer();
+    }
+    if (kind == "TDATA") {
+        auto message = igtl::TrackingDataMessage::New();
+        auto element = igtl::TrackingDataElement::New();
+        element->SetName("pointer");
+        element->SetType(igtl::TrackingDataElement::TYPE_TRACKER);
+        element->SetMatrix(matrix);
+        message->SetDeviceName("tracker");
+        message->AddTrackingDataElement(element);
+        return message.GetPointer();
+    }
+    if (kind == "QTDATA") {
+        auto message = igtl::QuaternionTrackingDataMessage::New();
+        auto element = igtl::QuaternionTrackingDataElement::New();
+        element->SetName("pointer");
+        element->SetType(igtl::QuaternionTrackingDataElement::TYPE_TRACKER);
+        element->SetPosition(100, -20, 30);
+        element->SetQuaternion(0, 0, 1, 0);
+        message->SetDeviceName("tracker");
+        message->AddQuaternionTrackingDataElement(element);
+        return message.GetPointer();
+    }
+    return nullptr;
+}
+
+static bool receive(igtl::Socket *peer, void *to, int size) {
+    return size == 0 || peer->Receive(to, size) == size;
+}
+
+// The next STRING; null where the peer is gone.
+static igtl::StringMessage::Pointer answer(igtl::Socket *peer) {
+    for (;;) {
+        auto header = igtl::MessageHeader::New();
+        header->InitPack();
+        if (!receive(peer, header->GetPackPointer(), header->GetPackSize())) {
+            return nullptr;
+        }
+        header->Unpack();
+        if (std::strcmp(header->GetDeviceType(), "STRING") != 0) {
+            peer->Skip(header->GetBodySizeToRead());
+            continue;
+        }
+        auto message = igtl::StringMessage::New();
+        message->SetMessageHeader(header);
+        message->AllocatePack();
+        if (!receive(peer, message->GetPackBodyPointer(), message->GetPackBodySize())) {
+            return nullptr;
+        }
+        return (message->Unpack(1) & igtl::MessageHeader::UNPACK_BODY) != 0 ? message : nullptr;
+    }
+}
+
+static bool send(igtl::Socket *peer, igtl::MessageBase *message) {
+    auto now = igtl::TimeStamp::New();
+    now->GetTime();
+    message->SetTimeStamp(now);
+    message->Pack();
+    return peer->Send(message->GetPackPointer(), message->GetPackSize()) != 0;
+}
+
 int main(int, char **arguments) {
     const int port = std::atoi(arguments[1]), frames = std::atoi(arguments[2]);
     const std::size_t triangles = std::atoi(arguments[3]);
@@ -83,15 +156,23 @@ int main(int, char **arguments) {
     for (int frame = 0; frame < frames; ++frame) {
         std::vector<Point> points(vertices);
         std::memcpy(points.data(), &data[3 * (triangles + frame * vertices)], sizeof(Point) * vertices);
-        igtl::MessageBase::Pointer message = kind == "POLYDATA" ? poly_data(points, faces)
-                                           : kind == "POINT"    ? point_list(points)
-                                                                : nd_array(points);
+        igtl::MessageBase::Pointer tool = pose(kind);
+        if (tool.IsNotNull()) {
+            if (!send(peer, tool)) {
+                return 4;
+            }
+            auto said = answer(peer);
+            if (said.IsNull()) {
+                return 5;
+            }
+            std::printf("%s\n", said->GetString());
+            std::fflush(stdout);
+        }
+        igtl::MessageBase::Pointer message = kind == "POINT"     ? point_list(points)
+                                           : kind == "NDARRAY" ? nd_array(points)
+                                                               : poly_data(points, faces);
         message->SetDeviceName("heart");
-        auto now = igtl::TimeStamp::New();
-        now->GetTime();
-        message->SetTimeStamp(now);
-        message->Pack();
-        if (!peer->Send(message->GetPackPointer(), message->GetPackSize())) {
+        if (!send(peer, message)) {
             return 3;
         }
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
