@@ -407,7 +407,7 @@ fn no_pair_goes_without_an_answer() {
         tools.map(|_| Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough"));
     let command = RigidMotion::translation(Vec3::X * 0.1);
     let rows = [MotionRow::along(Vec3::Z, -1.0); 8];
-    let least = 800 + 3 * (1_600 + Cost::M7_TICK.base);
+    let least = 800 + 3 * (1_000 + Cost::M7_TICK.base);
     let eight = least + 8 * 64;
     for (budget, rows) in [(200_000, &rows[..]), (least, &[]), (eight, &rows)] {
         let mut pairs: Vec<_> = trackers

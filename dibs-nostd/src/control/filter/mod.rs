@@ -197,7 +197,7 @@ impl<const LABELS: usize> Filter<LABELS> {
 
     /// The same with a budget: the instructions of a tick, searches, rows and all, 200,000 by default. If it runs out, motions
     /// that are not verified are not admitted, and the next tick's searches continue where they stopped. It must cover 800,
-    /// for each row 64, for each pair, and each label's part of one, 1,600, and for each pair the [cost](Self::cost)'s base
+    /// for each row 64, for each pair, and each label's part of one, 1,000, and for each pair the [cost](Self::cost)'s base
     /// (some 10,000): a pair that is never searched has no answer, and then no motion is admitted.
     #[must_use]
     pub const fn budget(self, instructions: u32) -> Self {

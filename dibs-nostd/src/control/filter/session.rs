@@ -40,11 +40,10 @@ const TESTS_OF_DUE: u64 = 10;
 /// Motions (mm) of a period within which a wall is near.
 const NEAR: f32 = 4.0;
 
-/// Instructions of work besides searches: a product or sum of two vectors, a pair's path, its distances on it, and a look at an
-/// opened node. Each is at least what the emulated board takes.
+/// Instructions of work besides searches: a product or sum of two vectors, a pair's path, and a look at an opened node. Each
+/// is at least what the emulated board takes.
 const PRODUCT: u32 = 32;
 const PATH: u32 = 300;
-const DISTANCES: u32 = 300;
 const LOOK: u32 = 6;
 
 /// Instructions that the searches at the start leave for the rows of the first motion, besides those for each row: a few
@@ -137,7 +136,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
                 self.start(pair, (number, part), reserved, &rest)?;
             }
         }
-        let paths = (PATH + DISTANCES).saturating_mul(self.states.len() as u32);
+        let paths = PATH.saturating_mul(self.states.len() as u32);
         self.pay(paths);
         let stand_still = self.verify(pairs, &rest)?;
         let mut best = stand_still;
@@ -153,7 +152,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             }
             let proposal = self.propose();
             let is_covered = self.shorten(pairs, &proposal, &mut extent);
-            if !is_covered && self.worthwhile(0, false).is_none() {
+            if !is_covered && self.worthwhile(0, LEAST_TESTS).is_none() {
                 break;
             }
             let point = proposal.at(extent);
@@ -227,13 +226,13 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let found = match (part, whole) {
             (Some(part), Some(whole)) if whole > 0.0 && whole < near => {
                 let near = Some((part.label, near));
-                self.worthwhile(reserved, true)
+                self.worthwhile(reserved, LEAST_TESTS_OF_PART)
                     .map(|left| self.search(pair, ends, false, near, left))
                     .transpose()?
             }
             (Some(_), _) => None,
             (None, _) => self
-                .left(reserved, false)
+                .left(reserved)
                 .map(|left| self.search(pair, ends, false, None, left))
                 .transpose()?,
         };
@@ -289,7 +288,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     fn first(&self, pairs: usize) -> u32 {
         let walls = pairs as u32;
         let rows = (self.rows.own() + walls).saturating_mul(2 * PRODUCT);
-        STEPS.saturating_add(rows).saturating_add(walls.saturating_mul(3 * PATH + 2 * DISTANCES))
+        STEPS.saturating_add(rows).saturating_add(walls.saturating_mul(3 * PATH))
     }
 
     /// Pays for work besides searches. Returns whether the budget covers it.
@@ -409,10 +408,11 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let mut nearest = on_path(last);
         // From there on the path is far enough, whatever is between its ends.
         let near = part.map(|part| (part.label, least + moved + 2.0 * (grow + arc)));
+        let least_tests = if part.is_some() { LEAST_TESTS_OF_PART } else { LEAST_TESTS };
         // At rest the start's search suffices.
         if !is_enough(nearest)
             && moved > 0.0
-            && let Some(left) = self.worthwhile(0, part.is_some())
+            && let Some(left) = self.worthwhile(0, least_tests)
         {
             let searched = self.search(pair, ends, start.distance > 0.0, near, left)?;
             last = larger(last, searched.distance);
@@ -482,18 +482,15 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     /// The budget left for a query, less what is reserved for others (instructions); `None` if that is below the base
     /// cost.
-    fn left(&self, reserved: u32, is_of_part: bool) -> Option<Budget> {
+    fn left(&self, reserved: u32) -> Option<Budget> {
         let Self { filter: Filter { instructions, .. }, cost, .. } = self;
         let left = instructions.checked_sub(self.instructions)?.checked_sub(reserved)?;
-        // A label's search takes up to half more than its tests: it reads every triangle's label, and compares corners.
-        let left = if is_of_part { left / 3 * 2 } else { left };
         (left >= cost.base).then(|| Budget::for_instructions(left, cost))
     }
 
     /// The same, if a query is worth its base cost.
-    fn worthwhile(&self, reserved: u32, is_of_part: bool) -> Option<Budget> {
-        let least_tests = if is_of_part { LEAST_TESTS_OF_PART } else { LEAST_TESTS };
-        self.left(reserved, is_of_part).filter(|left| left.tests() >= least_tests)
+    fn worthwhile(&self, reserved: u32, least_tests: u32) -> Option<Budget> {
+        self.left(reserved).filter(|left| left.tests() >= least_tests)
     }
 
     /// The closest pair with the axis at these ends, or that of a label's triangles within a distance, within a budget. A
@@ -518,8 +515,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         // The root's test is included in the base cost.
         let spent = self.cost.instructions(node_tests.saturating_sub(1), triangle_tests);
         let spent = u32::try_from(spent).unwrap_or(u32::MAX);
-        let more = if near.is_some() { spent / 2 } else { 0 };
-        self.instructions = self.instructions.saturating_add(spent).saturating_add(more);
+        self.instructions = self.instructions.saturating_add(spent);
         self.queries += 1;
         Ok(found)
     }
