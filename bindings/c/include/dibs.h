@@ -2538,7 +2538,7 @@ dibs_filter dibs_filter_of(float stand_off, float speed);
  * its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
  * its tracker continues in the next tick.
  *
- * Cost: at most the filter's instructions.
+ * Cost: at most the filter's instructions, by `cost`.
  *
  * @param filter       The filter.
  * @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.

@@ -250,7 +250,7 @@ impl Command<'_> {
 /// its uncertainty and no faster than stated, and the surface is within its stretch limit. If the budget ends a search,
 /// its tracker continues in the next tick.
 ///
-/// Cost: at most the filter's instructions.
+/// Cost: at most the filter's instructions, by `cost`.
 ///
 /// @param filter       The filter.
 /// @param trackers     Addresses of the trackers, one for each tool. No tracker may be listed twice.

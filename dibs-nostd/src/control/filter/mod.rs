@@ -222,7 +222,8 @@ impl<const LABELS: usize> Filter<LABELS> {
     /// The pairs are the current parts of one rigid instrument, each with its own surface and tracker: a chain of two
     /// tools in a scene of two surfaces has four pairs. `rows` are up to 8 additional limits.
     ///
-    /// Cost: the [budget](Self::budget) at most.
+    /// Cost: the [budget](Self::budget) at most, by a [cost](Self::cost) whose constants are typical: on the board 259 of 129,000
+    /// adversarial ticks took up to 7 % more.
     ///
     /// # Errors
     /// [`FilterError`]: an argument that is not finite or out of range, or a query without an answer. The tool must
