@@ -108,8 +108,8 @@ impl Precision for f64 {
     const TINY: Self = 0.0;
     const MOST: Self = 1e75;
     const IS_ROUGH: bool = false;
-    const DISTANCE_COST: u32 = 120;
-    const RING_COST: u32 = 60;
+    const DISTANCE_COST: u32 = 136;
+    const RING_COST: u32 = 68;
 
     fn vector(vector: Vec3) -> DVec3 {
         vector.as_dvec3()

@@ -18,8 +18,8 @@ const LEAST_WORK: u32 = 4_608;
 
 /// Node tests that the order of ties in f32 and then in f64 takes for a triangle, and for one around a vertex
 /// (`query/precision.rs`).
-const DISTANCE_COST: u32 = 4 + 120;
-const RING_COST: u32 = 3 + 60;
+const DISTANCE_COST: u32 = 4 + 136;
+const RING_COST: u32 = 3 + 68;
 
 /// A valid tree and its rows. They are built before the first input: on a busy machine they would use up its time
 /// limit.

@@ -386,9 +386,9 @@ fn a_search_costs_what_the_filter_was_told() {
     let dear = ample.cost(Cost { base, node_test, triangle_test });
     let dearer = asked(dear);
     assert_eq!((dearer.reason, dearer.queries), (by_default.reason, by_default.queries));
-    // The motion that was tried costs the same.
+    // The motion that was tried costs the same: its rows and paths, not three times as much.
     let rest = (3 * by_default.instructions).abs_diff(dearer.instructions);
-    assert!(rest > 0 && rest < 2_000, "{by_default:?} {dearer:?}");
+    assert!(rest > 0 && rest < 3_000, "{by_default:?} {dearer:?}");
     let none = asked(dear.budget(base - 1));
     assert_eq!((none.reason, none.queries), (Reason::NoSafeMotion, 0));
     assert!(none.instructions < base, "{none:?}");
@@ -407,7 +407,7 @@ fn no_pair_goes_without_an_answer() {
         tools.map(|_| Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough"));
     let command = RigidMotion::translation(Vec3::X * 0.1);
     let rows = [MotionRow::along(Vec3::Z, -1.0); 8];
-    let least = 800 + 3 * (1_000 + Cost::M7_TICK.base);
+    let least = 800 + 3 * (1_400 + Cost::M7_TICK.base);
     let eight = least + 8 * 64;
     for (budget, rows) in [(200_000, &rows[..]), (least, &[]), (eight, &rows)] {
         let mut pairs: Vec<_> = trackers

@@ -61,7 +61,10 @@ fn two_tools_keep_off_two_surfaces() {
         let command = RigidMotion::new(joints[0], (goal - joints[0]).clamp_length_max(0.2), spin);
         let admitted = filter.admit(&mut pairs, &command, PERIOD as f32, &uncertainty, &[]);
         let admitted = admitted.expect("an answer");
-        assert_ne!(admitted.reason, Reason::NoSafeMotion, "{tick}: {admitted:?}");
+        // Four trackers that start anew have no answer yet in the first tick, and then nothing moves.
+        let is_safe = admitted.reason != Reason::NoSafeMotion;
+        let is_at_rest = admitted.motion.translation == Vec3::ZERO;
+        assert!(is_safe || tick == 0 && is_at_rest, "{tick}: {admitted:?}");
         let ends = joints.map(|joint| admitted.motion.apply(joint));
         for (pair, near) in near.iter_mut().enumerate() {
             let (surface, tool) = (pair / 2, pair % 2);

@@ -197,8 +197,9 @@ impl<const LABELS: usize> Filter<LABELS> {
 
     /// The same with a budget: the instructions of a tick, searches, rows and all, 200,000 by default. If it runs out, motions
     /// that are not verified are not admitted, and the next tick's searches continue where they stopped. It must cover 800,
-    /// for each row 64, for each pair, and each label's part of one, 1,000, and for each pair the [cost](Self::cost)'s base
-    /// (some 10,000): a pair that is never searched has no answer, and then no motion is admitted.
+    /// for each row 64, for each pair, and each label's part of one, 1,400, and for each pair the [cost](Self::cost)'s base
+    /// (some 10,000): a pair that is never searched has no answer, and then no motion is admitted. Trackers that start anew may
+    /// take some ticks until all pairs are known; those ticks admit no motion, and their reason says so.
     #[must_use]
     pub const fn budget(self, instructions: u32) -> Self {
         Self { instructions, ..self }
@@ -222,8 +223,8 @@ impl<const LABELS: usize> Filter<LABELS> {
     /// The pairs are the current parts of one rigid instrument, each with its own surface and tracker: a chain of two
     /// tools in a scene of two surfaces has four pairs. `rows` are up to 8 additional limits.
     ///
-    /// Cost: the [budget](Self::budget) at most, by a [cost](Self::cost) whose constants are typical: on the board 259 of 129,000
-    /// adversarial ticks took up to 7 % more.
+    /// Cost: the [budget](Self::budget) at most, by a [cost](Self::cost) whose constants are typical. No tick of adversarial walks
+    /// on the emulated board takes more (`filter.board.over` in the guarantees).
     ///
     /// # Errors
     /// [`FilterError`]: an argument that is not finite or out of range, or a query without an answer. The tool must

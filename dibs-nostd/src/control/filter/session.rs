@@ -40,15 +40,15 @@ const TESTS_OF_DUE: u64 = 10;
 /// Motions (mm) of a period within which a wall is near.
 const NEAR: f32 = 4.0;
 
-/// Instructions of work besides searches: a product or sum of two vectors, a pair's path, and a look at an opened node. Each
-/// is at least what the emulated board takes.
+/// Instructions of work besides searches: a product or sum of two vectors, a pair's path, its distances on it, and a look at an
+/// opened node. Typical but for the emulated board's dearest ticks, none of which takes more than its budget with these.
 const PRODUCT: u32 = 32;
 const PATH: u32 = 300;
+const DISTANCES: u32 = 200;
 const LOOK: u32 = 6;
 
-/// Instructions that the searches at the start leave for the rows of the first motion, besides those for each row: a few
-/// steps of the active set.
-const STEPS: u32 = 24 * PRODUCT;
+/// Instructions of the active set's first steps, which the searches at the start leave, besides those for each row.
+const FIRST_SOLUTION: u32 = 24 * PRODUCT;
 
 /// A motion, and its distances from the tissue.
 #[derive(Clone, Copy)]
@@ -125,18 +125,18 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     pub fn run<P: Pair>(mut self, pairs: &mut [P]) -> Result<AdmittedMotion, FilterError> {
         let rest = RigidMotion { about: self.about, ..RigidMotion::translation(Vec3::ZERO) };
-        let first = self.first(pairs.len() * self.filter.layers().count());
+        let first_motion = self.price_of_first_motion(pairs.len() * self.filter.layers().count());
         for part in self.filter.layers() {
             let mut to_come = pairs.len() as u32;
             for (number, pair) in pairs.iter_mut().enumerate() {
                 to_come -= 1;
                 // A part goes without a search.
                 let others = if part.is_none() { to_come } else { 0 };
-                let reserved = others.saturating_mul(self.cost.base).saturating_add(first);
+                let reserved = others.saturating_mul(self.cost.base).saturating_add(first_motion);
                 self.start(pair, (number, part), reserved, &rest)?;
             }
         }
-        let paths = PATH.saturating_mul(self.states.len() as u32);
+        let paths = (PATH + DISTANCES).saturating_mul(self.states.len() as u32);
         self.pay(paths);
         let stand_still = self.verify(pairs, &rest)?;
         let mut best = stand_still;
@@ -285,10 +285,12 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
 
     /// The instructions of the first motion besides its searches, for so many pairs and parts: its rows, and the paths at
     /// rest, of the look and of the motion.
-    fn first(&self, pairs: usize) -> u32 {
+    fn price_of_first_motion(&self, pairs: usize) -> u32 {
         let walls = pairs as u32;
         let rows = (self.rows.own() + walls).saturating_mul(2 * PRODUCT);
-        STEPS.saturating_add(rows).saturating_add(walls.saturating_mul(3 * PATH))
+        FIRST_SOLUTION
+            .saturating_add(rows)
+            .saturating_add(walls.saturating_mul(3 * PATH + 2 * DISTANCES))
     }
 
     /// Pays for work besides searches. Returns whether the budget covers it.
@@ -332,7 +334,8 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         if needed.is_some_and(|needed| self.covers(needed)) || *extent >= last {
             return needed.is_some_and(|needed| self.covers(needed));
         }
-        // A shorter motion mostly needs less. A look leaves what the longest covered one needs.
+        // Bisection, because most often a shorter motion needs less. Another look is taken only if the budget still covers
+        // the searches of the longest motion found so far.
         let (mut longer, mut shorter, mut kept) = (*extent, last, None);
         while let Some(middle) = longer.middle(shorter) {
             if !self.covers(kept.unwrap_or(0) + look) {

@@ -40,12 +40,13 @@ pub const CHECK: Check = Check {
         note("demo.nodes.compared"),
         note("demo.nodes.rate"),
         Promise {
-            id: "demo.nodes.mean",
-            says: "An answer of the guard then, the side included, in the mean of ticks with the axis outside",
+            id: "demo.nodes.listed",
+            says: "An answer of the guard then, side and contacts included, in the mean of ticks with the axis outside",
             criterion: TIMING,
-            bound: Bound::AtMost(60_000.0),
+            bound: Bound::AtMost(120_000.0),
             unit: "instructions; {demo.nodes.all} with the depth of a crossing axis in the mean of all, {demo.nodes.largest} at most",
-            limits: "The generated heart beats in real time, extrapolated between frames at 60 Hz; a capsule by the script.",
+            limits: "The generated heart beats in real time, extrapolated between frames at 60 Hz; a capsule by the script. \
+                     Before the firmware listed contacts it was 47,862, and the bound 60,000 (commit 991fa126).",
         },
         note("demo.nodes.all"),
         note("demo.nodes.largest"),
@@ -97,7 +98,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
         Ok::<_, anyhow::Error>((number(&report[field], field)? * 100.0).round() / 100.0)
     };
     figures.note("demo.nodes.rate", hundredths("frames_per_second")?);
-    figures.note("demo.nodes.mean", hundredths("instructions_outside_mean")?.round());
+    figures.note("demo.nodes.listed", hundredths("instructions_outside_mean")?.round());
     figures.note("demo.nodes.all", hundredths("instructions_mean")?.round());
     figures.note("demo.nodes.flash", hundredths("tree_bytes_per_triangle")?);
     Ok(Outcome::Passed)

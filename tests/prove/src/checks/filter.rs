@@ -30,7 +30,8 @@ pub const CHECK: Check = Check {
             unit: "of {filter.ticks} ticks, {filter.near} of them within 5 mm; the worst was {filter.worst} mm below",
             limits: "Two capsules, ten scenes: corner, groove, gaps, spike, plate of 0.2 mm, ball, heart, brain; tissue at its limit of \
                      up to 300 mm/s, swinging, waving, drifting, closing; frames late and lost; periods of 0.5 to 4 ms; an eighth of the \
-                     walks take the worst of three commands, and an eighth lead to the medial axis. Truth by exhaustive search in f64 at six instants of a tick.",
+                     walks take the worst of three commands, and an eighth lead to the medial axis. Truth by exhaustive search in f64 at six instants of a tick. \
+                     Residual and position error are 0 here, and no frame is extrapolated: these only add to the stand-off.",
         },
         Promise {
             id: "filter.uncertain",
@@ -72,7 +73,7 @@ pub const CHECK: Check = Check {
             criterion: FLOW,
             bound: Bound::AtLeast(95.0),
             unit: "% of the commanded speed along one wall, at the least of {filter.glide.along} ticks",
-            limits: "The same ticks.",
+            limits: "The same ticks, with new frames and without a stated error of registration.",
         },
         Promise {
             id: "filter.free",
@@ -90,7 +91,7 @@ pub const CHECK: Check = Check {
             unit: "mm of penetration at the deepest; {filter.rows} mm by velocity rows alone, {filter.proxy} mm by the force of all \
                    contacts, {filter.force} mm or more by that of the closest pair",
             limits: "An instrument of 1 mm radius, no stand-off, in the hand's six scenes; forces of at most 5 N against 4.5 N, commands of \
-                     225 mm/s, rows of a gain of 100/s with the surface's velocity. Beyond 10 mm a push ends.",
+                     225 mm/s within 2,000,000 instructions a tick, rows of a gain of 100/s with the surface's velocity. Beyond 10 mm a push ends.",
         },
         note("filter.ticks"),
         note("filter.near"),

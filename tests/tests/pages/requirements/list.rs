@@ -265,8 +265,8 @@ pub const REQUIREMENTS: &[Requirement] = &[
     ),
     requirement(
         "C-06",
-        "A filter does not brake along a wall or in free space, counts no more than its budget, names bad input, and keeps the caller's rows.",
-        &["filter.along", "filter.free", "filter.over"],
+        "A filter does not brake along a wall or in free space, takes no more than its budget, names bad input, and keeps the caller's rows.",
+        &["filter.along", "filter.free", "filter.over", "filter.board.over"],
     ),
     requirement(
         "C-07",
