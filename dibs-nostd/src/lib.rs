@@ -67,13 +67,15 @@
 
 pub use glam;
 
+#[macro_use]
+mod math;
+
 #[cfg(feature = "control")]
 mod control;
 mod error;
 #[cfg(all(feature = "bus", feature = "control"))]
 pub mod guard;
 mod include;
-mod math;
 #[cfg(feature = "modes")]
 pub mod modes;
 #[cfg(feature = "nodes")]

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use dibs_nostd::format::Link;
+use dibs_nostd::format::NodeLink;
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::{Index, MeasuredStretch, Tree, TriangleRow, VertexTable};
 
@@ -68,7 +68,7 @@ pub fn levels<I: Index>(tree: &Tree<'_, I>) -> u32 {
 
 fn children<I: Index>(tree: &Tree<'_, I>, row: u32) -> Option<std::ops::Range<u32>> {
     match tree.node(row)? {
-        (_, _, Link::Children { first, count }) => Some(first..first + count),
+        (_, _, NodeLink::Children { first, count }) => Some(first..first + count),
         _ => None,
     }
 }
@@ -112,7 +112,7 @@ fn is_opening<I: Index>(
         return true;
     }
     // The leaf's plane was tested: its vertices follow, in the leaf's order, some or all.
-    let Link::Leaf { first, count } = link else { return false };
+    let NodeLink::Leaf { first, count } = link else { return false };
     let corners = (first..first + count).filter_map(|row| tree.corners(TriangleRow(row)));
     let vertices = corners
         .enumerate()

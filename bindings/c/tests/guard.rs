@@ -55,8 +55,8 @@ enum Step {
     Tick(u32, [f32; 7]),
     /// The same, with the contacts.
     Touch(u32, [f32; 7]),
-    /// The same, with a command.
-    Admit(u32, [f32; 7]),
+    /// The same, with a command along x, in mm.
+    Admit(u32, [f32; 7], f32),
     Blind(u32),
     Acknowledge,
     Counters,
@@ -114,7 +114,8 @@ fn script(built: &BuiltTree, frames: &[Vec<Vec3>]) -> Vec<Step> {
             1_334 => Step::Tick(now, [f32::NAN, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
             1_335 => Step::Tick(now, [a[0], a[1], a[2], b[0], b[1], b[2], -1.0]),
             _ if now % 3 == 1 && start != end => {
-                Step::Admit(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5])
+                let along = if now % 40 == 0 { f32::NAN } else { -0.1 };
+                Step::Admit(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5], along)
             }
             _ if now % 3 == 2 => Step::Touch(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5]),
             _ => Step::Tick(now, [a[0], a[1], a[2], b[0], b[1], b[2], 2.5]),
@@ -166,8 +167,9 @@ fn lines(steps: &[Step]) -> String {
             Step::Touch(now, tool) => {
                 writeln!(text, "touch {now} {}", tool.map(|number| number.to_string()).join(" "))
             }
-            Step::Admit(now, tool) => {
-                writeln!(text, "admit {now} {}", tool.map(|number| number.to_string()).join(" "))
+            Step::Admit(now, tool, along) => {
+                let tool = tool.map(|number| number.to_string()).join(" ");
+                writeln!(text, "admit {now} {tool} {along}")
             }
             Step::Blind(now) => writeln!(text, "blind {now}"),
             Step::Acknowledge => writeln!(text, "acknowledge 0"),
@@ -239,11 +241,11 @@ fn answer<R: Rows<Poses = ()>>((bus, guard): &mut Ends<'_, R>, step: &Step) -> S
             };
             tick(0, &answer) + &touched(&list)
         }
-        Step::Admit(now, [a, b, c, d, e, f, radius]) => {
+        Step::Admit(now, [a, b, c, d, e, f, radius], along) => {
             let (start, end) = (Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f));
             let tool = Capsule::new(start, end, *radius).expect("a tool");
             let filter = Filter::new(1.0, 200.0).expect("a filter");
-            let command = RigidMotion::new(start, Vec3::new(-0.1, 0.0, 0.0), Vec3::ZERO);
+            let command = RigidMotion::new(start, Vec3::new(*along, 0.0, 0.0), Vec3::ZERO);
             let (answer, admitted) = guard.admit(&filter, &tool, &command, Millis(*now));
             tick(0, &answer) + &motion(admitted)
         }
@@ -375,6 +377,7 @@ fn motion(admitted: Result<AdmittedMotion, FilterError>) -> String {
             line
         }
         Err(FilterError::Untrusted(because)) => format!(" {}", cause(because)),
+        Err(FilterError::Command) => " 310".to_owned(),
         Err(error) => panic!("{error}"),
     }
 }
@@ -453,6 +456,8 @@ fn the_loop_in_c_answers_with_the_same_bits() {
     let admitted = others.filter_map(|tick| tick.get(width).copied());
     let (admitted, refused): (Vec<_>, Vec<_>) = admitted.partition(|&code| code == "0");
     assert!(admitted.len() > 100 && refused.len() > 100, "{} admitted", admitted.len());
+    let not_finite = refused.iter().filter(|&&code| code == "310").count();
+    assert!(not_finite > 5, "{not_finite} commands that are not finite");
     assert!(ticks.iter().any(|tick| tick[30] != tick[31] && tick[2] == "0"), "no velocity");
     for start in ["work 0 3", "work 313", "packet 400", "acknowledge 0", "acknowledge 505"] {
         assert!(expected.iter().any(|line| line.starts_with(start)), "nothing is {start}");

@@ -301,6 +301,9 @@ class Guards(unittest.TestCase):
             self.assertGreater(admitted.least_separation, 0.98)
             tool = admitted.motion.apply(tool)
             reasons.add(admitted.reason)
+        nowhere = dibs.RigidMotion(tool[:3], [float("nan"), 0.0, 0.0])
+        with self.assertRaisesRegex(ValueError, "command"):
+            loop.guard.admit(guard, tool, nowhere, loop.now)
         self.assertIn("commanded", reasons)
         self.assertGreater(len(reasons), 1)
         self.assertGreater(TREE.query(tool, surface=loop.frame)["lower"], 0.98)

@@ -3,7 +3,7 @@
 // Requirement: A-02
 
 use dibs_nostd::format::{
-    CRC, HEADER_BYTES, Join, Link, MAGIC, PathKind, Unit, VERSION, field, section,
+    CRC, HEADER_BYTES, Join, MAGIC, NodeLink, PathKind, Unit, VERSION, field, section,
 };
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Index, Tree};
@@ -24,7 +24,7 @@ use crate::rest::LimitRatios;
 #[derive(Debug)]
 struct Flat {
     /// Pin, radius and link of each node.
-    nodes: Vec<(u32, f64, Link)>,
+    nodes: Vec<(u32, f64, NodeLink)>,
     /// Triangles, leaf by leaf.
     triangles: Vec<StoredTriangle>,
     /// Entries that a traversal's stack needs.
@@ -53,7 +53,7 @@ impl Flat {
                 let link = match &cluster.content {
                     Content::Leaf(triangles) => {
                         leaves.push((triangle, triangles));
-                        Link::Leaf { first: triangle, count: triangles.len() as u32 }
+                        NodeLink::Leaf { first: triangle, count: triangles.len() as u32 }
                     }
                     Content::Inner(children) => {
                         let (first, count) = (placed, children.len() as u32);
@@ -63,7 +63,7 @@ impl Flat {
                             below.push((child, triangle));
                             triangle += child.triangles();
                         }
-                        Link::Children { first, count }
+                        NodeLink::Children { first, count }
                     }
                 };
                 flat.nodes.push((cluster.pin, cluster.radius, link));

@@ -28,7 +28,7 @@ use core::ops::{Add, BitAnd, Mul, Sub};
 
 use glam::Vec4;
 
-use super::layout::AtRest;
+use super::layout::RestElement;
 use crate::math::sqrt::sqrt;
 
 /// One number, or one for each of four elements, with the same rounding.
@@ -74,13 +74,13 @@ impl Lanes for Vec4 {
 
 /// The current shape of one element, or of four.
 #[derive(Clone, Copy)]
-pub(super) struct Now<T> {
-    /// The products of its edges, in the order of [`AtRest::products`].
+pub(super) struct CurrentElement<T> {
+    /// The products of its edges, in the order of [`RestElement::products`].
     products: [T; 6],
     volume: T,
 }
 
-impl<T: Lanes> Now<T> {
+impl<T: Lanes> CurrentElement<T> {
     /// The shape from the coordinates of its four nodes.
     #[inline(always)]
     pub fn of([a, b, c, d]: [[T; 3]; 4]) -> Self {
@@ -100,13 +100,13 @@ impl<T: Lanes> Now<T> {
 
     /// Whether its volume is positive; false for NaN.
     #[inline(always)]
-    pub fn is_upright(&self, rest: &AtRest<T>) -> T::Mask {
+    pub fn is_upright(&self, rest: &RestElement<T>) -> T::Mask {
         self.volume.is_above(rest.least)
     }
 
     /// Whether its stretch is certainly below `sqrt(limit)`; false for NaN.
     #[inline(always)]
-    pub fn is_within(&self, rest: &AtRest<T>, limit: f32) -> T::Mask {
+    pub fn is_within(&self, rest: &RestElement<T>, limit: f32) -> T::Mask {
         let (limit, zero) = (T::splat(limit), T::splat(0.0));
         let [m11, m12, m13, m22, m23, m33] = rest.products;
         let [g11, g12, g13, g22, g23, g33] = self.products;
@@ -121,18 +121,18 @@ impl<T: Lanes> Now<T> {
 
     /// The sum of the squares of its edges, current and at rest.
     #[inline(always)]
-    pub fn sizes(&self, rest: &AtRest<T>) -> [T; 2] {
+    pub fn sizes(&self, rest: &RestElement<T>) -> [T; 2] {
         let sum = |[first, _, _, second, _, third]: [T; 6]| first + second + third;
         [sum(self.products), sum(rest.products)]
     }
 }
 
-impl Now<f32> {
+impl CurrentElement<f32> {
     /// The squared stretch of an element that is not within `from` but within `limit`, rounded up by at most
     /// [`HEADROOM`].
     #[cold]
     #[inline(never)]
-    pub fn squared_stretch(&self, rest: &AtRest<f32>, from: f32, limit: f32) -> f32 {
+    pub fn squared_stretch(&self, rest: &RestElement<f32>, from: f32, limit: f32) -> f32 {
         let (mut low, mut high) = (from, limit);
         // Enough for a limit of a million.
         for _ in 0..64 {
@@ -152,7 +152,7 @@ impl Now<f32> {
     /// The stretch of an element beyond the square `limit`, within one part in a thousand; infinite if it is not
     /// finite.
     #[cold]
-    pub fn stretch_beyond(&self, rest: &AtRest<f32>, limit: f32) -> f32 {
+    pub fn stretch_beyond(&self, rest: &RestElement<f32>, limit: f32) -> f32 {
         let (mut from, mut to) = (limit, limit * 2.0);
         for _ in 0..40 {
             if self.is_within(rest, to) {

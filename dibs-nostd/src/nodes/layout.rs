@@ -95,12 +95,12 @@ impl Scale {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Element {
     pub corners: [u32; 4],
-    pub rest: AtRest<f32>,
+    pub rest: RestElement<f32>,
 }
 
 /// The constants of an element's check, or those of four.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AtRest<T> {
+pub(super) struct RestElement<T> {
     /// The products of the edges along the path through the four nodes: 11, 12, 13, 22, 23, 33.
     pub products: [T; 6],
     /// The least edge volume that is certainly positive (mm³).
@@ -246,12 +246,12 @@ pub(super) fn position(
 pub(super) fn element(record: &[u8; ELEMENT_BYTES]) -> Element {
     let (words, _) = record.as_chunks::<4>();
     let &[ab, cd, m11, m12, m13, m22, m23, m33, least] = words else {
-        let rest = AtRest { products: [0.0; 6], least: f32::NAN };
+        let rest = RestElement { products: [0.0; 6], least: f32::NAN };
         return Element { corners: [u32::MAX; 4], rest };
     };
     let float = f32::from_le_bytes;
     let products = [float(m11), float(m12), float(m13), float(m22), float(m23), float(m33)];
-    let rest = AtRest { products, least: float(least) };
+    let rest = RestElement { products, least: float(least) };
     let (ab, cd) = (u32::from_le_bytes(ab), u32::from_le_bytes(cd));
     let corners = [ab & 0xFFFF, ab >> 16, cd & 0xFFFF, cd >> 16];
     Element { corners, rest }
@@ -259,7 +259,7 @@ pub(super) fn element(record: &[u8; ELEMENT_BYTES]) -> Element {
 
 /// The records of four elements: all first nodes, all second nodes and so on; and their shapes at rest.
 #[inline(always)]
-pub(super) fn four([a, b, c, d]: &[[u8; ELEMENT_BYTES]; 4]) -> ([[u32; 4]; 4], AtRest<Vec4>) {
+pub(super) fn four([a, b, c, d]: &[[u8; ELEMENT_BYTES]; 4]) -> ([[u32; 4]; 4], RestElement<Vec4>) {
     let (a, b, c, d) = (element(a), element(b), element(c), element(d));
     let [a0, a1, a2, a3] = a.corners;
     let [b0, b1, b2, b3] = b.corners;
@@ -279,7 +279,7 @@ pub(super) fn four([a, b, c, d]: &[[u8; ELEMENT_BYTES]; 4]) -> ([[u32; 4]; 4], A
     let last = Mat4::from_cols(last(&a), last(&b), last(&c), last(&d)).transpose();
     let Mat4 { x_axis: m11, y_axis: m12, z_axis: m13, w_axis: m22 } = first;
     let products = [m11, m12, m13, m22, last.x_axis, last.y_axis];
-    (corners, AtRest { products, least: last.z_axis })
+    (corners, RestElement { products, least: last.z_axis })
 }
 
 #[inline(always)]

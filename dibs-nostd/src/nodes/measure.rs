@@ -3,8 +3,8 @@
 use glam::{Vec3, Vec4};
 
 use super::Nodes;
-use super::kernel::Now;
-use super::layout::{self, AtRest, ELEMENT_BYTES, Element};
+use super::kernel::CurrentElement;
+use super::layout::{self, ELEMENT_BYTES, Element, RestElement};
 use crate::math::vec3x4::Vec3x4;
 use crate::stretch::{LEAST, StretchError, root_up, squared_limit};
 use crate::surface::{MeasuredStretch, REGIONS, VertexTable};
@@ -41,8 +41,8 @@ impl Pass {
         &mut self,
         nodes: &Nodes<'_>,
         row: u32,
-        now: &Now<f32>,
-        rest: &AtRest<f32>,
+        now: &CurrentElement<f32>,
+        rest: &RestElement<f32>,
         limit: f32,
     ) -> Result<(), StretchError> {
         if now.is_within(rest, self.squared) {
@@ -203,20 +203,23 @@ impl Pass {
 fn now_of<V: VertexTable + ?Sized>(
     table: &V,
     [a, b, c, d]: [u32; 4],
-) -> Result<Now<f32>, StretchError> {
+) -> Result<CurrentElement<f32>, StretchError> {
     let at = |row| table.position(row).map(Vec3::into).ok_or(StretchError::Corrupt { row });
-    Ok(Now::of([at(a)?, at(b)?, at(c)?, at(d)?]))
+    Ok(CurrentElement::of([at(a)?, at(b)?, at(c)?, at(d)?]))
 }
 
 /// Four current elements; `None` if a node is outside of the table.
 #[inline(always)]
-fn four_of<V: VertexTable + ?Sized>(table: &V, corners: [[u32; 4]; 4]) -> Option<Now<Vec4>> {
+fn four_of<V: VertexTable + ?Sized>(
+    table: &V,
+    corners: [[u32; 4]; 4],
+) -> Option<CurrentElement<Vec4>> {
     let at = |nodes| {
         let Vec3x4 { x, y, z } = Vec3x4::of(|node| table.position(node), nodes)?;
         Some([x, y, z])
     };
     let [a, b, c, d] = corners;
-    Some(Now::of([at(a)?, at(b)?, at(c)?, at(d)?]))
+    Some(CurrentElement::of([at(a)?, at(b)?, at(c)?, at(d)?]))
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ mod surface;
 use core::ops::Range;
 
 use glam::Vec3;
-use kernel::Now;
+use kernel::CurrentElement;
 use layout::Parts;
 
 pub use error::NodesError;
@@ -165,7 +165,7 @@ impl<'a> Nodes<'a> {
         let record = layout::element(self.parts.elements.get(element as usize)?);
         let [a, b, c, d] = record.corners.map(|node| self.rest_position(node));
         let corners = [a?, b?, c?, d?].map(|corner| corner.to_array());
-        let [own, compared] = Now::of(corners).sizes(&record.rest);
+        let [own, compared] = CurrentElement::of(corners).sizes(&record.rest);
         Some(self.limit * sqrt(compared / own))
     }
 

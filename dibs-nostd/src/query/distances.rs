@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::tree::format::Link;
+use crate::tree::format::NodeLink;
 use crate::{Tool, Tree};
 
 /// Distance from a tool's axis, in f64.
@@ -15,12 +15,12 @@ pub(super) fn distance(tool: &impl Tool, point: Vec3) -> f64 {
 }
 
 /// The least distance of any vertex of a subtree.
-pub(super) fn least(tree: &Tree<'_, u16>, link: Link, far: &impl Fn(u32) -> f64) -> f64 {
+pub(super) fn least(tree: &Tree<'_, u16>, link: NodeLink, far: &impl Fn(u32) -> f64) -> f64 {
     match link {
-        Link::Children { first, count } => (first..first + count)
+        NodeLink::Children { first, count } => (first..first + count)
             .map(|row| least(tree, tree.node(row).expect("a node").2, far))
             .fold(f64::INFINITY, f64::min),
-        Link::Leaf { first, count } => (first..first + count)
+        NodeLink::Leaf { first, count } => (first..first + count)
             .flat_map(|row| tree.triangle(row).expect("a triangle"))
             .map(far)
             .fold(f64::INFINITY, f64::min),

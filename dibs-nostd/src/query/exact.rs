@@ -20,7 +20,7 @@
 use super::NoSide;
 use super::normal::{Feature, NORMAL, turned};
 use super::precision::Precision;
-use super::side::OnAxis;
+use super::side::AxisPlace;
 use crate::math::sqrt::sqrt;
 use crate::tree::{MAX_RING, after};
 use crate::unavailable::QueryError;
@@ -33,7 +33,7 @@ pub(super) type SideOfPlane = Result<bool, NoSide>;
 pub(super) struct Exact<'s, 't, I, V: ?Sized, P: Precision> {
     tree: &'s Tree<'t, I>,
     vertices: &'s V,
-    at: &'s OnAxis,
+    at: &'s AxisPlace,
     start: P::Vector,
     along: P::Vector,
     /// Square of the least distance, and its error.
@@ -67,7 +67,7 @@ struct TriangleView<P: Precision> {
 
 impl<'s, 't, I: Index, V: VertexTable + ?Sized, P: Precision> Exact<'s, 't, I, V, P> {
     /// For a point, with at most `left` node tests.
-    pub fn new(tree: &'s Tree<'t, I>, vertices: &'s V, at: &'s OnAxis, left: u32) -> Self {
+    pub fn new(tree: &'s Tree<'t, I>, vertices: &'s V, at: &'s AxisPlace, left: u32) -> Self {
         Self {
             tree,
             vertices,

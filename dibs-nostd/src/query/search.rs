@@ -36,7 +36,7 @@ use crate::math::order::larger;
 use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, Tool};
 use crate::tree::RootSet;
-use crate::tree::format::Link;
+use crate::tree::format::NodeLink;
 use crate::unavailable::QueryError;
 use crate::{Index, MeasuredStretch, Proximity, Tree, TriangleRow, VertexTable};
 
@@ -205,15 +205,15 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Search<'s, 't, I, V, T>
             if KIND == UNTIL && self.cutoff <= limit {
                 return self.finish(0.0);
             }
-            let step = match Link::decode(link) {
-                Link::Children { first, count } => match self.meter.nodes(count) {
+            let step = match NodeLink::decode(link) {
+                NodeLink::Children { first, count } => match self.meter.nodes(count) {
                     Some(()) => {
                         self.expand::<CLOSEST>(lower, first, count, 0.0)?;
                         Expansion::Done
                     }
                     None => Expansion::OutOfBudget,
                 },
-                Link::Leaf { first, count } => self.leaf(first, count)?,
+                NodeLink::Leaf { first, count } => self.leaf(first, count)?,
             };
             if matches!(step, Expansion::OutOfBudget) {
                 if KIND == UNTIL {

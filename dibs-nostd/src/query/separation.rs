@@ -11,7 +11,7 @@ use glam::Vec3;
 use super::depth::Depth;
 use super::memory::depth::KnownDepthMut;
 use super::search::{Ties, WaitingNode};
-use super::side::{self, OnAxis};
+use super::side::{self, AxisPlace};
 use super::sides::{NoSide, Side};
 use super::{Options, Proximity, solids};
 use crate::tree::RootSet;
@@ -82,7 +82,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Request<'_, '_, I, V, T> {
             let many = is_many
                 .then(|| side::of_many(roots, tree, stack, vertices, found, on_axis, options))
                 .transpose()?;
-            let point = OnAxis::new(tool, found.axis_parameter);
+            let point = AxisPlace::new(tool, found.axis_parameter);
             let left = options.after(found.tests()).budget.tests();
             let at = side::of_point(tree, vertices, found, &point, ties, many, left)?;
             found.node_tests = found.node_tests.saturating_add(at.work);

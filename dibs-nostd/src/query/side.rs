@@ -35,14 +35,14 @@ pub(super) struct PointSide {
 
 /// A point of an axis. Start and offset are kept apart, so that far from the origin their sum is not rounded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct OnAxis {
+pub(super) struct AxisPlace {
     pub start: Vec3,
     pub span: Vec3,
     pub parameter: f32,
     point: Vec3,
 }
 
-impl OnAxis {
+impl AxisPlace {
     pub fn new(tool: &impl Tool, parameter: f32) -> Self {
         let (start, span) = (tool.axis_start(), tool.axis_span());
         Self { start, span, parameter, point: tool.axis_point(parameter) }
@@ -61,7 +61,7 @@ pub(super) fn of_point<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     vertices: &V,
     pair: &Proximity,
-    at: &OnAxis,
+    at: &AxisPlace,
     ties: &Ties,
     many: Option<SideOfPlane>,
     left: u32,
@@ -147,7 +147,7 @@ pub(super) fn of_many<I: Index, V: VertexTable + ?Sized>(
     options: &Options,
 ) -> Result<SideOfPlane, QueryError> {
     let (tool, first) = (AxisPoint(point), pair.triangle);
-    let at = OnAxis::new(&tool, 0.0);
+    let at = AxisPlace::new(&tool, 0.0);
     let rest = |pair: &Proximity| options.after(pair.tests());
     let rough = Exact::<_, _, f32>::new(tree, vertices, &at, 0);
     if tree.is_closed() {

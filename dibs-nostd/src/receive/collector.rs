@@ -14,8 +14,8 @@ use super::health::{BusHealth, FrameName, Trouble};
 use crate::surface::{AHEAD, Millis, elapsed};
 use crate::tree::SurfaceFacts;
 use crate::wire::{
-    Answer, Begin, Commit, Content, Counters, Event, FrameId, Hello, Mac, POSE_SEQUENCE, Packet,
-    PublishedStatus, Status, is_newer,
+    Begin, Commit, Content, Counters, Event, FrameId, Hello, Mac, POSE_SEQUENCE, Packet,
+    PublishedStatus, Status, StatusAnswer, is_newer,
 };
 
 pub use heartbeats::LastHeartbeat;
@@ -481,7 +481,7 @@ impl Collector {
             }
         });
         let nonce = self.hello.take().map(u64::from_le_bytes);
-        let answer = nonce.map(|nonce| Answer { nonce, challenge, surface });
+        let answer = nonce.map(|nonce| StatusAnswer { nonce, challenge, surface });
         Status { published, wants_whole: self.wants_whole, safety, number, clock: now.0, answer }
     }
 }

@@ -11,7 +11,7 @@ use super::{Assembler, Progress, ReceiveError, arrivals};
 use crate::stretch::{AdmissionCheck, FrameExtent};
 use crate::surface::{PoseError, Position, RigidPose};
 use crate::wire::{
-    Begin, Body, Content, Encoding, Mac, Packet, Rows, Vertices, Weights, float_position,
+    Begin, Body, Content, Encoding, Mac, Packet, PacketRows, VertexPacket, Weights, float_position,
     quantised_row,
 };
 
@@ -122,7 +122,7 @@ impl<G: AdmissionCheck, M: Mac> Assembler<'_, G, M> {
     fn vertices(
         &mut self,
         packet: &Packet<'_>,
-        Vertices { first, rows }: Vertices<'_>,
+        VertexPacket { first, rows }: VertexPacket<'_>,
     ) -> Result<Progress, ReceiveError> {
         let (frame, contribution) = self.collector.frame_of(packet, &self.mac)?;
         let count = rows.len() as u32;
@@ -131,8 +131,8 @@ impl<G: AdmissionCheck, M: Mac> Assembler<'_, G, M> {
         let limit = self.max_coordinate;
         let grid = match (&rows, frame.begin.encoding, frame.begin.content) {
             (_, _, Content::Modal) => return Err(ReceiveError::Encoding),
-            (Rows::Float(_), Encoding::Float, _) => None,
-            (Rows::Quantised(_), Encoding::Quantised(grid), _) => Some(grid),
+            (PacketRows::Float(_), Encoding::Float, _) => None,
+            (PacketRows::Quantised(_), Encoding::Quantised(grid), _) => Some(grid),
             _ => return Err(ReceiveError::Encoding),
         };
         let slots = self.writer.rows(range.clone()).ok_or(out_of_range)?;
@@ -145,14 +145,14 @@ impl<G: AdmissionCheck, M: Mac> Assembler<'_, G, M> {
             return Err(ReceiveError::NotReady { first });
         }
         match (rows, grid) {
-            (Rows::Quantised(rows), Some(grid)) => {
+            (PacketRows::Quantised(rows), Some(grid)) => {
                 let decode = |row: &[u8; 6]| grid.position(quantised_row(row));
                 if !self.is_box_inside {
                     check(rows.iter().map(decode), first, limit)?;
                 }
                 store(slots, rows, decode);
             }
-            (Rows::Float(rows), _) => {
+            (PacketRows::Float(rows), _) => {
                 check(rows.iter().map(float_position), first, limit)?;
                 for (slot, row) in slots.iter().zip(rows) {
                     slot.set(float_position(row));

@@ -81,7 +81,8 @@ impl<'a, V: ?Sized> IncomingSurface<'a, V> {
 /// [`advance`](Self::advance) as often as there is time, until it admits or refuses the frame. A frame may be abandoned
 /// at any time, and another begun. [`published`](Self::published) follows once an admitted frame is published.
 ///
-/// A user's admission check wraps the library's: in this example whole frames wait until somebody has confirmed them.
+/// A user's admission check wraps the library's: in this example whole frames wait until somebody has confirmed them. A
+/// wrapper that, like this one, does not forward the other methods has frames without measured motion.
 ///
 /// ```
 /// use core::ops::Range;
@@ -204,6 +205,7 @@ pub trait AdmissionCheck {
     }
 
     /// The facts of the admission check's surface; the default has none.
+    #[doc(hidden)]
     fn surface_facts(&self) -> SurfaceFacts {
         SurfaceFacts::default()
     }

@@ -7,13 +7,13 @@ use glam::Vec3;
 
 /// A pair of an edge and an axis: the length along the axis, and the position on the edge (0 to 1).
 #[derive(Clone, Copy)]
-pub(super) struct OnEdge {
+pub(super) struct EdgePair {
     pub distance_squared: f32,
     pub along: f32,
     pub x: f32,
 }
 
-impl OnEdge {
+impl EdgePair {
     #[inline(always)]
     pub fn on_ab(self) -> Candidate {
         self.candidate(self.x, 0.0)
@@ -37,16 +37,16 @@ impl OnEdge {
 
 /// The closest pair between the edge from `corner` along `edge` and the origin, which is the axis' point at `along`.
 #[inline(always)]
-pub(super) fn edge_to_point(corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
+pub(super) fn edge_to_point(corner: Vec3, edge: Vec3, along: f32) -> EdgePair {
     let squared = edge.dot(edge);
     let x = if squared > TINY { clamp(-corner.dot(edge) / squared, 1.0) } else { 0.0 };
     let apart = corner + x * edge;
-    OnEdge { distance_squared: apart.dot(apart), along, x }
+    EdgePair { distance_squared: apart.dot(apart), along, x }
 }
 
 /// The closest pair between the edge from `corner` (relative to the axis' start) along `edge`, and the
 /// axis.
-pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
+pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> EdgePair {
     let (corner_along, edge_along) = (corner.dot(axis.direction), edge.dot(axis.direction));
     let corner_across = corner - corner_along * axis.direction;
     let edge_across = edge - edge_along * axis.direction;
@@ -60,7 +60,7 @@ pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
     if across_squared > SLIVER * edge.dot(edge) {
         if along >= 0.0 && along <= axis.length {
             let apart = corner_across + x * edge_across;
-            return OnEdge { distance_squared: apart.dot(apart), along, x };
+            return EdgePair { distance_squared: apart.dot(apart), along, x };
         }
         let along = clamp(along, axis.length);
         return edge_to_point(corner - along * axis.direction, edge, along);
@@ -75,7 +75,7 @@ pub(super) fn edge_to_segment(axis: &Axis, corner: Vec3, edge: Vec3) -> OnEdge {
 /// the edge varies by as little. They are kept because the module's bound relies on them.
 #[cold]
 #[inline(never)]
-fn nearly_parallel(axis: &Axis, corner: Vec3, edge: Vec3, along: f32) -> OnEdge {
+fn nearly_parallel(axis: &Axis, corner: Vec3, edge: Vec3, along: f32) -> EdgePair {
     let (corner_along, edge_along) = (corner.dot(axis.direction), edge.dot(axis.direction));
     let from = |along: f32| {
         let along = clamp(along, axis.length);

@@ -10,12 +10,12 @@ use glam::Vec3;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sphere {
     #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
-    center: Vec3,
+    centre: Vec3,
     radius: f32,
 }
 
 impl Sphere {
-    /// A sphere of `radius` around `center`, in millimetres and the mesh's frame.
+    /// A sphere of `radius` around `centre`, in millimetres and the mesh's frame.
     ///
     /// # Errors
     /// A coordinate or radius that is not finite or exceeds [`super::MAX_COORDINATE`], or a negative
@@ -28,22 +28,22 @@ impl Sphere {
     /// assert_eq!(tip.axis_distance_squared(Vec3::ZERO), 100.0);
     /// # Ok::<(), dibs_nostd::ToolError>(())
     /// ```
-    pub fn new(center: Vec3, radius: f32) -> Result<Self, ToolError> {
-        check_point(center)?;
+    pub fn new(centre: Vec3, radius: f32) -> Result<Self, ToolError> {
+        check_point(centre)?;
         check_radius(radius)?;
-        Ok(Self { center, radius })
+        Ok(Self { centre, radius })
     }
 
     /// The centre as given.
     pub fn centre(&self) -> Vec3 {
-        self.center
+        self.centre
     }
 }
 
 impl sealed::Sealed for Sphere {
     #[inline(always)]
     fn axis_to_four(&self, points: &Vec3x4) -> Vec3x4 {
-        points.minus(Vec3x4::splat(self.center))
+        points.minus(Vec3x4::splat(self.centre))
     }
 
     #[inline(always)]
@@ -53,13 +53,13 @@ impl sealed::Sealed for Sphere {
 
     #[inline(always)]
     fn towards(&self, to: &Self, t: f32) -> Self {
-        let center = self.center + (to.center - self.center) * t;
-        Self { center, radius: larger(self.radius, to.radius) }
+        let centre = self.centre + (to.centre - self.centre) * t;
+        Self { centre, radius: larger(self.radius, to.radius) }
     }
 
     #[inline(always)]
-    fn with_axis(&self, [center, _]: [Vec3; 2]) -> Self {
-        Self { center, radius: self.radius }
+    fn with_axis(&self, [centre, _]: [Vec3; 2]) -> Self {
+        Self { centre, radius: self.radius }
     }
 }
 
@@ -71,7 +71,7 @@ impl Tool for Sphere {
 
     #[inline]
     fn axis_start(&self) -> Vec3 {
-        self.center
+        self.centre
     }
 
     #[inline]
@@ -81,12 +81,12 @@ impl Tool for Sphere {
 
     #[inline]
     fn axis_point(&self, _parameter: f32) -> Vec3 {
-        self.center
+        self.centre
     }
 
     #[inline(always)]
     fn axis_to(&self, point: Vec3) -> Vec3 {
-        point - self.center
+        point - self.centre
     }
 
     #[inline(always)]
@@ -96,6 +96,6 @@ impl Tool for Sphere {
 
     #[inline]
     fn closest_on_triangle(&self, corners: &[Vec3; 3], limit_squared: f32) -> Option<AxisPair> {
-        triangle::closest_to_point(self.center, corners, limit_squared)
+        triangle::closest_to_point(self.centre, corners, limit_squared)
     }
 }

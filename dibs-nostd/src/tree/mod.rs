@@ -4,16 +4,6 @@
 
 // Requirement: M-01
 
-/// The operator `?`, for `const` functions.
-macro_rules! tri {
-    ($result:expr) => {
-        match $result {
-            Ok(value) => value,
-            Err(error) => return Err(error),
-        }
-    };
-}
-
 mod adjacency;
 mod error;
 mod facts;
@@ -53,7 +43,7 @@ use glam::Vec3;
 
 #[cfg(feature = "wide")]
 use format::several;
-use format::{Link, Metric, Node, section};
+use format::{Metric, Node, NodeLink, section};
 use header::Header;
 use sections::Sections;
 
@@ -361,11 +351,11 @@ impl<'a, I: Index> Tree<'a, I> {
     /// Pin, geodesic radius (mm, rounded up) and link of a node, for programs that walk the tree; `None` outside the
     /// table. Row 0 is the root.
     #[must_use]
-    pub const fn node(&self, row: u32) -> Option<(u32, f32, Link)> {
+    pub const fn node(&self, row: u32) -> Option<(u32, f32, NodeLink)> {
         match self.record(row) {
             Some(node) => {
                 let radius = node.radius_code as f32 * self.header.radius_unit;
-                Some((node.pin, radius, Link::decode(node.link)))
+                Some((node.pin, radius, NodeLink::decode(node.link)))
             }
             None => None,
         }

@@ -5,7 +5,7 @@
 use core::marker::PhantomData;
 
 use crate::tree::format::{
-    self, Join, Link, MAX_LEAF_TRIANGLES, MAX_STACK, Metric, Node, limit_code,
+    self, Join, MAX_LEAF_TRIANGLES, MAX_STACK, Metric, Node, NodeLink, limit_code,
 };
 use crate::tree::header::Header;
 use crate::tree::sections::Sections;
@@ -68,7 +68,7 @@ const fn nodes<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
         if node.radius_code > I::MAX_RADIUS_CODE {
             return Err(FormatError::Radius { node: row, code: node.radius_code });
         }
-        if let Link::Children { first, count } = Link::decode(node.link) {
+        if let NodeLink::Children { first, count } = NodeLink::decode(node.link) {
             if first != next_node || count > header.nodes - next_node {
                 return Err(FormatError::NodeOrder { node: first });
             }
@@ -106,8 +106,8 @@ const fn leaves<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
         let Some(node) = parts.node(row) else {
             return Err(FormatError::NodeOrder { node: row });
         };
-        match Link::decode(node.link) {
-            Link::Children { first, count } => {
+        match NodeLink::decode(node.link) {
+            NodeLink::Children { first, count } => {
                 let mut child = count;
                 while child > 0 {
                     child -= 1;
@@ -115,7 +115,7 @@ const fn leaves<I: Index>(parts: &Parts<'_, I>) -> Result<(), FormatError> {
                     waiting += 1;
                 }
             }
-            Link::Leaf { first, count } => {
+            NodeLink::Leaf { first, count } => {
                 if first != next_triangle || count > header.triangles - next_triangle {
                     return Err(FormatError::Leaf { first });
                 }

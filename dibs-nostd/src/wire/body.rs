@@ -13,7 +13,7 @@ pub enum Body<'a> {
     /// A frame begins.
     Begin(Begin),
     /// Some of its vertices.
-    Vertices(Vertices<'a>),
+    Vertices(VertexPacket<'a>),
     /// Some of its mode weights.
     Weights(Weights<'a>),
     /// A frame ends: all of it was sent.
@@ -97,24 +97,24 @@ impl Encoding {
 
 /// A range of consecutive vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vertices<'a> {
+pub struct VertexPacket<'a> {
     /// Row of the first vertex, in the tree's vertex order.
     pub first: u32,
     /// The positions.
-    pub rows: Rows<'a>,
+    pub rows: PacketRows<'a>,
 }
 
 /// Undecoded positions, 1 to 255.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Rows<'a> {
+pub enum PacketRows<'a> {
     /// Little-endian `f32`, not checked: any bits are possible.
     Float(&'a [[u8; 12]]),
     /// Little-endian `u16`.
     Quantised(&'a [[u8; 6]]),
 }
 
-impl Rows<'_> {
+impl PacketRows<'_> {
     /// Number of positions.
     #[must_use]
     pub const fn len(&self) -> usize {
@@ -131,7 +131,7 @@ impl Rows<'_> {
     }
 }
 
-/// Decodes one row of [`Rows::Float`].
+/// Decodes one row of [`PacketRows::Float`].
 #[inline(always)]
 pub(crate) fn float_position(row: &[u8; 12]) -> Vec3 {
     let &[x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3] = row;
@@ -142,7 +142,7 @@ pub(crate) fn float_position(row: &[u8; 12]) -> Vec3 {
     )
 }
 
-/// Decodes one row of [`Rows::Quantised`].
+/// Decodes one row of [`PacketRows::Quantised`].
 #[inline(always)]
 pub(crate) const fn quantised_row(row: &[u8; 6]) -> [u16; 3] {
     let &[x0, x1, y0, y1, z0, z1] = row;

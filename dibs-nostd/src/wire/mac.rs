@@ -42,8 +42,8 @@ pub enum Direction {
 pub struct Code {
     /// The part sent with the packet.
     pub tag: [u8; TAG_BYTES],
-    /// A part that is never sent: [`Commit::digest`](super::Commit::digest) is its sum over the frame, so that without
-    /// the key nobody can tell which packets of two frames give the same sum.
+    /// A part that is never sent: the digest in a frame's commit is its sum over the frame, so that without the key
+    /// nobody can tell which packets of two frames give the same sum.
     pub contribution: u32,
 }
 

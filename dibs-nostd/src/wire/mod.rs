@@ -1,10 +1,10 @@
 //! The wire protocol: surfaces as packets of at most one transport unit, and statuses in the other direction.
 //!
-//! The byte layout is specified in `docs/wire.md`. A frame is one [`Begin`] packet, packets of [`Vertices`] or
+//! The byte layout is specified in `docs/wire.md`. A frame is one [`Begin`] packet, [`VertexPacket`]s or packets of
 //! [`Weights`], and one [`Commit`]; a pose may follow the begin. [`FrameEncoder`] and [`WeightsEncoder`] make the
 //! packets on the sender's side, [`Packet::decode`] reads one in place on the receiver's, and the
 //! [`Assembler`](crate::Assembler) makes frames of them. A [`Heartbeat`] is the sender's sign of life, a [`Status`]
-//! reports the published frame to the sender, a [`Hello`] asks for an [`Answer`].
+//! reports the published frame to the sender, a [`Hello`] asks for a [`StatusAnswer`].
 //!
 //! On a byte stream each packet is framed with COBS: [`enframe`] and [`Deframer`]. On UDP a packet is
 //! one datagram, on CAN-FD one message: [`canfd`].
@@ -33,7 +33,7 @@ mod stream;
 pub use self::cmac::AesCmac;
 /// A packet's contents, for the senders of `dibs-stream`: a receiver passes bytes to its assembler.
 #[doc(hidden)]
-pub use body::{Begin, Body, Commit, Content, Heartbeat, Hello, Rows, Vertices, Weights};
+pub use body::{Begin, Body, Commit, Content, Heartbeat, Hello, PacketRows, VertexPacket, Weights};
 pub use body::{Encoding, Freshness};
 pub(crate) use body::{float_position, quantised_row};
 pub use counters::{Counters, Event};
@@ -52,7 +52,7 @@ pub use packet::Packet;
 pub use quantised::{BoxError, QuantisedBox};
 pub use status::Status;
 #[doc(hidden)]
-pub use status::{Answer, PublishedStatus, StatusReport};
+pub use status::{PublishedStatus, StatusAnswer, StatusReport};
 #[doc(hidden)]
 pub use stream::framed_bytes;
 pub use stream::{Deframer, StreamError, enframe};

@@ -7,10 +7,10 @@ use glam::{Quat, Vec3};
 use super::checksum::{checksum, scrambled};
 use super::fields::Fields;
 use super::{
-    Answer, Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Direction, Encoding, Freshness,
+    Begin, Body, BoxError, CHECKSUM_BYTES, Commit, Content, Direction, Encoding, Freshness,
     HEADER_BYTES, Heartbeat, Hello, MAX_ROWS, MAX_WEIGHTS, Mac, POSE_SEQUENCE, PacketError,
-    PublishedStatus, QuantisedBox, Rows, Status, StatusReport, TAG_BYTES, VERSION, Vertices,
-    Weights, float_position, kind, padded,
+    PacketRows, PublishedStatus, QuantisedBox, Status, StatusAnswer, StatusReport, TAG_BYTES,
+    VERSION, VertexPacket, Weights, float_position, kind, padded,
 };
 use crate::surface::{PoseError, RigidPose};
 use crate::tree::{SurfaceFacts, Unit};
@@ -125,11 +125,12 @@ impl<'a> Packet<'a> {
         let body = match kind {
             kind::BEGIN => Body::Begin(begin(Fields(body), [session_low, sequence], epoch, clock)?),
             kind::FLOAT_VERTICES => {
-                Body::Vertices(Vertices { first, rows: Rows::Float(body.as_chunks().0) })
+                Body::Vertices(VertexPacket { first, rows: PacketRows::Float(body.as_chunks().0) })
             }
-            kind::QUANTISED_VERTICES => {
-                Body::Vertices(Vertices { first, rows: Rows::Quantised(body.as_chunks().0) })
-            }
+            kind::QUANTISED_VERTICES => Body::Vertices(VertexPacket {
+                first,
+                rows: PacketRows::Quantised(body.as_chunks().0),
+            }),
             kind::COMMIT => Body::Commit(Commit { digest: Fields(body).u32() }),
             kind::WEIGHTS => Body::Weights(Weights { first, values: body.as_chunks().0 }),
             kind::HEARTBEAT => Body::Heartbeat(heartbeat(Fields(body), session_low, clock)?),
@@ -328,7 +329,7 @@ fn answer(
     let (nonce, challenge) = (fields.u64(), fields.u64());
     let surface = facts(&mut fields)?;
     zero(fields.0, HEADER_BYTES + 35)?;
-    let answer = Some(Answer { nonce, challenge, surface });
+    let answer = Some(StatusAnswer { nonce, challenge, surface });
     Ok(StatusReport { status: Status { answer, ..status }, first_counter: 0, counters: &[] })
 }
 

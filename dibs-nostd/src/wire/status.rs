@@ -17,13 +17,13 @@ pub struct Status {
     /// The receiver's clock at this status, in ms: the sender's next frames echo it.
     pub clock: u32,
     /// The answer to a [`Hello`](super::Hello), if this is one: the status then has no counters and no stretch.
-    pub answer: Option<Answer>,
+    pub answer: Option<StatusAnswer>,
 }
 
 /// The answer to a hello.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Answer {
+pub struct StatusAnswer {
     /// The hello's nonce.
     pub nonce: u64,
     /// The number to which the receiver's tags are bound: [`Mac::challenge`](super::Mac::challenge).

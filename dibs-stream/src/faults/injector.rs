@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use dibs_nostd::format::CRC;
 use dibs_nostd::wire::{
-    Body, CHECKSUM_BYTES, Content, Encoding, HEADER_BYTES, NoMac, Packet, Rows, TAG_BYTES,
+    Body, CHECKSUM_BYTES, Content, Encoding, HEADER_BYTES, NoMac, Packet, PacketRows, TAG_BYTES,
 };
 use fastrand::Rng;
 
@@ -190,7 +190,7 @@ impl Injector {
                 put(15, &first[..3]);
             }
             (Fault::NotFinite | Fault::TooFar, Body::Vertices(vertices)) => {
-                let Rows::Float(rows) = vertices.rows else { return None };
+                let PacketRows::Float(rows) = vertices.rows else { return None };
                 let coordinate = HEADER_BYTES + 4 * rng.usize(..3 * rows.len());
                 put(coordinate, &bad_number(fault, rng).to_le_bytes());
             }
@@ -205,12 +205,12 @@ impl Injector {
                 put(number, &bad_number(fault, rng).to_le_bytes());
             }
             (Fault::Stretch, Body::Vertices(vertices)) => match vertices.rows {
-                Rows::Quantised(rows) => {
+                PacketRows::Quantised(rows) => {
                     // Half of the box's extent away.
                     let at = HEADER_BYTES + 2 * rng.usize(..3 * rows.len()) + 1;
                     put(at, &[packet[at] ^ 0x80]);
                 }
-                Rows::Float(rows) => {
+                PacketRows::Float(rows) => {
                     let at = HEADER_BYTES + 4 * rng.usize(..3 * rows.len());
                     // Mirrored and doubled, or moved away from zero: still a possible position.
                     let value = float_at(packet, at);

@@ -1,7 +1,9 @@
 //! One frame's packets, their effect on the receiver's table, and their counts.
 
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{Body, Content, Encoding, FrameEncoder, Mac, Packet, QuantisedBox, Rows};
+use dibs_nostd::wire::{
+    Body, Content, Encoding, FrameEncoder, Mac, Packet, PacketRows, QuantisedBox,
+};
 
 /// A frame that was sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,13 +84,13 @@ pub(super) fn apply(packet: &[u8], encoding: Encoding, held: &mut [Vec3]) -> usi
     };
     let rows = held.iter_mut().skip(vertices.first as usize);
     match (vertices.rows, encoding) {
-        (Rows::Float(floats), _) => {
+        (PacketRows::Float(floats), _) => {
             for (row, bytes) in rows.zip(floats) {
                 let (words, _) = bytes.as_chunks::<4>();
                 *row = Vec3::from_array([0, 1, 2].map(|axis| f32::from_le_bytes(words[axis])));
             }
         }
-        (Rows::Quantised(numbers), Encoding::Quantised(grid)) => {
+        (PacketRows::Quantised(numbers), Encoding::Quantised(grid)) => {
             for (row, bytes) in rows.zip(numbers) {
                 let (words, _) = bytes.as_chunks::<2>();
                 *row = grid.position([0, 1, 2].map(|axis| u16::from_le_bytes(words[axis])));

@@ -3,7 +3,7 @@
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::time::Duration;
 
-use dibs_nostd::wire::Answer;
+use dibs_nostd::wire::StatusAnswer;
 
 /// Time between two hellos with one nonce.
 const INTERVAL: Duration = Duration::from_millis(50);
@@ -24,7 +24,7 @@ impl Greeting {
     }
 
     /// Whether this answers the hello.
-    pub const fn is_answered_by(&self, answer: &Answer) -> bool {
+    pub const fn is_answered_by(&self, answer: &StatusAnswer) -> bool {
         self.nonce == answer.nonce
     }
 

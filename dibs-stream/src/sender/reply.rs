@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use dibs_nostd::wire::{
-    Answer, Body, Counters, Mac, Packet, PublishedStatus, Status, StatusReport, encode_hello,
+    Body, Counters, Mac, Packet, PublishedStatus, Status, StatusAnswer, StatusReport, encode_hello,
     is_newer,
 };
 
@@ -113,7 +113,13 @@ impl<T: Transport, M: Mac, const MTU: usize> Sender<T, MTU, M> {
     }
 
     /// Handles an authentic answer to the pending hello.
-    fn take_answer(&mut self, mesh_id: u32, report: &StatusReport<'_>, answer: &Answer, mac: M) {
+    fn take_answer(
+        &mut self,
+        mesh_id: u32,
+        report: &StatusReport<'_>,
+        answer: &StatusAnswer,
+        mac: M,
+    ) {
         let facts = answer.surface;
         let (is_ours, now) = (mesh_id == self.surface.mesh_id, self.clock.now());
         if !is_ours || !facts.agrees_with(&self.surface.facts) {

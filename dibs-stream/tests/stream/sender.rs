@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use dibs_build::{Builder, FrameError, Motion, generate};
 use dibs_nostd::glam::Vec3;
-use dibs_nostd::wire::{Body, Content, Encoding, NoMac, Packet, PacketError, Rows};
+use dibs_nostd::wire::{Body, Content, Encoding, NoMac, Packet, PacketError, PacketRows};
 use dibs_stream::faults::{Fault, Injector};
 use dibs_stream::{SendError, Sender, Settings, SurfaceOrder};
 
@@ -46,7 +46,7 @@ fn receive(packets: &[Vec<u8>], held: &mut [Vec3]) -> (u32, Content, usize) {
                 };
             }
             Body::Vertices(vertices) => match vertices.rows {
-                Rows::Float(rows) => {
+                PacketRows::Float(rows) => {
                     for (row, bytes) in rows.iter().enumerate() {
                         let number =
                             |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
@@ -55,7 +55,7 @@ fn receive(packets: &[Vec<u8>], held: &mut [Vec3]) -> (u32, Content, usize) {
                     }
                     rows_sent += rows.len();
                 }
-                Rows::Quantised(rows) => {
+                PacketRows::Quantised(rows) => {
                     for (row, b) in rows.iter().enumerate() {
                         let number = |at: usize| u16::from_le_bytes([b[at], b[at + 1]]);
                         held[vertices.first as usize + row] =

@@ -12,7 +12,7 @@
  *     status NOW FRAMED            the status for the sender
  *     tick NOW START END RADIUS    a control tick: a capsule, or a sphere if both ends are equal
  *     touch NOW START END RADIUS   a control tick with the contacts within 5 mm
- *     admit NOW START END RADIUS   a control tick whose command, a tenth of a millimetre along -x, is filtered
+ *     admit NOW START END RADIUS X a control tick whose command, X mm along x, is filtered
  *     blind NOW                    a control tick without a pose
  *     acknowledge 0                an operator's acknowledgement
  *     counters 0                   the bus's events
@@ -162,7 +162,8 @@ static void answer_event(dibs_bus *bus, dibs_guard *guard, const char *name, uin
     } else if (strcmp(name, "admit") == 0) {
         const dibs_tool tool = take_tool(rest);
         const dibs_filter filter = dibs_filter_of(1.0f, 200.0f);
-        const dibs_rigid_motion command = {.about = tool.start, .translation = {-0.1f, 0.0f, 0.0f}};
+        const float along = strtof(strrchr(rest, ' '), NULL);
+        const dibs_rigid_motion command = {.about = tool.start, .translation = {along, 0.0f, 0.0f}};
         dibs_answer answer;
         dibs_admitted_motion admitted;
         const dibs_code code = dibs_guard_admit(guard, &filter, &tool, &command, now, &answer, &admitted);

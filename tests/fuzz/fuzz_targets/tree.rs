@@ -2,7 +2,7 @@
 //! right, so that the bytes reach the checks behind them.
 #![no_main]
 
-use dibs_nostd::format::{HEADER_BYTES, Link, field};
+use dibs_nostd::format::{HEADER_BYTES, NodeLink, field};
 use dibs_nostd::{Index, Tree, TriangleRow};
 use dibs_tests::tree_bytes::reseal;
 use libfuzzer_sys::fuzz_target;
@@ -27,8 +27,8 @@ fn walk<I: Index>(bytes: &[u8]) {
         let (pin, _, link) = tree.node(row).expect("a valid tree has its nodes");
         assert!(pin < tree.vertex_count());
         match link {
-            Link::Children { first, count } => rows.extend(first..first + count),
-            Link::Leaf { first, count } => {
+            NodeLink::Children { first, count } => rows.extend(first..first + count),
+            NodeLink::Leaf { first, count } => {
                 for row in first..first + count {
                     let corners = tree.corners(TriangleRow(row)).expect("a valid tree has its triangles");
                     assert!(corners.iter().all(|&corner| corner < tree.vertex_count()));

@@ -21,7 +21,7 @@ pub trait Axis {
 }
 
 pub struct Sphere {
-    pub center: Vec3,
+    pub centre: Vec3,
 }
 
 /// Any tool: the shortest vector from its axis to the point that is asked for is given.
@@ -102,12 +102,12 @@ pub struct Node {
     pub link: u32,
 }
 
-enum Link {
+enum NodeLink {
     Children,
     Leaf { first: u32, count: u32 },
 }
 
-impl Link {
+impl NodeLink {
     /// A leaf's node is tested against a plane besides: that is a kernel of its own.
     fn decode(_: u32) -> Self {
         Self::Children

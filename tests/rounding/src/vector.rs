@@ -124,7 +124,7 @@ mod tests {
                 assert_same(&(ta * ts).each(), &(a * s).to_array());
                 assert_same(&[ta.dot(tb), ta.length()], &[a.dot(b), a.length()]);
                 if let Ok(sphere) = dibs_nostd::Sphere::new(a, 0.0) {
-                    let to = Sphere { center: ta }.axis_to(tb);
+                    let to = Sphere { centre: ta }.axis_to(tb);
                     assert_same(&to.each(), &sphere.axis_to(b).to_array());
                 }
             };

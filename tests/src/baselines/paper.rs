@@ -6,7 +6,7 @@
 //! so far. The library's upper bounds from pins, planes, slack and warm starts are not used.
 
 use dibs_build::BuiltTree;
-use dibs_nostd::format::Link;
+use dibs_nostd::format::NodeLink;
 use dibs_nostd::{Index, Tool, TriangleRow};
 use glam::Vec3;
 
@@ -91,10 +91,10 @@ impl<'t> Paper<'t> {
 fn nodes<I: Index>(built: &BuiltTree) -> Vec<Node> {
     let tree = built.tree::<I>().expect("valid");
     let of = |row| match tree.node(row).expect("inside the table") {
-        (pin, radius, Link::Children { first, count: 2 }) => {
+        (pin, radius, NodeLink::Children { first, count: 2 }) => {
             Node::Inner { pin, radius: radius * tree.stretch(), children: [first, first + 1] }
         }
-        (pin, _, Link::Leaf { first, count: 1 }) => {
+        (pin, _, NodeLink::Leaf { first, count: 1 }) => {
             let [a, b, c] = tree.corners(TriangleRow(first)).expect("inside the table");
             let corners = if pin == b {
                 [b, c, a]

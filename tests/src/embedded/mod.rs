@@ -7,7 +7,7 @@ mod radii;
 mod receiver;
 mod shapes;
 
-use dibs_nostd::format::Link;
+use dibs_nostd::format::NodeLink;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{Tree, TriangleRow, VertexTable};
 use glam::{DMat3, DVec3, Vec3};
@@ -42,12 +42,12 @@ pub fn sections(tree: &Tree<'_, u16>) -> Vec<Section> {
         let (mut below, mut covered) = (vec![row], Vec::new());
         while let Some(row) = below.pop() {
             match tree.node(row).expect("in the tree").2 {
-                Link::Leaf { first, count } => covered.extend(
+                NodeLink::Leaf { first, count } => covered.extend(
                     (first..first + count)
                         .filter_map(|row| tree.corners(TriangleRow(row)))
                         .flatten(),
                 ),
-                Link::Children { first, count } => below.extend(first..first + count),
+                NodeLink::Children { first, count } => below.extend(first..first + count),
             }
         }
         covered.sort_unstable();

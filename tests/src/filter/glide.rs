@@ -50,13 +50,19 @@ pub struct Glided {
     pub against: u32,
 }
 
-/// Glides near a moving mesh, for this many ticks.
+/// Glides near a moving mesh, for this many ticks, with a stated error of registration (mm).
 ///
 /// # Panics
 /// If the tree cannot be built or a query fails.
 #[must_use]
-pub fn glide(mesh: &Mesh, motion: &Motion, stretch: f32, ticks: u32, seed: u64) -> Glided {
-    glide_told(mesh, motion, stretch, (ticks, seed), &mut ())
+pub fn glide(
+    mesh: &Mesh,
+    motion: &Motion,
+    stretch: f32,
+    (ticks, seed): (u32, u64),
+    registration: f32,
+) -> Glided {
+    glide_told(mesh, motion, stretch, (ticks, seed, registration), &mut ())
 }
 
 /// The same with a listener.
@@ -68,7 +74,7 @@ pub fn glide_told(
     mesh: &Mesh,
     motion: &Motion,
     stretch: f32,
-    (ticks, seed): (u32, u64),
+    (ticks, seed, registration): (u32, u64, f32),
     listener: &mut impl Listener,
 ) -> Glided {
     let built = Builder::new().stretch(stretch).build(mesh).expect("a valid mesh");
@@ -108,7 +114,7 @@ pub fn glide_told(
             listener.frame(&frames[to]);
         }
         let measured = stretches[from].or_larger(stretches[to]).expect("one tree");
-        let uncertainty = Uncertainty::new(tissue);
+        let uncertainty = Uncertainty::new(tissue).error(registration);
         if tick % 700 == 0 {
             // Towards it, along it, away from it.
             outward = (joints[0] - middle).normalize();
@@ -134,7 +140,7 @@ pub fn glide_told(
         let mut pairs = [(one, &surface, &tools[0]), (other, &surface, &tools[1])];
         let admitted =
             filter.admit(&mut pairs, &command, TICK, &uncertainty, &[]).expect("an answer");
-        let (share, radii, tissue) = (Some(share), [RADIUS; 2], [tissue, 0.0, 0.0]);
+        let (share, radii, tissue) = (Some(share), [RADIUS; 2], [tissue, 0.0, registration]);
         listener.tick(&Asked { share, joints, radii, command, tissue, admitted });
         let moved = admitted.motion;
         if tick < 100 {

@@ -3,8 +3,8 @@
 // Requirement: B-03
 
 use dibs_nostd::wire::{
-    AesCmac, Answer, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet,
-    TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_hello, encode_status,
+    AesCmac, Body, Counters, Encoding, Event, FrameEncoder, FrameId, Mac, NoMac, Packet,
+    StatusAnswer, TAG_BYTES, WeightsEncoder, encode_heartbeat, encode_hello, encode_status,
 };
 use dibs_nostd::{
     Assembler, FrameReader, Frames, Millis, NoAdmissionCheck, Progress, ReceiveError, SurfaceFacts,
@@ -231,7 +231,7 @@ fn hellos_and_answers_are_under_the_tag() {
         assert_eq!(assembler.accept(&hello, Millis(7)), Ok(Progress::Hello));
         let status = assembler.status(Millis(7), 1);
         let facts = SurfaceFacts { vertices: N as u32, ..SurfaceFacts::default() };
-        let answer = Answer { nonce: nonce ^ known, challenge: CHALLENGE, surface: facts };
+        let answer = StatusAnswer { nonce: nonce ^ known, challenge: CHALLENGE, surface: facts };
         assert_eq!(status.answer, Some(answer));
         assert_eq!(assembler.status(Millis(7), 1).answer, None, "one answer a hello");
         let packet = encode_status(MESH, &status, assembler.counters(), &mac, &mut buffer).to_vec();

@@ -7,8 +7,8 @@ use std::rc::Rc;
 
 use dibs_nostd::glam::Vec3;
 use dibs_nostd::wire::{
-    Body, Deframer, EncodeError, Encoding, Event, FrameEncoder, Packet, PacketError, QuantisedBox,
-    Rows, StreamError, enframe, framed_bytes,
+    Body, Deframer, EncodeError, Encoding, Event, FrameEncoder, Packet, PacketError, PacketRows,
+    QuantisedBox, StreamError, enframe, framed_bytes,
 };
 use dibs_nostd::{
     Admission, AdmissionCheck, Advance, FrameExtent, IncomingSurface, Millis, Progress,
@@ -339,7 +339,7 @@ fn a_packet_that_is_too_long_is_not_passed_on_cut() {
 fn rows_know_their_number() {
     let frame = frame(1, true);
     let Body::Vertices(vertices) = Packet::decode(&frame[1]).unwrap().body else { panic!() };
-    assert!(matches!(vertices.rows, Rows::Quantised(_)));
+    assert!(matches!(vertices.rows, PacketRows::Quantised(_)));
     assert_eq!((vertices.first, vertices.rows.len()), (0, 7));
     assert!(!vertices.rows.is_empty());
 }

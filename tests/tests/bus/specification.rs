@@ -5,9 +5,9 @@
 use dibs_nostd::format::Unit;
 use dibs_nostd::glam::{Quat, Vec3};
 use dibs_nostd::wire::{
-    AesCmac, Answer, Body, Counters, Encoding, FrameEncoder, FrameId, Freshness, NoMac, Packet,
-    PublishedStatus, QuantisedBox, Status, StatusReport, WeightsEncoder, encode_heartbeat,
-    encode_hello, encode_status, enframe, framed_bytes,
+    AesCmac, Body, Counters, Encoding, FrameEncoder, FrameId, Freshness, NoMac, Packet,
+    PublishedStatus, QuantisedBox, Status, StatusAnswer, StatusReport, WeightsEncoder,
+    encode_heartbeat, encode_hello, encode_status, enframe, framed_bytes,
 };
 use dibs_nostd::{RigidPose, SurfaceFacts};
 
@@ -108,7 +108,7 @@ fn pose() -> RigidPose {
 
 /// The status that answers the hello.
 fn answer() -> Status {
-    let answer = Answer { nonce: NONCE, challenge: CHALLENGE, surface: SURFACE };
+    let answer = StatusAnswer { nonce: NONCE, challenge: CHALLENGE, surface: SURFACE };
     let mut status = Status { number: 7, answer: Some(answer), ..status() };
     status.published.as_mut().unwrap().stretch = None;
     status

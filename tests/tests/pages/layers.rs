@@ -180,15 +180,11 @@ fn imports(package: &str) -> Imports {
     imports
 }
 
-/// The rows of the page. A name in bold is imported in both directions.
+/// The rows of the page.
 fn table(package: &str, imports: &Imports) -> String {
     let mut rows = format!("| {package} | imports from |\n|---|---|\n");
     for (from, to) in imports {
-        let mark = |to: &String| {
-            let is_mutual = imports[to].contains(from);
-            if is_mutual { format!("**{to}**") } else { to.clone() }
-        };
-        let to = to.iter().map(mark).collect::<Vec<_>>().join(", ");
+        let to = to.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
         rows.push_str(&format!("| {from} | {to} |\n"));
     }
     rows + "\n"

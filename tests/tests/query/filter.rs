@@ -15,7 +15,7 @@ use dibs_tests::deform::unit;
 use dibs_tests::filter::{Episode, Tally, glide, scenes, walk};
 use dibs_tests::oracle::{Instrument, exhaustive};
 use dibs_tests::sample;
-use dibs_tests::surfaces::{ball, sheet};
+use dibs_tests::surfaces::{Inexact, ball, sheet};
 use fastrand::Rng;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -82,7 +82,7 @@ fn along_a_wall_it_does_not_brake() {
     let generate::MovingMesh { mesh, motion } = generate::heart(10_272).expect("a valid size");
     let (mut instructions, mut ticks) = (0, 0);
     for seed in 1..4 {
-        let glided = glide(&mesh, &motion, 1.5, 4_000, seed);
+        let glided = glide(&mesh, &motion, 1.5, (4_000, seed), 0.0);
         println!("{glided:?}");
         assert!(glided.free > 1_000 && glided.whole == glided.free);
         assert!(glided.along > 40 && glided.least_along >= 0.95);
@@ -318,6 +318,26 @@ fn a_tool_without_a_command_retreats_from_an_approaching_surface() {
         assert_eq!(admitted.reason, reason, "{admitted:?}");
         let off = admitted.motion.translation - step - Vec3::Z * 0.05;
         assert!(off.length() < 5e-3, "{admitted:?}");
+    }
+}
+
+/// An error of the surface's positions adds to the stand-off, as a stated error of registration does.
+#[test]
+fn an_error_of_the_positions_adds_to_the_stand_off() {
+    let mut bench = Bench::new(&sheet(20, 60.0, |_, _| 0.0), 1.0);
+    let tip = Vec3::new(0.3, 0.2, 2.55);
+    let tool = capsule(tip, tip + Vec3::Z * 40.0);
+    let push = RigidMotion { about: tip, ..RigidMotion::translation(Vec3::Z * -0.2) };
+    let tree = bench.built.tree::<u16>().expect("16-bit indices");
+    let mut tracker = Tracker::<_, MAX_STACK, 256>::new(&tree).expect("deep enough");
+    let (inexact, mut odometer) = (Inexact(&bench.rows, 0.5), Odometer::new(&tree));
+    let surface = odometer.start(&inexact);
+    let mut pairs = [(&mut tracker, &surface, &tool)];
+    let found = bench.filter.admit(&mut pairs, &push, bench.period, &Uncertainty::NONE, &[]);
+    bench.uncertainty = Uncertainty::NONE.error(0.5);
+    for admitted in [found, bench.ask(&tool, &push)] {
+        let step = admitted.expect("an answer").motion.translation.z;
+        assert!((step + 0.05).abs() < 2e-3, "{admitted:?}");
     }
 }
 

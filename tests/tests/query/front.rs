@@ -3,7 +3,7 @@
 // Requirement: T-01
 
 use dibs_build::{Builder, generate};
-use dibs_nostd::format::{Link, MAX_STACK};
+use dibs_nostd::format::{MAX_STACK, NodeLink};
 use dibs_nostd::{Odometer, Options, Sphere, Tracker, Tree};
 use glam::Vec3;
 
@@ -13,8 +13,8 @@ fn covers(tree: &Tree<'_, u16>, front: &[u32]) -> Vec<u32> {
     let mut below = front.to_vec();
     while let Some(row) = below.pop() {
         match tree.node(row).expect("a node").2 {
-            Link::Children { first, count } => below.extend(first..first + count),
-            Link::Leaf { first, count } => {
+            NodeLink::Children { first, count } => below.extend(first..first + count),
+            NodeLink::Leaf { first, count } => {
                 (first..first + count).for_each(|triangle| covers[triangle as usize] += 1);
             }
         }
@@ -50,7 +50,7 @@ fn every_triangle_is_below_one_node_of_the_front() {
     // It reaches leaves, and changes with the motion.
     let leaves = tracker
         .front()
-        .filter(|&row| matches!(tree.node(row).expect("a node").2, Link::Leaf { .. }));
+        .filter(|&row| matches!(tree.node(row).expect("a node").2, NodeLink::Leaf { .. }));
     assert!(leaves.count() > 0 && sizes.iter().any(|&size| size != sizes[0]), "{sizes:?}");
     // A tree of one leaf.
     let small = generate::heart(320).expect("a valid size").mesh;

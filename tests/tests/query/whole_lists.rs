@@ -120,6 +120,46 @@ fn a_budget_leaves_the_closest_pair_of_uncertain_positions() {
     assert!(cut > 300 && several > 100, "{cut} lists cut short, {several} of several contacts");
 }
 
+/// A list that the budget ends while the tool is outside begins with the least separation that is possible, at the closest
+/// pair that was found: it never says less than the answer.
+#[test]
+fn a_list_that_the_budget_ends_has_the_closest_pair_found() {
+    let mesh = generate::heart(10_272).expect("a valid size").mesh;
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let (mut tracker, mut odometer) =
+        (Tracked::new(&tree).expect("deep enough"), Odometer::new(&tree));
+    let mut list = Contacts::<32, 1024>::new();
+    let mut rng = Rng::with_seed(23);
+    let (mut uncertain, mut from, mut along) = (0, Vec3::ZERO, Vec3::X);
+    for tick in 0..sample(40_000) {
+        if tick % 100 == 0 {
+            let at = rng.usize(..rows.len());
+            (from, along) = (rows[at] + rows[at].normalize() * 4.0, unit(&mut rng));
+        }
+        from += unit(&mut rng) * 0.3;
+        let tool = Capsule::new(from, from + along * 40.0, 1.5).expect("finite");
+        let surface = odometer.step(rows.as_slice(), rows.as_slice()).after();
+        let budget =
+            if tick % 100 == 0 { Budget::UNLIMITED } else { Budget::new(rng.u32(20..150)) };
+        let options = Options::new().budget(budget);
+        let tracked = tracker.contacts(&surface, &tool, 5.0, &options, &mut list);
+        let closest = tracked.expect("an answer").closest;
+        if closest.side != Side::Outside || closest.lower > 5.0 {
+            continue;
+        }
+        let first = list.within(5.0).expect("the side is known").next().copied();
+        let truth = query.closest(rows.as_slice(), &tool, &Options::new()).expect("an answer");
+        let separation = first.expect("a contact within the margin").separation;
+        assert!(separation >= closest.lower - closest.accuracy, "{tick}: {separation} {closest:?}");
+        assert!(separation <= truth.separation + truth.accuracy, "{tick}: {separation} {truth:?}");
+        uncertain += u32::from(separation < truth.separation - 0.1);
+    }
+    assert!(uncertain > 50, "{uncertain} lists of an uncertain pair");
+}
+
 /// The tracker's pair is less exact than a query's. Its list is not: it parts the same basins.
 #[test]
 fn a_tracked_list_has_the_contacts_of_a_query() {

@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 
 use dibs_build::{BuildError, Builder, BuiltTree, Construction, IndexWidth, Mesh, Paths, generate};
-use dibs_nostd::format::{Link, MAX_STACK, PathKind};
+use dibs_nostd::format::{MAX_STACK, NodeLink, PathKind};
 use dibs_nostd::{Index, Options, Query, Sphere, Tree, TriangleRow, measure_stretch};
 use dibs_tests::deform::{Deformation, unit};
 use dibs_tests::{stretch, surfaces};
@@ -55,11 +55,11 @@ fn each_node<I: Index>(tree: &Tree<'_, I>, visit: &mut impl FnMut(u32, f64, &[u3
         let mut below = vec![row];
         while let Some(row) = below.pop() {
             match tree.node(row).expect("in the tree").2 {
-                Link::Leaf { first, count } => {
+                NodeLink::Leaf { first, count } => {
                     let rows = (first..first + count).filter_map(|t| tree.corners(TriangleRow(t)));
                     vertices.extend(rows.flatten().map(number));
                 }
-                Link::Children { first, count } => below.extend(first..first + count),
+                NodeLink::Children { first, count } => below.extend(first..first + count),
             }
         }
         visit(number(pin), f64::from(radius), &vertices);

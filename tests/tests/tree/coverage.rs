@@ -9,7 +9,7 @@
 // Requirement: A-02
 
 use dibs_build::{Builder, BuiltTree, Construction, Mesh, Paths};
-use dibs_nostd::format::Link;
+use dibs_nostd::format::NodeLink;
 use dibs_nostd::{Tree, TriangleRow, measure_stretch};
 use fastrand::Rng;
 use glam::Vec3;
@@ -27,12 +27,12 @@ fn spheres(tree: &Tree<'_, u16>) -> Vec<Sphere> {
         let (mut below, mut covered) = (vec![row], Vec::new());
         while let Some(row) = below.pop() {
             match tree.node(row).expect("in the tree").2 {
-                Link::Leaf { first, count } => {
+                NodeLink::Leaf { first, count } => {
                     let corners =
                         (first..first + count).filter_map(|row| tree.corners(TriangleRow(row)));
                     covered.extend(corners.flatten().map(|vertex| vertex as usize));
                 }
-                Link::Children { first, count } => below.extend(first..first + count),
+                NodeLink::Children { first, count } => below.extend(first..first + count),
             }
         }
         covered.sort_unstable();

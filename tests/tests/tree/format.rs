@@ -5,7 +5,7 @@
 // Requirements: A-12, M-01
 
 use dibs_build::{BuildError, Builder, BuiltTree, IndexWidth, Mesh, ReadOptions, Unit, generate};
-use dibs_nostd::format::{CRC, Link, MAX_STACK};
+use dibs_nostd::format::{CRC, MAX_STACK, NodeLink};
 use dibs_nostd::{FormatError, Options, Query, QueryError, Sphere, Tree, TriangleRow};
 use dibs_tests::tree_bytes::{section, with_words, word};
 use fastrand::Rng;
@@ -153,7 +153,7 @@ fn a_leaf_whose_vertices_are_not_at_their_places_is_refused() {
     let table = section(bytes, 2).0;
     let mut refused = 0;
     for row in 0..tree.node_count() {
-        let Some((.., Link::Leaf { first, count })) = tree.node(row) else { continue };
+        let Some((.., NodeLink::Leaf { first, count })) = tree.node(row) else { continue };
         for triangle in first + 1..first + count {
             let [a, b, c] = tree.corners(TriangleRow(triangle)).expect("in the tree");
             let others = (first..first + count).filter(|&t| t != triangle);
@@ -188,7 +188,7 @@ fn a_leaf_whose_triangles_come_too_early_is_refused() {
     let table = section(bytes, 2).0;
     let (mut refused, mut accepted) = (0, 0);
     for row in 0..tree.node_count() {
-        let Some((.., Link::Leaf { first, count })) = tree.node(row) else { continue };
+        let Some((.., NodeLink::Leaf { first, count })) = tree.node(row) else { continue };
         for triangle in first + 1..(first + count).saturating_sub(1) {
             // The next triangle comes before this one.
             let at = table + 6 * triangle as usize;

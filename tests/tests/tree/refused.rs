@@ -4,7 +4,7 @@
 // Requirements: M-01, S-02
 
 use dibs_build::{Builder, BuiltTree, IndexWidth, Mesh, generate};
-use dibs_nostd::format::{Link, MAX_STACK};
+use dibs_nostd::format::{MAX_STACK, NodeLink};
 use dibs_nostd::{FormatError, Index, Query, Tree, TriangleRow};
 use dibs_tests::surfaces::{cuboid, joined, moved, sheet};
 use dibs_tests::tree_bytes::{row_of_section, section, with_words, word};
@@ -84,21 +84,21 @@ fn every_triangle_is_in_one_leaf() {
     let (mut leaves, mut inner) = (Vec::new(), Vec::new());
     for (row, link) in links {
         match link {
-            Link::Leaf { first, count } => leaves.push((first, count, row)),
-            Link::Children { first, count } => inner.push((first, count, row)),
+            NodeLink::Leaf { first, count } => leaves.push((first, count, row)),
+            NodeLink::Children { first, count } => inner.push((first, count, row)),
         }
     }
     leaves.sort_unstable();
     // The last children of all, of one more than there are nodes.
     let &(first, count, row) = inner.iter().max().expect("a root");
-    let more = Link::Children { first, count: count + 1 }.encode();
+    let more = NodeLink::Children { first, count: count + 1 }.encode();
     assert_eq!(
         refusal::<u32>(bytes, &[(link_at(row), more)]),
         FormatError::NodeOrder { node: first }
     );
     // The first leaf with the second's triangles, and the last leaf without its last triangle.
     let [(_, _, row), (second, count, _)] = [leaves[0], leaves[1]];
-    let other = Link::Leaf { first: second, count }.encode();
+    let other = NodeLink::Leaf { first: second, count }.encode();
     assert_eq!(
         refusal::<u32>(bytes, &[(link_at(row), other)]),
         FormatError::Leaf { first: second }
@@ -106,7 +106,7 @@ fn every_triangle_is_in_one_leaf() {
     let &(first, count, row) = leaves.iter().rev().find(|(_, count, _)| *count > 1).expect("one");
     let last = leaves[leaves.len() - 1].0;
     assert_eq!(first, last, "the last leaf has several triangles");
-    let less = Link::Leaf { first, count: count - 1 }.encode();
+    let less = NodeLink::Leaf { first, count: count - 1 }.encode();
     let refused = refusal::<u32>(bytes, &[(link_at(row), less)]);
     assert_eq!(refused, FormatError::Leaf { first: tree.triangle_count() - 1 });
     // A radius above the largest code.
@@ -116,7 +116,7 @@ fn every_triangle_is_in_one_leaf() {
     // A leaf of two triangles in a tree of one.
     let one = triangle();
     let at = section(one.blob(), 1).0 + 4;
-    let two = Link::Leaf { first: 0, count: 2 }.encode();
+    let two = NodeLink::Leaf { first: 0, count: 2 }.encode();
     assert_eq!(refusal::<u16>(one.blob(), &[(at, two)]), FormatError::Leaf { first: 0 });
 }
 

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 use dibs_build::{Builder, Volume, generate};
 use dibs_nostd::Capsule;
-use dibs_nostd::format::Link;
+use dibs_nostd::format::NodeLink;
 
 use super::*;
 
@@ -51,8 +51,8 @@ fn distance(tool: &Capsule, point: Vec3) -> f32 {
 
 fn triangles_below(tree: &Tree<'_, u16>, row: u32) -> Vec<u32> {
     match tree.node(row).unwrap().2 {
-        Link::Leaf { first, count } => (first..first + count).collect(),
-        Link::Children { first, count } => {
+        NodeLink::Leaf { first, count } => (first..first + count).collect(),
+        NodeLink::Children { first, count } => {
             (first..first + count).flat_map(|row| triangles_below(tree, row)).collect()
         }
     }
@@ -100,7 +100,7 @@ fn tested_spheres_are_those_of_opened_nodes() {
             let (pin, radius, link) = session.tree.node(row).unwrap();
             let pin = session.now.surface.position(pin).unwrap();
             let distance = distance(&tool, pin);
-            let Link::Children { first, count } = link else { continue };
+            let NodeLink::Children { first, count } = link else { continue };
             let is_open = (first..first + count).all(|child| set.contains(&child));
             let bound = distance - radius * session.now.stretch.sigma();
             assert!(is_open || bound > answer.axis_distance - 1e-3, "node {row}, tick {tick}");

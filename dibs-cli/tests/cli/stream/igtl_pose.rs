@@ -12,7 +12,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use dibs_build::glam::{DQuat, DVec3, Mat3, Quat, Vec3};
-use dibs_nostd::wire::{Body, Packet, Rows, Vertices};
+use dibs_nostd::wire::{Body, Packet, PacketRows, VertexPacket};
 use dibs_nostd::{RigidPose, Tree};
 
 use super::igtl::{accepted, organ};
@@ -91,7 +91,7 @@ pub fn posed(
                         frame.age_ms = begin.freshness.age_ms;
                     }
                     Body::Pose(sent) => frame.poses.push(sent.unwrap()),
-                    Body::Vertices(Vertices { first, rows: Rows::Float(rows) }) => {
+                    Body::Vertices(VertexPacket { first, rows: PacketRows::Float(rows) }) => {
                         let at = |row: &[u8; 12]| {
                             let (numbers, _) = row.as_chunks::<4>();
                             Vec3::from_slice(

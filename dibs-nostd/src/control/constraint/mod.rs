@@ -39,16 +39,6 @@
 
 // Requirement: C-02
 
-/// `?` in a `const fn`.
-macro_rules! tri {
-    ($result:expr) => {
-        match $result {
-            Ok(value) => value,
-            Err(error) => return Err(error),
-        }
-    };
-}
-
 mod account;
 mod forbidden;
 mod guidance;

@@ -60,7 +60,9 @@ use crate::query::Proximity;
 use crate::surface::{FrameAge, Millis};
 use crate::unavailable::Unavailable;
 
-pub use limits::{LimitError, Limits, Quantity, ThresholdPair};
+#[doc(hidden)]
+pub use limits::Quantity;
+pub use limits::{LimitError, Limits, ThresholdPair};
 pub use link::Link;
 #[cfg(feature = "bus")]
 pub use status::LinkStatus;

@@ -12,7 +12,7 @@ use crate::query::corners::corners;
 use crate::query::made::Tests;
 use crate::query::prices::LIST;
 use crate::query::search::{Search, WaitingNode};
-use crate::query::side::{self, OnAxis};
+use crate::query::side::{self, AxisPlace};
 use crate::query::sides::Side;
 use crate::query::{NoSide, Options, Proximity};
 use crate::tool::AxisPair;
@@ -188,21 +188,30 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         }
         made = made.and(tester.made);
         let is_met = is_crossing || closest.is_at_surface();
-        let is_known = is_side_searched && (is_met || !closest.is_cut_short());
-        // The closest pair is certain then, even if the search was cut short.
-        if is_known
-            && !is_crossing
-            && let Some(contact) = own
-            && !(least <= contact.separation + 2.0 * accuracy)
-        {
-            found.insert(contact);
-        }
-        // For a part without the closest pair, the search has seen the deepest contact if it was completed.
-        found.is_open |= !is_known || !(is_crossing || own.is_some() || beyond >= limit);
         let mut from = smaller(complete, beyond);
         if let Some(missing) = missing.map(sqrt).filter(|&missing| missing < from) {
             from = missing;
         }
+        // A basin's lowest triangle is less than a ridge below the visited low triangle.
+        let bound = if from < limit { from - ridge - tool.radius() } else { f32::INFINITY };
+        let is_certain = is_met || !closest.is_cut_short();
+        let is_deepest_found = least < bound;
+        let is_known = is_side_searched && (is_certain || is_deepest_found || own.is_some());
+        if is_known
+            && !is_crossing
+            && let Some(contact) = own
+        {
+            if is_certain && !(least <= contact.separation + 2.0 * accuracy) {
+                found.insert(contact);
+            } else if !is_certain && !is_deepest_found {
+                // Nothing is deeper than the least separation that an uncertain pair may have.
+                let place = |at: &Contact| (at.surface, at.tool, at.triangle);
+                found.list.retain(|other| place(other) != place(&contact));
+                found.insert(contact);
+            }
+        }
+        // For a part without the closest pair, the search has seen the deepest contact if it was completed.
+        found.is_open |= !is_known || !(is_crossing || own.is_some() || beyond >= limit);
         // If the axis meets the surface at several places, another part of the axis may be inside, less deep.
         if is_crossing && meets > 1 {
             found.lower_bound(closest.lower);
@@ -210,9 +219,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         // The budget ended before the side was known: the tool may be inside, deeper than every pair seen.
         if !is_side_searched {
             found.lower_bound(f32::NEG_INFINITY);
-        } else if from < limit {
-            // A basin's lowest triangle is less than a ridge below the visited low triangle.
-            found.lower_bound(from - ridge - tool.radius());
+        } else {
+            found.lower_bound(bound);
         }
         Ok(made.and(spent))
     }
@@ -347,7 +355,7 @@ impl Proximity {
     ) -> Result<(), QueryError> {
         let on_axis = tool.axis_point(self.axis_parameter);
         let (at, star) =
-            (OnAxis::new(tool, self.axis_parameter), side::star(tree, vertices, self)?);
+            (AxisPlace::new(tool, self.axis_parameter), side::star(tree, vertices, self)?);
         let at = side::of_point(tree, vertices, self, &at, &star, None, u32::MAX)?;
         self.side = at.side;
         if at.outward != Vec3::ZERO {

@@ -189,12 +189,13 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         self.found.list.is_empty()
     }
 
-    /// The contacts, deepest first, for a constraint that acts within `margin` (mm). The deepest is certainly included;
-    /// others may be missing, see [`ContactIter::is_complete`]. Contacts beyond `margin`, from a query with a larger
+    /// The contacts, deepest first, for a constraint that acts within `margin` (mm). None is deeper than the first: if the
+    /// budget ended before the deepest was certain, that is the closest pair found, with the interval's least separation.
+    /// Others may be missing, see [`ContactIter::is_complete`]. Contacts beyond `margin`, from a query with a larger
     /// one, are included too.
     ///
     /// # Errors
-    /// [`Unavailable::CutShort`] if the budget ended before the deepest contact was known, or no query filled the list;
+    /// [`Unavailable::CutShort`] if the budget ended before the side was known, or no query filled the list;
     /// [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin; [`QueryError::Margin`] if
     /// the query's margin was smaller.
     pub fn within(&self, margin: f32) -> Result<ContactIter<'_>, Unavailable> {

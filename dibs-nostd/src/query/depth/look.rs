@@ -9,7 +9,7 @@ use crate::math::order::smaller;
 use crate::query::memory::depth::RememberedDepth;
 use crate::query::prices::TIE;
 use crate::query::search::{Search, UNTIL};
-use crate::query::side::{self, COORDINATES, OnAxis, PointSide};
+use crate::query::side::{self, AxisPlace, COORDINATES, PointSide};
 use crate::query::sides::{NoSide, Side};
 use crate::query::{Options, Proximity};
 use crate::tool::{AxisPoint, Tool};
@@ -169,7 +169,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let at = if is_cut {
             None
         } else {
-            let (at, left) = (OnAxis::new(&point, 0.0), self.options.budget.tests());
+            let (at, left) = (AxisPlace::new(&point, 0.0), self.options.budget.tests());
             Some(side::of_point(tree, vertices, &found, &at, self.ties, many, left)?)
         };
         if let Some(PointSide { work: work @ 1.., .. }) = at {

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use super::clock::{Deadline, MotionClock};
-use crate::tree::format::{Link, MAX_CHILDREN};
+use crate::tree::format::{MAX_CHILDREN, NodeLink};
 
 /// A node whose children (or, for a leaf, whose triangles) have separate bounds.
 #[derive(Clone, Copy, Debug)]
@@ -135,16 +135,17 @@ impl<const OPENED: usize> Front<OPENED> {
         let opened = self.nodes.iter().take(self.end).filter(|opened| opened.link != UNUSED);
         opened.flat_map(|opened| {
             let above = self.nodes.get(usize::from(opened.parent)).map(|above| above.link);
-            let (first, bounded) = match (Link::decode(opened.link), above.map(Link::decode)) {
-                (Link::Children { first, count }, _) => {
-                    (first, !u32::from(opened.apart) & !(u32::MAX << count))
-                }
-                (Link::Leaf { .. }, Some(Link::Children { first, .. })) => {
-                    (first, 1 << opened.slot)
-                }
-                // The root is a leaf.
-                (Link::Leaf { .. }, _) => (0, 1),
-            };
+            let (first, bounded) =
+                match (NodeLink::decode(opened.link), above.map(NodeLink::decode)) {
+                    (NodeLink::Children { first, count }, _) => {
+                        (first, !u32::from(opened.apart) & !(u32::MAX << count))
+                    }
+                    (NodeLink::Leaf { .. }, Some(NodeLink::Children { first, .. })) => {
+                        (first, 1 << opened.slot)
+                    }
+                    // The root is a leaf.
+                    (NodeLink::Leaf { .. }, _) => (0, 1),
+                };
             (0..MAX_CHILDREN)
                 .filter(move |slot| bounded >> slot & 1 == 1)
                 .map(move |slot| first + slot)

@@ -5,7 +5,7 @@
 //! passed. Opened nodes stay open until no slot is free; then the front restarts.
 
 use super::clock::{Deadline, MotionClock, Reading};
-use crate::tree::format::{Link, MAX_CHILDREN};
+use crate::tree::format::{MAX_CHILDREN, NodeLink};
 
 /// After a motion of more units than this, a 16th to a 32nd of the root sphere's radius, the front restarts.
 const JUMP: u32 = 1 << 20;
@@ -107,7 +107,7 @@ impl RangeFrontMut<'_> {
         for first in (0..roots).step_by(MAX_CHILDREN as usize) {
             let rest = roots - first;
             let count = if rest < MAX_CHILDREN { rest } else { MAX_CHILDREN };
-            self.open(Link::Children { first, count }.encode(), now)?;
+            self.open(NodeLink::Children { first, count }.encode(), now)?;
         }
         Some(())
     }

@@ -17,7 +17,7 @@ use crate::math::sqrt::sqrt;
 use crate::query::memory::leaves::{Leaf, Leaves};
 use crate::query::plane::least;
 use crate::query::prices::LEAF_PLANE;
-use crate::tree::format::Link;
+use crate::tree::format::NodeLink;
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
@@ -46,7 +46,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if leaf.bound - moved > self.cutoff + self.coordinate_slack {
                 continue;
             }
-            let Link::Leaf { first, count } = Link::decode(leaf.link) else {
+            let NodeLink::Leaf { first, count } = NodeLink::decode(leaf.link) else {
                 return Err(QueryError::Corrupt { row: leaf.link });
             };
             let Some(bound) = self.leaf_bound(first, count, price)? else {
@@ -86,9 +86,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if lower > self.cutoff + wider {
                 continue;
             }
-            let (first, count) = match Link::decode(link) {
-                Link::Leaf { first, count } => (first, count),
-                Link::Children { first, count } => {
+            let (first, count) = match NodeLink::decode(link) {
+                NodeLink::Leaf { first, count } => (first, count),
+                NodeLink::Children { first, count } => {
                     if self.meter.nodes(count).is_none() {
                         return self.leave(WaitingNode { lower, link }, wider, leaves, waiting);
                     }

@@ -12,7 +12,7 @@ use crate::query::made::Tests;
 use crate::query::prices::{CHILD, LIST};
 use crate::tool::{AxisPair, Tool};
 use crate::tree::MAX_RING;
-use crate::tree::format::Link;
+use crate::tree::format::NodeLink;
 use crate::unavailable::QueryError;
 use crate::{Budget, Index, Options, VertexTable};
 
@@ -118,20 +118,20 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if lower > self.cutoff {
                 continue;
             }
-            let link = Link::decode(link);
-            let (Link::Children { count, .. } | Link::Leaf { count, .. }) = link;
+            let link = NodeLink::decode(link);
+            let (NodeLink::Children { count, .. } | NodeLink::Leaf { count, .. }) = link;
             let price = match link {
-                Link::Children { .. } if heights.is_priced => (1 + CHILD) * count,
-                Link::Children { .. } => count,
-                Link::Leaf { .. } => heights.price_of(count),
+                NodeLink::Children { .. } if heights.is_priced => (1 + CHILD) * count,
+                NodeLink::Children { .. } => count,
+                NodeLink::Leaf { .. } => heights.price_of(count),
             };
             let is_done = self.meter.nodes(price).is_some()
                 && match link {
-                    Link::Children { first, count } => {
+                    NodeLink::Children { first, count } => {
                         self.expand::<RANGE>(lower, first, count, 0.0)?;
                         true
                     }
-                    Link::Leaf { first, count } => {
+                    NodeLink::Leaf { first, count } => {
                         self.visit_low(first, count, ridge, heights, visit)?.is_some()
                     }
                 };

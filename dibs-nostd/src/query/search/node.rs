@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{Search, WaitingNode};
 use crate::math::sqrt::sqrt;
-use crate::tree::format::{Link, Node};
+use crate::tree::format::{Node, NodeLink};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, VertexTable};
 
@@ -94,7 +94,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             // it rejects no leaf whose pin is within the range.
             if KIND != AROUND
                 && (KIND == CLOSEST || squared > self.cutoff_squared)
-                && let Link::Leaf { first, count } = Link::decode(node.link)
+                && let NodeLink::Leaf { first, count } = NodeLink::decode(node.link)
                 && (KIND == RANGE || self.meter.node().is_some())
             {
                 let plane = self.plane_across(normal, position, distance);

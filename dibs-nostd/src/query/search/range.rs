@@ -16,7 +16,7 @@ use crate::query::memory::clock::Deadline;
 use crate::query::memory::range::{RangeFrontMut, RangeNode};
 use crate::query::prices::{CHILD_PLANE, LIST, PASSED, VISIT};
 use crate::tool::{AxisPair, Tool};
-use crate::tree::format::Link;
+use crate::tree::format::NodeLink;
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
@@ -79,7 +79,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let margin = self.slack + self.coordinate_slack;
         let later = |bound: f32| node.deadline.or_later(clock.deadline(bound - margin));
         let RangeNode { link, mut opened, mut near, .. } = node;
-        let Link::Children { first, count } = Link::decode(link) else {
+        let NodeLink::Children { first, count } = NodeLink::decode(link) else {
             return Err(QueryError::Corrupt { row: 0 });
         };
         let corrupt = QueryError::Corrupt { row: first };
@@ -102,8 +102,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             let mut deadline = later(own);
             // NaN counts as near: the leaves below report the vertex that it comes from.
             if !(own > self.cutoff) {
-                match Link::decode(child.link) {
-                    Link::Children { .. } => {
+                match NodeLink::decode(child.link) {
+                    NodeLink::Children { .. } => {
                         if front.open(child.link, deadline).is_some() {
                             opened |= bit;
                             continue;
@@ -112,11 +112,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                         self.push(0, subtree).ok_or(corrupt)?;
                     }
                     // Without a test of its plane it counts as near.
-                    Link::Leaf { .. } if self.pay(is_priced, 1 + CHILD_PLANE).is_none() => {
+                    NodeLink::Leaf { .. } if self.pay(is_priced, 1 + CHILD_PLANE).is_none() => {
                         near |= bit;
                         continue;
                     }
-                    Link::Leaf { first, count } => {
+                    NodeLink::Leaf { first, count } => {
                         let plane = self.plane_across(normal, position, distance);
                         let excess =
                             plane.excess(tree, self.vertices, first, count).ok_or(corrupt)?;
@@ -151,13 +151,15 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         let margin = self.slack + self.coordinate_slack;
         let corrupt = QueryError::Corrupt { row: 0 };
         let node = front.node_mut(at).ok_or(corrupt)?;
-        let Link::Children { first, .. } = Link::decode(node.link) else { return Err(corrupt) };
+        let NodeLink::Children { first, .. } = NodeLink::decode(node.link) else {
+            return Err(corrupt);
+        };
         let mut near = node.near;
         while near != 0 {
             let slot = near.trailing_zeros();
             near &= near - 1;
             let child = tree.whole_record(first + slot).ok_or(corrupt)?;
-            let Link::Leaf { first, count } = Link::decode(child.link) else {
+            let NodeLink::Leaf { first, count } = NodeLink::decode(child.link) else {
                 return Err(corrupt);
             };
             if self.meter.nodes(heights.price_of(count)).is_none() {
@@ -196,7 +198,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if node.near == 0 {
                 continue;
             }
-            let Link::Children { first, count } = Link::decode(node.link) else { continue };
+            let NodeLink::Children { first, count } = NodeLink::decode(node.link) else { continue };
             let corrupt = QueryError::Corrupt { row: first };
             let children = self.tree.records(first, count).ok_or(corrupt)?;
             for (_, child) in children.enumerate().filter(|(slot, _)| node.near >> slot & 1 == 1) {

@@ -24,7 +24,7 @@ use crate::query::memory::clock::{Deadline, MotionClock};
 use crate::query::memory::front::{ChildSlot, FrontMut, NOWHERE, UNUSED};
 use crate::query::prices::{CHILD_PLANE, TRIANGLE, VISIT};
 use crate::surface::motion::FAR;
-use crate::tree::format::{Link, Node};
+use crate::tree::format::{Node, NodeLink};
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, TriangleRow, VertexTable};
 
@@ -200,8 +200,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
 
     #[inline(always)]
     fn record(&mut self, place: ChildSlot) -> Option<Node> {
-        match Link::decode(self.front.node(place.node)?.link) {
-            Link::Children { first, count } if u32::from(place.slot) < count => {
+        match NodeLink::decode(self.front.node(place.node)?.link) {
+            NodeLink::Children { first, count } if u32::from(place.slot) < count => {
                 self.search.tree.whole_record(first + u32::from(place.slot))
             }
             _ => None,
@@ -224,14 +224,14 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         if self.is_priced && self.search.meter.nodes(VISIT).is_none() {
             return Ok(Expansion::OutOfBudget);
         }
-        let (step, count) = match Link::decode(opened.link) {
+        let (step, count) = match NodeLink::decode(opened.link) {
             // A free slot becomes due after `FAR` units of motion; it is rescheduled.
             _ if opened.link == UNUSED => (Expansion::Done, 0),
-            Link::Children { first, count } => {
+            NodeLink::Children { first, count } => {
                 let due = opened.due(count, threshold);
                 (self.test_children(at, first, due)?, count)
             }
-            Link::Leaf { first, count } => {
+            NodeLink::Leaf { first, count } => {
                 let due = opened.due(count, threshold);
                 let price = TRIANGLE * due.count_ones();
                 if self.is_priced && self.search.meter.nodes(price).is_none() {
@@ -270,7 +270,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
             if own > search.cutoff {
                 continue;
             }
-            if let Link::Leaf { first, count } = Link::decode(node.link)
+            if let NodeLink::Leaf { first, count } = NodeLink::decode(node.link)
                 && search.meter.nodes(if is_priced { 1 + CHILD_PLANE } else { 1 }).is_some()
             {
                 let plane = search.plane_across(normal, position, distance);

@@ -15,7 +15,7 @@ use super::{Search, WaitingNode};
 use crate::math::sqrt::sqrt;
 use crate::query::made::Tests;
 use crate::tool::Tool;
-use crate::tree::format::Link;
+use crate::tree::format::NodeLink;
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
@@ -167,12 +167,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if lower > self.cutoff {
                 continue;
             }
-            let link = Link::decode(link);
-            let (Link::Children { first, count } | Link::Leaf { first, count }) = link;
+            let link = NodeLink::decode(link);
+            let (NodeLink::Children { first, count } | NodeLink::Leaf { first, count }) = link;
             if self.meter.nodes(count).is_none() {
                 return Ok((false, self.meter.made()));
             }
-            if let Link::Children { .. } = link {
+            if let NodeLink::Children { .. } = link {
                 self.expand::<RANGE>(lower, first, count, 0.0)?;
                 continue;
             }

@@ -19,7 +19,7 @@ use super::{Expansion, Search, WaitingNode};
 use crate::math::sqrt::sqrt;
 use crate::math::vec3x4::{Vec3x4, roots};
 use crate::tree::format::several::four_nodes;
-use crate::tree::format::{Link, MAX_CHILDREN, node_bytes};
+use crate::tree::format::{MAX_CHILDREN, NodeLink, node_bytes};
 use crate::unavailable::QueryError;
 use crate::{Index, Proximity, Tool, VertexTable};
 
@@ -69,13 +69,13 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         while let Some(top) = self.search.waiting.checked_sub(1) {
             let corrupt = QueryError::Corrupt { row: top as u32 };
             let &WaitingNode { lower, link } = self.search.stack.get(top).ok_or(corrupt)?;
-            let step = match Link::decode(link) {
-                Link::Children { .. } => self.expand_batch(),
-                Link::Leaf { .. } if lower > self.search.cutoff => {
+            let step = match NodeLink::decode(link) {
+                NodeLink::Children { .. } => self.expand_batch(),
+                NodeLink::Leaf { .. } if lower > self.search.cutoff => {
                     self.search.waiting = top;
                     continue;
                 }
-                Link::Leaf { first, count } => {
+                NodeLink::Leaf { first, count } => {
                     self.search.waiting = top;
                     self.search.leaf_at_once(first, count)
                 }
@@ -113,7 +113,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
         let (mut subtrees, mut children) = (0, 0);
         let from = search.waiting.saturating_sub(SUBTREES);
         for &WaitingNode { lower, link } in search.stack.get(from..search.waiting)?.iter().rev() {
-            let Link::Children { first, count } = Link::decode(link) else { break };
+            let NodeLink::Children { first, count } = NodeLink::decode(link) else { break };
             let all = children + count as usize;
             if subtrees > 0 && search.waiting + all > *room + subtrees + 1 {
                 break;

@@ -16,7 +16,7 @@ use crate::format::MAX_STACK;
 use crate::query::distances::{distance, least};
 use crate::query::memory::clock::Deadline;
 use crate::query::memory::front::{NOWHERE, UNUSED};
-use crate::tree::format::Link;
+use crate::tree::format::NodeLink;
 use crate::{
     Budget, Capsule, Contacts, Coverage, MotionReading, MovingSurface, Odometer, Options, Query,
     Side, Sphere, Tree, VertexTable, measure_stretch,
@@ -46,13 +46,13 @@ fn bounds<const STACK: usize, const OPENED: usize>(
             continue;
         }
         assert!((node.parent == NOWHERE) == (place == 0), "{node:?}");
-        let (first, count, is_leaf) = match Link::decode(node.link) {
-            Link::Children { first, count } => (first, count, false),
-            Link::Leaf { first, count } => (first, count, true),
+        let (first, count, is_leaf) = match NodeLink::decode(node.link) {
+            NodeLink::Children { first, count } => (first, count, false),
+            NodeLink::Leaf { first, count } => (first, count, true),
         };
         for slot in (0..count).filter(|slot| node.apart & 1 << slot == 0) {
             let link = if is_leaf {
-                Link::Leaf { first: first + slot, count: 1 }
+                NodeLink::Leaf { first: first + slot, count: 1 }
             } else {
                 tree.node(first + slot).expect("a node").2
             };

@@ -3,10 +3,8 @@
 use glam::Vec3;
 
 use super::{RigidPose, Turn};
+use crate::math::round::U;
 use crate::math::sqrt::sqrt;
-
-/// Half a unit in the last place of one.
-const HALF_UNIT: f32 = 1.0 / 16_777_216.0;
 
 /// Sine of half the largest angle (0.5 rad) of an extrapolated step.
 pub(super) const MOST_SINE: f32 = 0.247_404;
@@ -28,7 +26,7 @@ impl RigidPose {
         let moved = length(shifted) + chord * lever;
         // The relative quaternion has an error of 7 half units, so the chord has 14; the centre's arm has the same plus
         // the rounding of two rotations.
-        moved * (1.0 + 16.0 * HALF_UNIT) + (lever + length(centre)) * (64.0 * HALF_UNIT)
+        moved * (1.0 + 16.0 * U) + (lever + length(centre)) * (64.0 * U)
     }
 
     /// Upper bound (mm) on the rounding of a point from [`apply_inverse`](Self::apply_inverse), for a pose as received.
@@ -37,7 +35,7 @@ impl RigidPose {
     /// first cross product has an error of 3, the second of 7, both together with the factor before them less than 30;
     /// the sum and the difference before add one each.
     pub(crate) fn rounding(local: Vec3) -> f32 {
-        size(local) * (34.0 * HALF_UNIT)
+        size(local) * (34.0 * U)
     }
 }
 
@@ -104,7 +102,7 @@ impl PoseStep {
             return turned;
         }
         let parts = 168.0 * size(self.centre) + 4.0 * (size(pose.shift) + size(self.shifted));
-        turned + parts * HALF_UNIT
+        turned + parts * U
     }
 
     /// The same for a vector, which the shift does not change.
@@ -112,7 +110,7 @@ impl PoseStep {
         if part == 0.0 {
             return RigidPose::rounding(local);
         }
-        size(local) * (100.0 * HALF_UNIT)
+        size(local) * (100.0 * U)
     }
 
     /// The velocity (mm per step time) of a mesh point at `point`, at this fraction of the step beyond its end.

@@ -184,7 +184,7 @@ impl PathKind {
 
 /// A node's children, or a leaf's triangles, as a range of rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Link {
+pub enum NodeLink {
     /// Rows `first..first + count` of the node table.
     Children {
         /// First row.
@@ -205,7 +205,7 @@ const LEAF_BIT: u32 = 1 << 31;
 const COUNT_SHIFT: u32 = 28;
 const FIRST_MASK: u32 = (1 << COUNT_SHIFT) - 1;
 
-impl Link {
+impl NodeLink {
     /// The stored link: bit 31 marks a leaf, bits 28 to 30 hold `count - 1`, bits 0 to 27 `first`.
     #[must_use]
     pub const fn encode(self) -> u32 {
@@ -216,7 +216,7 @@ impl Link {
         mark | ((count.wrapping_sub(1) & 7) << COUNT_SHIFT) | (first & FIRST_MASK)
     }
 
-    /// The inverse of [`Link::encode`].
+    /// The inverse of [`NodeLink::encode`].
     #[inline(always)]
     #[must_use]
     pub const fn decode(word: u32) -> Self {

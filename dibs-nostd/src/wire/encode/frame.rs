@@ -50,13 +50,13 @@ pub struct FrameEncoder<'a, T: ?Sized, const MTU: usize, M = NoMac> {
     held: Option<&'a T>,
     pose: Option<RigidPose>,
     mac: M,
-    next: Next,
+    next: NextPacket,
     sequence: u16,
     digest: u32,
 }
 
 #[derive(Debug)]
-enum Next {
+enum NextPacket {
     Begin,
     Pose(RigidPose),
     Vertices { first: u32 },
@@ -84,7 +84,7 @@ impl<'a, T: VertexTable + ?Sized, const MTU: usize> FrameEncoder<'a, T, MTU> {
         let (session, freshness) = (id.session, Freshness::default());
         let (content, surface) = (Content::Whole, SurfaceFacts::default());
         let begin = Begin { session, content, encoding, rows, surface, freshness, is_posed: false };
-        let (held, pose, next) = (None, None, Next::Begin);
+        let (held, pose, next) = (None, None, NextPacket::Begin);
         let frame =
             Self { id, begin, positions, held, pose, mac: NoMac, next, sequence: 0, digest: 0 };
         frame.fits()
@@ -176,14 +176,14 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
     /// Writes the next packet to the buffer; `None` after the commit.
     pub fn next_packet<'b>(&mut self, buffer: &'b mut [u8; MTU]) -> Option<&'b [u8]> {
         let first = match self.next {
-            Next::Begin => {
+            NextPacket::Begin => {
                 let packet = begin_packet::<M>(buffer, &self.id, &self.begin);
                 let (packet, contribution) = packet.finish(&self.mac, self.id.session);
                 self.digest = contribution;
-                self.next = self.pose.map_or_else(|| self.vertices_from(0), Next::Pose);
+                self.next = self.pose.map_or_else(|| self.vertices_from(0), NextPacket::Pose);
                 return Some(packet);
             }
-            Next::Pose(pose) => {
+            NextPacket::Pose(pose) => {
                 self.sequence = self.sequence.wrapping_add(1);
                 let mut packet = self.packet(buffer, kind::POSE, 0, 0);
                 for number in pose.rotation().to_array().iter().chain(&pose.shift().to_array()) {
@@ -194,15 +194,15 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
                 self.next = self.vertices_from(0);
                 return Some(packet);
             }
-            Next::Vertices { first } => first,
-            Next::Commit => {
+            NextPacket::Vertices { first } => first,
+            NextPacket::Commit => {
                 self.sequence = self.sequence.wrapping_add(1);
                 let mut packet = self.packet(buffer, kind::COMMIT, 0, 0);
                 packet.put(&self.digest.to_le_bytes());
-                self.next = Next::Done;
+                self.next = NextPacket::Done;
                 return Some(packet.finish(&self.mac, self.id.session).0);
             }
-            Next::Done => return None,
+            NextPacket::Done => return None,
         };
         self.sequence = self.sequence.wrapping_add(1);
         let end = self.end_of_run(first);
@@ -244,10 +244,10 @@ impl<T: VertexTable + ?Sized, M: Mac, const MTU: usize> FrameEncoder<'_, T, MTU,
     }
 
     /// The next packet: vertices from the first row at or after this one that must be sent, or the commit.
-    fn vertices_from(&self, row: u32) -> Next {
+    fn vertices_from(&self, row: u32) -> NextPacket {
         match (row..self.begin.rows).find(|&row| self.must_be_sent(row)) {
-            Some(first) => Next::Vertices { first },
-            None => Next::Commit,
+            Some(first) => NextPacket::Vertices { first },
+            None => NextPacket::Commit,
         }
     }
 

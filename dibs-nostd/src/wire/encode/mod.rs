@@ -14,9 +14,9 @@ use super::checksum::{checksum, scrambled};
 use super::fields::Bytes;
 use super::packet::{HAS_ECHO, HAS_POSE, STATUS_BYTES};
 use super::{
-    Answer, Begin, CHECKSUM_BYTES, Content, Counters, Direction, Encoding, FrameId, HEADER_BYTES,
-    MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, Status, TAG_BYTES, VERSION, kind,
-    padded,
+    Begin, CHECKSUM_BYTES, Content, Counters, Direction, Encoding, FrameId, HEADER_BYTES,
+    MAX_CONTENT_PACKETS, MAX_ROWS, MAX_WEIGHTS, MIN_MTU, Mac, Status, StatusAnswer, TAG_BYTES,
+    VERSION, kind, padded,
 };
 use crate::tree::{SurfaceFacts, Unit};
 
@@ -87,7 +87,7 @@ pub fn encode_status<'b, M: Mac, const MTU: usize>(
     packet.put(&[flags, status.safety]);
     packet.put(&status.number.to_le_bytes());
     packet.put(&age_ms.to_le_bytes());
-    if let Some(Answer { nonce, challenge, surface }) = &status.answer {
+    if let Some(StatusAnswer { nonce, challenge, surface }) = &status.answer {
         packet.put(&nonce.to_le_bytes());
         packet.put(&challenge.to_le_bytes());
         packet.surface(surface);

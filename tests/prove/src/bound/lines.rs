@@ -21,6 +21,17 @@ impl Frame {
         format!("{} {file}:{}", self.bare(), self.line)
     }
 
+    /// The file below the folder of the language's `core`, the line and the name of a function of it. Lines of its macros in
+    /// other functions are not of it; a closure is of the function around it.
+    pub fn in_core(&self) -> Option<(&str, u32, &str)> {
+        let (_, file) = self.file.split_once("/library/core/src/")?;
+        let name = self.bare();
+        let path = self.name.split('<').next().unwrap_or_default();
+        let is_of_core = path.starts_with("core::") || !path.contains("::");
+        (is_of_core && !name.is_empty() && !name.starts_with('{'))
+            .then_some((file, self.line, name))
+    }
+
     /// The name without path and generic arguments.
     pub fn bare(&self) -> &str {
         let name = self.name.split('<').next().unwrap_or_default();

@@ -9,6 +9,7 @@ use anyhow::{Context, Result, ensure};
 use xtask::toolchain::Cross;
 use xtask::{qemu, workspace};
 
+use super::core_items::{Item, items, section};
 use super::depth::TRACKED_DEPTH;
 use super::facts::{Facts, MODAL, ONLY_FROM};
 use super::follow::{Traced, faults, planted_in_queries, trace};
@@ -47,6 +48,8 @@ pub struct Findings {
     /// Number of planted errors, and of those that were not found.
     pub planted: usize,
     pub unnoticed: usize,
+    /// Functions of the language's `core` in a tick with side and depth.
+    pub core: Vec<Item>,
     /// Time of the proof itself, in seconds.
     pub seconds: f64,
 }
@@ -75,11 +78,12 @@ pub fn findings([probe, tracker]: [&Path; 2], queries: usize, traces: usize) -> 
         let decoded = proven.decoded(tracker)?;
         rows.push(Row { proven, counted, traced, decoded });
     }
+    let core = items(&rows.last().context("no tick")?.proven.analysis)?;
     let found = faults().map(|(kind, fault)| planted_in_queries(kind, probe, &fault));
     let found: Vec<_> = found.chain(ticks::faults(tracker)).collect::<Result<_>>()?;
     let found = found.as_flattened();
     let unnoticed = found.iter().filter(|is_found| !**is_found).count();
-    Ok(Findings { rows, planted: found.len(), unnoticed, seconds })
+    Ok(Findings { rows, planted: found.len(), unnoticed, core, seconds })
 }
 
 /// Runs the task.
@@ -251,5 +255,6 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
             "- to `{callee}` but from `{caller}`: checked, since its facts are of those calls"
         )?;
     }
+    section(&mut text, &findings.core)?;
     Ok(text)
 }

@@ -51,6 +51,17 @@ macro_rules! promises {
                 limits: "",
             },
             Promise {
+                id: "bound.core.unlisted",
+                says: "Functions of the language's `core` in a tick of which it is not known whether the certified subset has them",
+                criterion: FLOW,
+                bound: Bound::Is(0.0),
+                unit: "of {bound.core.items}; {bound.core.outside} are known to be outside of it",
+                limits: "A tick with side and depth. The subset is Ferrocene's for Rust 1.95, by `core_subset.txt`; nothing here claims \
+                         certification.",
+            },
+            note("bound.core.items"),
+            note("bound.core.outside"),
+            Promise {
                 id: "bound.sphere.ratio",
                 says: "The proven constants beside the typical ones of `Cost`, sphere",
                 criterion: TIMING,
@@ -157,6 +168,15 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     figures.note("bound.broken", sum(|row| row.traced.broken.len()));
     figures.note("bound.planted", found.planted as f64);
     figures.note("bound.unnoticed", found.unnoticed as f64);
+    let count = |is_certified| {
+        found.core.iter().filter(|item| item.is_certified == is_certified).count() as f64
+    };
+    for item in found.core.iter().filter(|item| item.is_certified.is_none()) {
+        println!("core_subset.txt lacks {} {}", item.file, item.name);
+    }
+    figures.note("bound.core.items", found.core.len() as f64);
+    figures.note("bound.core.unlisted", count(None));
+    figures.note("bound.core.outside", count(Some(false)));
     for Row { proven, .. } in &found.rows {
         let id = proven.kind.id;
         if let Some(ratios) = proven.ratios() {

@@ -4,14 +4,13 @@
 // Requirement: T-02
 
 use anyhow::Result;
-use dibs_nostd::Budget;
 use xtask::steps::Outcome;
 
 use super::bounded::force::steps;
 use super::bounded::rows::{DEARER, HUMAN, Row, TICKS};
 use super::bounded::scene::truth;
-use super::bounded::tally::run;
-use super::bounded::{largest, width};
+use super::bounded::tally::{AMPLE, run};
+use super::bounded::{COUNTED, IDLE, largest, width};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
 use crate::harness::{Check, Effort};
@@ -33,13 +32,14 @@ pub const CHECK: Check = Check {
             ..width(
                 "dearer.fast.95",
                 "At twice the instrument's speed, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
-                "mm; 99 %: {dearer.fast.99}, largest {dearer.fast.largest}; in or crossing, 95 %: {dearer.fast.inner}; pair off the deepest and turned: {dearer.fast.turned} %",
+                "mm; 99 %: {dearer.fast.99}, largest {dearer.fast.largest}; in or crossing, 95 %: {dearer.fast.inner}; pair off the deepest and turned: {dearer.fast.turned} %, without a budget {dearer.fast.uncut.turned} %",
                 Bound::Informs,
             )
         },
         note("dearer.fast.99"),
         note("dearer.fast.largest"),
         note("dearer.fast.turned"),
+        note("dearer.fast.uncut.turned"),
         note("dearer.fast.inner"),
         steps(
             "dearer.fast.size",
@@ -52,24 +52,26 @@ pub const CHECK: Check = Check {
         largest(
             "dearer.fast.instructions",
             "On the board the largest of these ticks takes",
-            "instructions with {dearer.fast.tests} tests; the mean one {dearer.fast.mean}, the median of those that use the budget up {dearer.fast.spent}",
+            "instructions with {dearer.fast.tests} tests; the mean one {dearer.fast.mean}, the median of those that use the budget up {dearer.fast.spent}; without a budget 95 % of the ticks near the wall make at most {dearer.fast.uncut.tests} tests",
             60_000.0,
         ),
         note("dearer.fast.mean"),
         note("dearer.fast.tests"),
         note("dearer.fast.spent"),
+        note("dearer.fast.uncut.tests"),
         Promise {
             limits: GOAL,
             ..width(
                 "dearer.large.95",
                 "On a heart of 40,000 triangles, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
-                "mm; 99 %: {dearer.large.99}, largest {dearer.large.largest}; in or crossing, 95 %: {dearer.large.inner}; pair off the deepest and turned: {dearer.large.turned} %",
+                "mm; 99 %: {dearer.large.99}, largest {dearer.large.largest}; in or crossing, 95 %: {dearer.large.inner}; pair off the deepest and turned: {dearer.large.turned} %, without a budget {dearer.large.uncut.turned} %",
                 Bound::Informs,
             )
         },
         note("dearer.large.99"),
         note("dearer.large.largest"),
         note("dearer.large.turned"),
+        note("dearer.large.uncut.turned"),
         note("dearer.large.inner"),
         steps(
             "dearer.large.size",
@@ -82,12 +84,13 @@ pub const CHECK: Check = Check {
         largest(
             "dearer.large.instructions",
             "On the board the largest of these ticks takes",
-            "instructions with {dearer.large.tests} tests; the mean one {dearer.large.mean}, the median of those that use the budget up {dearer.large.spent}",
+            "instructions with {dearer.large.tests} tests; the mean one {dearer.large.mean}, the median of those that use the budget up {dearer.large.spent}; without a budget 95 % of the ticks near the wall make at most {dearer.large.uncut.tests} tests",
             60_000.0,
         ),
         note("dearer.large.mean"),
         note("dearer.large.tests"),
         note("dearer.large.spent"),
+        note("dearer.large.uncut.tests"),
     ],
 };
 
@@ -105,13 +108,14 @@ pub const OF_HUMAN: Check = Check {
             ..width(
                 "dearer.human.95",
                 "On a human heart, within 60,000 instructions: the interval's width at 95 % of the ticks near the wall",
-                "mm; 99 %: {dearer.human.99}, largest {dearer.human.largest}; in or crossing, 95 %: {dearer.human.inner}; pair off the deepest and turned: {dearer.human.turned} %",
+                "mm; 99 %: {dearer.human.99}, largest {dearer.human.largest}; in or crossing, 95 %: {dearer.human.inner}; pair off the deepest and turned: {dearer.human.turned} %, without a budget {dearer.human.uncut.turned} %",
                 Bound::Informs,
             )
         },
         note("dearer.human.99"),
         note("dearer.human.largest"),
         note("dearer.human.turned"),
+        note("dearer.human.uncut.turned"),
         note("dearer.human.inner"),
         steps(
             "dearer.human.size",
@@ -124,18 +128,19 @@ pub const OF_HUMAN: Check = Check {
         largest(
             "dearer.human.instructions",
             "On the board the largest of these ticks takes",
-            "instructions with {dearer.human.tests} tests; the mean one {dearer.human.mean}, the median of those that use the budget up {dearer.human.spent}",
+            "instructions with {dearer.human.tests} tests; the mean one {dearer.human.mean}, the median of those that use the budget up {dearer.human.spent}; without a budget 95 % of the ticks near the wall make at most {dearer.human.uncut.tests} tests",
             60_000.0,
         ),
         note("dearer.human.mean"),
         note("dearer.human.tests"),
         note("dearer.human.spent"),
+        note("dearer.human.uncut.tests"),
     ],
 };
 
 /// What a dearer tick was meant to reach.
 const GOAL: &str = "The goal at 60,000 was 0.35 mm at 95 %: not reached. The motion of a tick, or the triangles near the axis, need more tests \
-     than the budget has. Tried, and in: prices for all work, by which the same instructions buy more tests, and the whole budget \
+     than the budget has: how many stands at the largest tick. Tried, and in: prices for all work, by which the same instructions buy more tests, and the whole budget \
      for the closest pair until a depth is known.";
 
 const fn wrong(id: &'static str, unit: &'static str) -> Promise {
@@ -156,7 +161,7 @@ const fn damped(id: &'static str, unit: &'static str) -> Promise {
         criterion: TIMING,
         bound: Bound::Is(0.0),
         unit,
-        limits: "After 100 ticks, and after 100 from each leap.",
+        limits: COUNTED,
     }
 }
 
@@ -167,7 +172,7 @@ const fn idle(id: &'static str, unit: &'static str) -> Promise {
         criterion: TIMING,
         bound: Bound::Is(0.0),
         unit,
-        limits: "Left is what covers the dearest step, 40 tests.",
+        limits: IDLE,
     }
 }
 
@@ -189,8 +194,9 @@ fn measure(rows: &[Row], name: &str, figures: &mut Figures) -> Result<Outcome> {
         };
         let truth = truth(&scene);
         let tally = run(&scene, &truth, row.budget()?);
-        let uncut = run(&scene, &truth, Budget::UNLIMITED);
-        uncut.steps.note_force(&format!("{}.uncut", row.name), figures);
+        let uncut = run(&scene, &truth, AMPLE);
+        uncut.note_uncut(row.name, figures);
+        figures.note(&format!("{}.uncut.tests", row.name), uncut.usual_tests());
         tally.note(row.name, figures);
         row.note_board(&scene, &tally.work, figures)?;
         wrong += tally.wrong;

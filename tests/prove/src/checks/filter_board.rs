@@ -120,7 +120,7 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let built = Builder::new().stretch(HEART.1).build(&mesh)?;
     for seed in 0..effort.board_glides {
         let mut script = Script::new(&built, true);
-        let settings = (effort.board_glide_ticks, seed + 11);
+        let settings = (effort.board_glide_ticks, seed + 11, 0.0);
         let _ = glide_told(&mesh, &motion, HEART.1, settings, &mut script);
         let ticks = ask(&script)?;
         compare(&ticks);

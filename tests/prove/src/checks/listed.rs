@@ -97,7 +97,7 @@ pub const CHECK: Check = Check {
 const fn without(id: &'static str, says: &'static str, bound: Bound) -> Promise {
     let (unit, limits) = (
         "of {listed.near} ticks within 5 mm",
-        "Budgets by `Cost::M7_TICK`. After 100 ticks, and after 100 from each leap. Without a list the budget ended before \
+        "Budgets measured to fit the instructions. After 100 ticks, and after 100 from each leap. Without a list the budget ended before \
          the deepest contact was known. The goal was 0 from 40,000 instructions on: reached from 60,000 on. With tests alone \
          counted, instead of all work, 1,521 ticks within 40,000 had none (measured once, 2026-11-28, before commit c0aae0a9).",
     );
@@ -106,8 +106,8 @@ const fn without(id: &'static str, says: &'static str, bound: Bound) -> Promise 
 
 /// The share of complete lists.
 const fn complete(id: &'static str, says: &'static str, unit: &'static str) -> Promise {
-    let limits = "The goals were 90 % within 60,000 instructions and 95 % within 100,000: not reached, because a list begins anew at \
-         each tick (docs/decisions.md). The whole list of an axis that crosses the surface or is inside is its deepest pair, \
+    let limits = "The goals were 90 % within 60,000 instructions and 95 % within 100,000, there with ridges of 1 mm and more alone: not \
+         reached, because a list begins anew at each tick (docs/decisions.md). The whole list of an axis that crosses the surface or is inside is its deepest pair, \
          which counts as incomplete. Contacts that a ridge of at least a 64th of the margin parts, 0.08 mm here, are listed apart.";
     Promise { id, says, criterion: TIMING, bound: Bound::Informs, unit, limits }
 }

@@ -23,7 +23,8 @@ use pages::{release, write};
 use runner::measure;
 
 /// Measures everything that docs/evidence shows, in one run that can be interrupted and continued at the same commit,
-/// and writes the pages: meant for 45 minutes on two idle cores. `cargo xtask peers` and the walks are not of it.
+/// and writes the pages: some 50 minutes on two idle cores, with its builds. `cargo xtask peers` and the walks are not of
+/// it.
 #[derive(clap::Args)]
 pub struct Options {
     /// Where parts and pages are kept; `evidence` in Cargo's target folder if absent.

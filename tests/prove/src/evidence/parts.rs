@@ -20,7 +20,7 @@ use crate::data;
 use crate::harness::{Check, Effort, lanes};
 
 pub const NOT_OF_THE_RUN: &str = "peers.json and peers.md (`cargo xtask peers`, other libraries), coverage.json and coverage.md (`cargo xtask coverage`), \
-     walks.md (people), README.md.";
+     the two demos with a bridge (demo/bridge, demo/bridge-nodes), walks.md (people), README.md.";
 
 /// A part that takes longer than this is ended.
 const LIMIT: Duration = Duration::from_mins(25);

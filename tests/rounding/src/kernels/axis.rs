@@ -16,9 +16,9 @@ const MOST: f64 = 1.000_000_953_674_316_4 / 16_777_216.0;
 
 pub fn paths(_: &Stated) -> Vec<(Vec<Goal>, Tape)> {
     tape::paths(|| {
-        let center = Vec3::of(|axis| coordinate(&format!("center_{axis}")));
+        let centre = Vec3::of(|axis| coordinate(&format!("centre_{axis}")));
         let to = Vec3::of(|axis| length(&format!("to_{axis}")));
-        let found = Sphere { center }.axis_to(center.plus(to));
+        let found = Sphere { centre }.axis_to(centre.plus(to));
         let (to, found, most) = (to.x, found.x, Traced::exact(MOST));
         let size = most.times(found);
         let sides = [("low", to.minus(found)), ("high", found.minus(to))];

@@ -19,7 +19,7 @@ const SUM: &str = "BOUND (d + K + R)";
 
 pub fn paths(stated: &Stated) -> Vec<(Vec<Goal>, Tape)> {
     tape::paths(|| {
-        let center = Vec3::of(|axis| coordinate(&format!("center_{axis}")));
+        let centre = Vec3::of(|axis| coordinate(&format!("centre_{axis}")));
         let to = Vec3::of(|axis| coordinate(&format!("to_{axis}")));
         let (code, cutoff, parent) =
             (input("code", "0", "65535"), length("cutoff"), length("parent"));
@@ -27,10 +27,10 @@ pub fn paths(stated: &Stated) -> Vec<(Vec<Goal>, Tape)> {
         let scale = length("unit").times(input("stretch", "1", "1b10"));
         let radius_scale = scale.times(near_one("rounding", "1b-24"));
         let radius = code.times(scale);
-        let node = Node { pin: center.plus(to), radius_code: code, link: 0 };
+        let node = Node { pin: centre.plus(to), radius_code: code, link: 0 };
         let zero = Traced::exact(0.0);
         let mut search = Search {
-            tool: Sphere { center },
+            tool: Sphere { centre },
             tree: Tree { node },
             vertices: (),
             meter: Meter,

@@ -17,7 +17,7 @@ const SAYS: &str = "A point that is found beyond the plane is farther from a sph
 
 pub fn paths(stated: &Stated) -> Vec<(Vec<Goal>, Tape)> {
     tape::paths(|| {
-        let center = Vec3::of(|axis| coordinate(&format!("center_{axis}")));
+        let centre = Vec3::of(|axis| coordinate(&format!("centre_{axis}")));
         let point = Vec3::of(|axis| coordinate(&format!("point_{axis}")));
         let normal = Vec3::of(|axis| coordinate(&format!("normal_{axis}")));
         let errors = Vec3::of(|axis| near_one(&format!("error_{axis}"), axis::ERROR));
@@ -31,7 +31,7 @@ pub fn paths(stated: &Stated) -> Vec<(Vec<Goal>, Tape)> {
         let zero = Traced::exact(0.0);
         let search = Search {
             tool: Given { to: normal },
-            tree: Tree { node: Node { pin: center, radius_code: zero, link: 0 } },
+            tree: Tree { node: Node { pin: centre, radius_code: zero, link: 0 } },
             vertices: (),
             meter: Meter,
             waiting: 0,
@@ -42,13 +42,13 @@ pub fn paths(stated: &Stated) -> Vec<(Vec<Goal>, Tape)> {
             tilt_slack: input("tilt", "0", "1b70"),
             pushed: None,
         };
-        if !search.plane_towards(center.plus(to)).has_beyond(point) {
+        if !search.plane_towards(centre.plus(to)).has_beyond(point) {
             // It rejects nothing.
             return Vec::new();
         }
         let size = Traced::exact(stated.plane).times(length("scale"));
         let cutoff = cutoff.minus(size.plus(Traced::exact(f64::from(FLOOR))));
-        let along = normal.exact_dot(point).minus(normal.exact_dot(center));
+        let along = normal.exact_dot(point).minus(normal.exact_dot(centre));
         let claim = along.minus(cutoff.times(tape::root(1)));
         let [beyond] = branches()[..] else { unreachable!("one comparison") };
         let goal =
@@ -62,7 +62,7 @@ pub fn paths(stated: &Stated) -> Vec<(Vec<Goal>, Tape)> {
                 .share(
                     ("COORDINATES", "that of the point on the axis, whose own error, and two sums"),
                     6.1,
-                    products("center"),
+                    products("centre"),
                     vec![of(&["C", "root1"])],
                 )
                 .share(

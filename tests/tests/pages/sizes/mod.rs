@@ -273,7 +273,15 @@ fn no_six_lines_stand_twice_among_the_searches() {
 const BY_HAND: [&str; 2] = ["docs/evidence/README.md", "docs/evidence/walks.md"];
 const MOST_WORDS: u32 = 25_000;
 
-/// Words of Markdown by hand. A word has a letter or a digit.
+/// Pages that have a limit of their own, and most words of each.
+const LIMITED: [(&str, u32); 4] = [
+    ("README.md", 1_200),
+    ("ARCHITECTURE.md", 2_500),
+    ("docs/guide.md", 2_500),
+    ("CHANGELOG.md", 1_500),
+];
+
+/// Words of Markdown by hand.
 fn words() -> u32 {
     let is_by_hand = |file: &PathBuf| {
         let path = inside(file);
@@ -281,15 +289,27 @@ fn words() -> u32 {
         file.extension().is_some_and(|kind| kind == "md")
             && (is_listed || !path.starts_with("docs/evidence"))
     };
+    files(&place("")).filter(is_by_hand).map(|page| words_of(&page)).sum()
+}
+
+/// Words of a page. A word has a letter or a digit.
+fn words_of(page: &Path) -> u32 {
     let is_word = |word: &&str| word.contains(char::is_alphanumeric);
-    let pages = files(&place("")).filter(is_by_hand);
-    pages.map(|page| read(&page).split_whitespace().filter(is_word).count() as u32).sum()
+    read(page).split_whitespace().filter(is_word).count() as u32
 }
 
 #[test]
 fn the_pages_by_hand_have_at_most_25_000_words() {
     let words = words();
     assert!((20_000..=MOST_WORDS).contains(&words), "{words} words");
+}
+
+#[test]
+fn four_pages_keep_limits_of_their_own() {
+    for (page, most) in LIMITED {
+        let words = words_of(&place(page));
+        assert!((most / 3..=most).contains(&words), "{page}: {words} words");
+    }
 }
 
 /// What the tests of this folder hold.

@@ -17,7 +17,7 @@ use crate::query::memory::clock::MotionClock;
 use crate::query::search::WaitingNode;
 use crate::surface::motion::Unit;
 use crate::tree::RootSet;
-use crate::tree::format::Link;
+use crate::tree::format::NodeLink;
 use crate::unavailable::QueryError;
 use crate::{Budget, Capsule, MovingSurface, Odometer, Options, Tree};
 
@@ -35,7 +35,9 @@ fn bounds<const M: usize>(
     let clock = memory.clock;
     let (mut bounds, mut seen) = (Vec::new(), std::vec![0; tree.triangle_count() as usize]);
     for node in memory.range.clone().now(clock, None).rest(0) {
-        let Link::Children { first, count } = Link::decode(node.link) else { unreachable!() };
+        let NodeLink::Children { first, count } = NodeLink::decode(node.link) else {
+            unreachable!()
+        };
         let bound = f64::from(clock.left(node.deadline));
         for slot in (0..count).filter(|slot| node.opened >> slot & 1 == 0) {
             let link = tree.node(first + slot).expect("a node").2;
@@ -55,11 +57,11 @@ fn bounds<const M: usize>(
     bounds
 }
 
-fn count_triangles(tree: &Tree<'_, u16>, link: Link, seen: &mut [u32]) {
+fn count_triangles(tree: &Tree<'_, u16>, link: NodeLink, seen: &mut [u32]) {
     match link {
-        Link::Children { first, count } => (first..first + count)
+        NodeLink::Children { first, count } => (first..first + count)
             .for_each(|row| count_triangles(tree, tree.node(row).expect("a node").2, seen)),
-        Link::Leaf { first, count } => {
+        NodeLink::Leaf { first, count } => {
             (first..first + count).for_each(|row| seen[row as usize] += 1);
         }
     }

@@ -7,7 +7,7 @@ use crate::math::vec3x4::{Vec3x4, roots};
 use crate::query::plane::Plane;
 use crate::query::search::leaf::THIRD;
 use crate::query::search::{Expansion, Search};
-use crate::tree::format::{Link, Node, whole_node};
+use crate::tree::format::{Node, NodeLink, whole_node};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
@@ -19,7 +19,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
         let mut left = near;
         while let Some(at) = next(&mut leaves) {
             let Node { pin, link, .. } = whole_node::<I>(&self.records, at as u32)?;
-            if let Link::Leaf { first, count } = Link::decode(link)
+            if let NodeLink::Leaf { first, count } = NodeLink::decode(link)
                 && self.search.meter.node().is_some()
             {
                 let plane = self.search.plane_towards(vertices.position(pin)?);

@@ -5,7 +5,7 @@ use core::hint::black_box;
 
 use super::{WideSearch, next};
 use crate::query::search::WaitingNode;
-use crate::tree::format::{Link, whole_node};
+use crate::tree::format::{NodeLink, whole_node};
 use crate::{Index, Tool, VertexTable};
 
 /// Trees with more nodes than this do not fit a processor's first-level cache.
@@ -29,8 +29,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
         let mut count = 0;
         while let Some(at) = next(&mut set) {
             if search.tree.node_count() > CACHED
-                && let Link::Children { first, .. } =
-                    Link::decode(whole_node::<I>(records, at as u32)?.link)
+                && let NodeLink::Children { first, .. } =
+                    NodeLink::decode(whole_node::<I>(records, at as u32)?.link)
             {
                 // A prefetch: on a large mesh loads take longer than the arithmetic.
                 black_box(search.tree.whole_record(first)?.pin);

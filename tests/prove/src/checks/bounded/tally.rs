@@ -26,14 +26,33 @@ pub struct Tally {
     inner: Vec<f32>,
     /// Steps of the force near the wall.
     pub steps: Steps,
-    /// Work of each tick, in node tests.
+    /// Work of each tick, in node tests, and of those near the wall.
     pub work: Vec<u32>,
+    near_work: Vec<u32>,
 }
 
 impl Tally {
     /// The width that this part of the intervals near the wall does not exceed.
     pub fn width(&self, part: f64) -> f64 {
         width(&self.widths, part)
+    }
+
+    /// Notes what a budget does not cause, of ticks without one.
+    pub fn note_uncut(&self, name: &str, figures: &mut Figures) {
+        self.steps.note_force(&format!("{name}.uncut"), figures);
+        figures.note(&format!("{name}.uncut.turned"), self.share_of_turned());
+    }
+
+    /// The work, in node tests, that 95 % of the ticks near the wall do not exceed.
+    pub fn usual_tests(&self) -> f64 {
+        let last = self.near_work.len().saturating_sub(1) as f64;
+        self.near_work.get((last * 0.95) as usize).copied().unwrap_or_default().into()
+    }
+
+    /// In per cent.
+    fn share_of_turned(&self) -> f64 {
+        let turned = self.turned as f64 / self.widths.len().max(1) as f64 * 100.0;
+        (turned * 100.0).round() / 100.0
     }
 
     /// Notes the widths, how often the pair was off the deepest, and steps of the force, under names that start with
@@ -43,8 +62,7 @@ impl Tally {
             figures.note(&format!("{name}.{end}"), self.width(part));
         }
         figures.note(&format!("{name}.inner"), width(&self.inner, 0.95));
-        let turned = self.turned as f64 / self.widths.len().max(1) as f64 * 100.0;
-        figures.note(&format!("{name}.turned"), (turned * 100.0).round() / 100.0);
+        figures.note(&format!("{name}.turned"), self.share_of_turned());
         self.steps.note_size(name, figures);
         self.steps.note_force(name, figures);
     }
@@ -56,6 +74,9 @@ fn width(widths: &[f32], part: f64) -> f64 {
     let width = widths.get((last * part) as usize).copied().unwrap_or_default();
     (f64::from(width) * 100.0).round() / 100.0
 }
+
+/// A budget that ends no tick. Unlike an unlimited one it counts all work.
+pub const AMPLE: Budget = Budget::new(1_000_000);
 
 /// Runs a tracker over the path within a budget.
 pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
@@ -78,6 +99,7 @@ pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
         }
         let width = found.separation - found.lower;
         tally.widths.push(width);
+        tally.near_work.push(found.work());
         if truth.upper < -tool.radius() {
             tally.inner.push(width);
         }
@@ -95,6 +117,7 @@ pub fn run(scene: &Scene, truth: &[Truth], budget: Budget) -> Tally {
     });
     tally.widths.sort_by(f32::total_cmp);
     tally.inner.sort_by(f32::total_cmp);
+    tally.near_work.sort_unstable();
     tally
 }
 
