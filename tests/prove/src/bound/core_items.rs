@@ -32,7 +32,8 @@ pub struct Item {
 struct Entry<'t> {
     place: (&'t str, &'t str),
     lines: Option<RangeInclusive<u32>>,
-    is_certified: bool,
+    /// None if the function is of another crate.
+    is_certified: Option<bool>,
 }
 
 /// The functions of `core` in a graph, by file and name. One whose places differ counts as outside of the subset.
@@ -47,6 +48,13 @@ pub fn items(analysis: &Analysis) -> Result<Vec<Item>> {
     let blocks = functions.flat_map(|function| &function.blocks);
     for at in blocks.flat_map(|block| block.instructions.iter().copied()) {
         for (file, line, name) in analysis.lines.of(at).iter().filter_map(|frame| frame.in_core()) {
+            let entry = entries.iter().find(|entry| {
+                entry.place == (file, name)
+                    && entry.lines.as_ref().is_none_or(|lines| lines.contains(&line))
+            });
+            if entry.is_some_and(|entry| entry.is_certified.is_none()) {
+                continue;
+            }
             let place = (file.to_owned(), name.to_owned());
             let item = found.entry(place).or_insert_with(|| Item {
                 file: file.to_owned(),
@@ -55,11 +63,7 @@ pub fn items(analysis: &Analysis) -> Result<Vec<Item>> {
                 is_certified: Some(true),
             });
             item.instructions += 1;
-            let entry = entries.iter().find(|entry| {
-                entry.place == (file, name)
-                    && entry.lines.as_ref().is_none_or(|lines| lines.contains(&line))
-            });
-            let is_certified = entry.map(|entry| entry.is_certified);
+            let is_certified = entry.and_then(|entry| entry.is_certified);
             item.is_certified = item.is_certified.and_then(|one| Some(one && is_certified?));
         }
     }
@@ -101,9 +105,10 @@ fn entry(line: &str) -> Result<Entry<'_>> {
         _ => bail!("no answer"),
     };
     let is_certified = match answer {
-        "in" => true,
-        "out" => false,
-        other => bail!("`{other}` is neither in nor out"),
+        "in" => Some(true),
+        "out" => Some(false),
+        "other" => None,
+        answer => bail!("`{answer}` is neither in, out nor other"),
     };
     Ok(Entry { place, lines, is_certified })
 }
