@@ -32,7 +32,6 @@ pub const CHECK: Check = Check {
         without(
             "listed.40k.without",
             "Ticks within 40,000 instructions at which a proxy has no list of contacts",
-            Bound::Is(0.0),
         ),
         note("listed.near"),
         complete(
@@ -55,7 +54,6 @@ pub const CHECK: Check = Check {
         without(
             "listed.60k.without",
             "Within 60,000 instructions a proxy is never without its list of contacts",
-            Bound::Is(0.0),
         ),
         complete(
             "listed.60k.complete",
@@ -73,7 +71,7 @@ pub const CHECK: Check = Check {
         note("listed.60k.mean"),
         note("listed.60k.tests"),
         note("listed.60k.spent"),
-        without("listed.100k.without", "The same within 100,000 instructions", Bound::Is(0.0)),
+        without("listed.100k.without", "The same within 100,000 instructions"),
         complete(
             "listed.100k.complete",
             "The list is complete to 5 mm",
@@ -94,13 +92,13 @@ pub const CHECK: Check = Check {
 };
 
 /// The number of ticks near the wall without a list.
-const fn without(id: &'static str, says: &'static str, bound: Bound) -> Promise {
+const fn without(id: &'static str, says: &'static str) -> Promise {
     let (unit, limits) = (
         "of {listed.near} ticks within 5 mm",
         "Budgets measured to fit the instructions. After 100 ticks, and after 100 from each leap. Without a list the budget ended before \
          the side was known.",
     );
-    Promise { id, says, criterion: TIMING, bound, unit, limits }
+    Promise { id, says, criterion: TIMING, bound: Bound::Is(0.0), unit, limits }
 }
 
 /// The share of complete lists.
