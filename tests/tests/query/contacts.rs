@@ -319,6 +319,55 @@ fn no_budget_hides_a_contact_at_a_vertex() {
     assert!(bounded > 20, "{bounded}");
 }
 
+/// A list of a label's part is only accepted if its deepest contact is certain, also where the closest pair is of another
+/// part, and the budget ends around a contact at a vertex.
+#[test]
+fn no_budget_hides_the_deepest_contact_of_a_part() {
+    const PART: u8 = 1;
+    let spikes = sheet(12, 40.0, |x, y| 2.0 * (7.1 * x).sin() * (5.3 * y).cos());
+    let is_of_part = |rows: &[u32; 3]| {
+        let at = rows.map(|row| spikes.positions[row as usize].x);
+        u8::from(at.iter().sum::<f32>() > 12.0) * PART
+    };
+    let labels = spikes.triangles.iter().map(is_of_part).collect();
+    let built = Builder::new().labels(labels).build(&spikes).expect("a valid mesh");
+    let rows = built.to_rows(&spikes.positions);
+    let tree = built.tree::<u16>().expect("valid");
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let mut deepest = |y, node_tests| {
+        let (start, end) = (Vec3::new(-15.0, y, 4.0), Vec3::new(15.0, y + 2.0, 4.5));
+        let tool = Capsule::new(start, end, 1.0).expect("valid");
+        let options = Options::cold().contacts_of(PART).budget(Budget::new(node_tests));
+        let mut found = Contacts::<64>::new();
+        let closest = query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut found);
+        let row = closest.expect("an answer").triangle;
+        let is_other = row.is_some_and(|row| tree.label(row) != Some(PART));
+        let list = found.within(MARGIN);
+        (list.map(|mut list| list.next().map_or(MARGIN, |first| first.separation)), is_other)
+    };
+    let (mut refused, mut accepted) = (0, 0);
+    for y in (-36..36).map(|y| 0.5 * y as f32) {
+        let (truth, is_other) = deepest(y, u32::MAX);
+        let truth = truth.expect("complete");
+        if !is_other {
+            continue;
+        }
+        for budget in 0..800 {
+            match deepest(y, budget).0 {
+                Ok(first) => {
+                    assert!(first <= truth + 1e-3, "{y} {budget}: {first} {truth}");
+                    accepted += 1;
+                }
+                Err(error) => {
+                    assert_eq!(error, Unavailable::CutShort);
+                    refused += 1;
+                }
+            }
+        }
+    }
+    assert!(accepted > 100 && refused > 100, "{accepted} {refused}");
+}
+
 /// Inside, the nearest triangle found within a small budget may be on the far side: its force would point inwards.
 #[test]
 fn no_budget_turns_the_force_inwards() {

@@ -144,7 +144,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             made: Tests::NONE,
             is_priced,
         };
-        let (mut least, mut meets) = (f32::INFINITY, 0_u32);
+        let (mut least, mut inner, mut meets) = (f32::INFINITY, f32::INFINITY, 0_u32);
         let is_left_out = |row| !is_of(TriangleRow(row));
         let ridges = (0.5 * RIDGE * margin, 2.0 * error);
         let visit = |near: NearTriangle| {
@@ -160,8 +160,9 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             if options.part.is_none() || !is_outside {
                 other.add_side(tree, vertices, tool)?;
             }
-            if other.side != Side::Inside
-                && other.separation <= margin
+            if other.side == Side::Inside {
+                inner = smaller(inner, other.separation);
+            } else if other.separation <= margin
                 && let Some(contact) = pair.contact(&other)
             {
                 if contact.separation < least {
@@ -177,7 +178,18 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         } else {
             None
         };
-        let deepest = own.map_or(least, |own| smaller(least, own.separation));
+        let mut from = smaller(complete, beyond);
+        if let Some(missing) = missing.map(sqrt).filter(|&missing| missing < from) {
+            from = missing;
+        }
+        // A basin's lowest triangle is less than a ridge below the visited low triangle.
+        let bound = if from < limit { from - ridge - tool.radius() } else { f32::INFINITY };
+        let is_met = is_crossing || closest.is_at_surface();
+        let is_certain = is_met || !closest.is_cut_short();
+        // Nothing that is missing is deeper than what the search has found; or it has found all.
+        let is_found = from >= limit || least < bound && least <= inner;
+        let own_least = own.filter(|_| is_certain || !is_found).map(|own| own.separation);
+        let deepest = own_least.map_or(least, |own| smaller(least, own));
         for contact in &mut found.list {
             let is_own = (contact.surface, contact.tool) == (pair.surface, pair.number);
             if is_own && contact.separation > deepest {
@@ -187,31 +199,26 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             }
         }
         made = made.and(tester.made);
-        let is_met = is_crossing || closest.is_at_surface();
-        let mut from = smaller(complete, beyond);
-        if let Some(missing) = missing.map(sqrt).filter(|&missing| missing < from) {
-            from = missing;
-        }
-        // A basin's lowest triangle is less than a ridge below the visited low triangle.
-        let bound = if from < limit { from - ridge - tool.radius() } else { f32::INFINITY };
-        let is_certain = is_met || !closest.is_cut_short();
-        let is_deepest_found = least < bound;
-        let is_known = is_side_searched && (is_certain || is_deepest_found || own.is_some());
+        let is_known = is_side_searched && (is_certain || is_found || own.is_some());
         if is_known
             && !is_crossing
             && let Some(contact) = own
         {
             if is_certain && !(least <= contact.separation + 2.0 * accuracy) {
                 found.insert(contact);
-            } else if !is_certain && !is_deepest_found {
+            } else if !is_certain && !is_found {
                 // Nothing is deeper than the least separation that an uncertain pair may have.
                 let place = |at: &Contact| (at.surface, at.tool, at.triangle);
-                found.list.retain(|other| place(other) != place(&contact));
+                let is_near = |at: &Contact| {
+                    at.point_on_surface.distance_squared(contact.point_on_surface)
+                        <= accuracy * accuracy
+                };
+                found.list.retain(|other| place(other) != place(&contact) && !is_near(other));
                 found.insert(contact);
             }
         }
-        // For a part without the closest pair, the search has seen the deepest contact if it was completed.
-        found.is_open |= !is_known || !(is_crossing || own.is_some() || beyond >= limit);
+        let is_own_crossing = is_crossing && options.part.is_none();
+        found.is_open |= !is_known || !(own.is_some() || is_found || is_own_crossing);
         // If the axis meets the surface at several places, another part of the axis may be inside, less deep.
         if is_crossing && meets > 1 {
             found.lower_bound(closest.lower);

@@ -15,7 +15,7 @@ pub(super) struct List<const N: usize> {
     pub is_full: bool,
     /// The requested margin.
     pub margin: f32,
-    /// The deepest contact is not known.
+    /// Something deeper than the first contact may be missing.
     pub is_open: bool,
     /// The tool may be inside a surface whose closest pair has no side.
     pub has_no_side: bool,

@@ -195,7 +195,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// one, are included too.
     ///
     /// # Errors
-    /// [`Unavailable::CutShort`] if the budget ended before the side was known, or no query filled the list;
+    /// [`Unavailable::CutShort`] if the budget ended before the side or any pair was known, or no query filled the list, or,
+    /// of a label's part, before its deepest contact was known;
     /// [`Unavailable::NoSide`] if the tool may be inside and no contact is within the margin; [`QueryError::Margin`] if
     /// the query's margin was smaller.
     pub fn within(&self, margin: f32) -> Result<ContactIter<'_>, Unavailable> {
@@ -336,8 +337,8 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// If the side is undefined, the tool is taken to be outside. If that is because the budget ended, contacts may be
     /// missing at any distance: see [`Contacts::within`].
     ///
-    /// If the list is too small, or the budget ends, the closest pair is still in it, and its [bound](Contacts::bound)
-    /// tells how far it is complete. One wall may then be several contacts.
+    /// If the list is too small, or the budget ends once the side is known, it still begins with the closest pair, and its
+    /// [bound](Contacts::bound) tells how far it is complete. One wall may then be several contacts.
     ///
     /// If the tool crosses or is inside, up to five more searches of a point, usually one, find the second triangle at
     /// its deepest point, for [`VelocityRow`](crate::constraint::VelocityRow). If the budget does not cover them, there

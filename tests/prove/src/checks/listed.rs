@@ -31,7 +31,7 @@ pub const CHECK: Check = Check {
         note("listed.ticks"),
         without(
             "listed.40k.without",
-            "Ticks within 40,000 instructions at which a proxy has no list of contacts",
+            "Within 40,000 instructions a proxy is never without its list of contacts",
         ),
         note("listed.near"),
         complete(
@@ -103,7 +103,7 @@ const fn without(id: &'static str, says: &'static str) -> Promise {
 
 /// The share of complete lists.
 const fn complete(id: &'static str, says: &'static str, unit: &'static str) -> Promise {
-    let limits = "The goals were 90 % within 60,000 instructions and 95 % within 100,000, there with ridges of 1 mm and more alone: not \
+    let limits = "The goals were 90 % within 60,000 instructions and 95 % within 100,000, then only for ridges of 1 mm and more: not \
          reached, because a list begins anew at each tick (docs/decisions.md). The whole list of an axis that crosses the surface or is inside is its deepest pair, \
          which counts as incomplete. Contacts that a ridge of at least a 64th of the margin parts, 0.08 mm here, are listed apart.";
     Promise { id, says, criterion: TIMING, bound: Bound::Informs, unit, limits }
