@@ -60,7 +60,7 @@ impl<'s, G> PoseAdmissionCheck<'s, G> {
     }
 
     /// Searches the received rows for the one farthest from the centre. Returns the work left.
-    fn look<V: VertexTable + ?Sized>(&mut self, surface: &V, ready: u32, work: u32) -> u32 {
+    fn check<V: VertexTable + ?Sized>(&mut self, surface: &V, ready: u32, work: u32) -> u32 {
         let waiting = ready.saturating_sub(self.next_row);
         let rows = if waiting < work { waiting } else { work };
         let end = self.next_row.saturating_add(rows);
@@ -139,10 +139,10 @@ impl<G: AdmissionCheck> AdmissionCheck for PoseAdmissionCheck<'_, G> {
         work: u32,
     ) -> Result<Admission, StretchError> {
         let IncomingSurface { surface, ready, before, compared } = arriving;
-        let is_looking = self.moves();
-        let work = if is_looking { self.look(surface, ready, work) } else { work };
+        let is_checking = self.moves();
+        let work = if is_checking { self.check(surface, ready, work) } else { work };
         let admission = self.rows.advance(arriving, work)?;
-        let is_waiting = is_looking && (self.next_row as usize) < surface.len();
+        let is_waiting = is_checking && (self.next_row as usize) < surface.len();
         if admission == Admission::Pending || is_waiting {
             return Ok(Admission::Pending);
         }

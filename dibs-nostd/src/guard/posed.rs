@@ -284,7 +284,7 @@ impl TickPose {
         &self,
         contacts: &mut Contacts<N, NEAR>,
     ) {
-        contacts.place(|point| self.pose.apply(point), |vector| self.pose.rotate(vector));
+        contacts.transform(|point| self.pose.apply(point), |vector| self.pose.rotate(vector));
     }
 
     /// The motion in mesh coordinates.

@@ -26,8 +26,8 @@ impl SkippedTools {
 
     /// Adds a tool that is outside or was skipped, with no surface within `clear` (mm) of its axis.
     pub fn add(&mut self, number: usize, clear: f32, is_outside: bool) {
-        if let Some(place) = self.clear.get_mut(number) {
-            *place = clear;
+        if let Some(slot) = self.clear.get_mut(number) {
+            *slot = clear;
             *(if is_outside { &mut self.outside } else { &mut self.passed }) |= 1 << number;
         }
     }

@@ -36,7 +36,7 @@ pub(super) const STEP: u32 = 1;
 /// A triangle that may be the closest to a point, whose plane decides the side (211).
 pub(super) const TIE: u32 = 2;
 
-/// A list of contacts: an empty cache of vertices, the start and the end of its search, and an empty table of floods (8,407).
+/// A list of contacts: an empty cache of vertices, the start and the end of its search, and an empty table of basins (8,407).
 pub(super) const LIST: u32 = 80;
 
 /// This many opened nodes of a list's front are passed over for a node test: 10 each, at most 15 more for a node and 50
@@ -59,15 +59,15 @@ pub(super) const FACING: u32 = 2;
 pub(super) const ON_EDGE: u32 = 3;
 
 /// A triangle that may represent its lowest corner (347), besides a node test for each triangle around that.
-pub(super) const STANDING: u32 = 3;
+pub(super) const CANDIDATE: u32 = 3;
 
-/// An entry of a flood (109).
+/// An entry of a basin (109).
 pub(super) const ENTRY: u32 = 1;
 
-/// An edge over which a flood may spread (132), besides the test of the triangle beyond.
+/// An edge over which a basin may grow (132), besides the test of the triangle beyond.
 pub(super) const EDGE: u32 = 1;
 
-/// A basin: its pair, its side, and its place in the list (1,400).
+/// A basin: its pair, its side, and its slot in the list (1,400).
 pub(super) const BASIN: u32 = 14;
 
 /// The start of a contact's activation: its empty paths (889).

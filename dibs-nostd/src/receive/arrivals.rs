@@ -104,21 +104,21 @@ impl Arrivals {
         rows: Range<u32>,
     ) -> Result<PacketPosition, PlacementError> {
         let rows = Range32 { first: rows.start, end: rows.end };
-        let mut place = PacketPosition { sequence, rows, before: None, after: None, free: GAPS };
-        self.meet(&self.prefix, PREFIX, &mut place)?;
+        let mut position = PacketPosition { sequence, rows, before: None, after: None, free: GAPS };
+        self.meet(&self.prefix, PREFIX, &mut position)?;
         if self.used == 0 {
-            place.free = 0;
-            return Ok(place);
+            position.free = 0;
+            return Ok(position);
         }
         for (at, range) in self.others.iter().enumerate() {
             if range.from == range.to {
-                place.free = at;
+                position.free = at;
             } else {
-                self.meet(range, at, &mut place)?;
+                self.meet(range, at, &mut position)?;
             }
         }
-        let is_alone = place.before.is_none() && place.after.is_none();
-        if is_alone && place.free == GAPS { Err(PlacementError::Gaps) } else { Ok(place) }
+        let is_alone = position.before.is_none() && position.after.is_none();
+        if is_alone && position.free == GAPS { Err(PlacementError::Gaps) } else { Ok(position) }
     }
 
     /// Compares a packet with one range.
@@ -127,12 +127,12 @@ impl Arrivals {
         &self,
         range: &Contig,
         at: usize,
-        place: &mut PacketPosition,
+        position: &mut PacketPosition,
     ) -> Result<(), PlacementError> {
-        let PacketPosition { sequence, rows, .. } = *place;
+        let PacketPosition { sequence, rows, .. } = *position;
         let fits = if range.to <= sequence {
             if range.to == sequence {
-                place.before = Some(at);
+                position.before = Some(at);
             }
             if self.is_exact && range.to == sequence {
                 range.end == rows.first
@@ -142,7 +142,7 @@ impl Arrivals {
         } else if sequence < range.from {
             let touches = sequence.checked_add(1) == Some(range.from);
             if touches {
-                place.after = Some(at);
+                position.after = Some(at);
             }
             if self.is_exact && touches { rows.end == range.first } else { rows.end <= range.first }
         } else {
@@ -153,8 +153,8 @@ impl Arrivals {
 
     /// Notes a packet at its position.
     #[inline]
-    pub fn insert(&mut self, place: PacketPosition) {
-        let PacketPosition { sequence, rows, before, after, free } = place;
+    pub fn insert(&mut self, position: PacketPosition) {
+        let PacketPosition { sequence, rows, before, after, free } = position;
         let to = sequence.saturating_add(1);
         match (before, after) {
             (None, None) => {

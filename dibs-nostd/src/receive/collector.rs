@@ -266,7 +266,7 @@ impl Collector {
     }
 
     /// The position of all rows of the current frame, received at once together with its commit.
-    pub fn place_whole(&mut self, rows: u32) -> Option<PacketPosition> {
+    pub fn locate_whole(&mut self, rows: u32) -> Option<PacketPosition> {
         let frame = self.frame.as_mut()?;
         frame.commit = Some((2, frame.sum));
         frame.arrivals.locate(1, 0..rows).ok()
@@ -341,10 +341,10 @@ impl Collector {
     pub fn take_rows(
         &mut self,
         contribution: u32,
-        place: PacketPosition,
+        position: PacketPosition,
     ) -> Result<bool, ReceiveError> {
         let Some(frame) = &mut self.frame else { return Ok(false) };
-        frame.arrivals.insert(place);
+        frame.arrivals.insert(position);
         frame.sum = frame.sum.wrapping_add(contribution);
         frame.touched = self.now;
         self.finish()
@@ -518,7 +518,7 @@ impl Frame {
             return Err(ReceiveError::Order { sequence });
         }
         match self.arrivals.locate(sequence, rows) {
-            Ok(place) => Ok(Some(place)),
+            Ok(position) => Ok(Some(position)),
             Err(PlacementError::Duplicate) => Ok(None),
             Err(PlacementError::Order) => Err(ReceiveError::Order { sequence }),
             Err(PlacementError::Gaps) => Err(ReceiveError::Gaps { sequence }),

@@ -140,8 +140,8 @@ impl<G: AdmissionCheck, M: Mac> Assembler<'_, G, M> {
             self.admission_check.place(pose);
         }
         let misplaced = ReceiveError::OutOfRange { first: 0, count: rows };
-        let place = self.collector.place_whole(rows).ok_or(misplaced)?;
+        let position = self.collector.locate_whole(rows).ok_or(misplaced)?;
         store(self.writer.rows(0..rows).ok_or(misplaced)?);
-        self.stored(id.epoch, 0, place, 0..rows)
+        self.stored(id.epoch, 0, position, 0..rows)
     }
 }

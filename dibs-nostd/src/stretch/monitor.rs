@@ -224,7 +224,7 @@ impl<'t, I: Index, const SURFACES: usize> StretchMonitor<'t, I, SURFACES> {
     }
 
     /// Measures the extrapolation of arrived rows, with at most `work` triangles. Returns whether it is finished.
-    fn look_ahead<V: VertexTable + ?Sized>(
+    fn check_ahead<V: VertexTable + ?Sized>(
         &mut self,
         before: Option<&V>,
         surface: &V,
@@ -299,7 +299,7 @@ impl<I: Index, const SURFACES: usize> AdmissionCheck for StretchMonitor<'_, I, S
         let sum = |rows| volume.add(tree, surface, replaced, rows);
         let (left, is_measured) = own.advance(tree, surface, ready, size, work - ahead, sum)?;
         let is_ahead =
-            SURFACES == 1 || self.look_ahead(before, surface, ready, ahead.saturating_add(left));
+            SURFACES == 1 || self.check_ahead(before, surface, ready, ahead.saturating_add(left));
         if !is_complete || !is_compared || !is_measured || !is_ahead {
             return Ok(Admission::Pending);
         }

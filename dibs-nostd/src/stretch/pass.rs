@@ -81,7 +81,7 @@ impl Pass {
                 let last = slot.triangle;
                 let mut worst = Worst::none(rows.start);
                 if rows.contains(&last) {
-                    if !rows::look(tree, surface, last, ready, &mut worst) {
+                    if !rows::check(tree, surface, last, ready, &mut worst) {
                         return Ok((work, false));
                     }
                     work -= 1;

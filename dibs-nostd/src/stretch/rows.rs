@@ -47,7 +47,7 @@ pub(super) fn scan<I: Index, V: VertexTable + ?Sized>(
 
 /// Raises `worst` if one triangle is stretched more and all its corners are below row `ready`. Returns whether they
 /// are. Triangles beyond their limit are left to [`scan`].
-pub(super) fn look<I: Index, V: VertexTable + ?Sized>(
+pub(super) fn check<I: Index, V: VertexTable + ?Sized>(
     tree: &Tree<'_, I>,
     surface: &V,
     row: u32,
@@ -262,7 +262,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         let edge = if metric.join == Join::Flip { centre - other } else { other - centre };
         let [rest, ..] = metric.squares;
         let left = largest * rest - edge.length_squared();
-        // NaN fails the quick check, so that `look_closer` measures the triangle.
+        // NaN fails the quick check, so that the triangle is measured.
         let edge = if left > 0.0 { edge } else { Vec3::NAN };
         Some(PreviousTriangle { centre, third: centre, edge, left, square: 0.0 })
     }
@@ -280,7 +280,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
         match self.pass::<I, M, UNIFORM>(before, metric, corners, worst.squared) {
             Some(next) => Some(next),
             None => {
-                let (next, raised) = self.look_closer::<I, M>(metric, corners, row, *worst)?;
+                let (next, raised) = self.measure_triangle::<I, M>(metric, corners, row, *worst)?;
                 *worst = raised;
                 Some(next)
             }
@@ -288,7 +288,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     }
 
     /// Checks that a triangle is certainly not stretched beyond `sqrt(largest)`. Rare cases fall through to
-    /// `look_closer`.
+    /// `measure_triangle`.
     #[inline(always)]
     fn pass<I: Index, M: Measure, const UNIFORM: bool>(
         &self,
@@ -335,7 +335,7 @@ impl<V: VertexTable + ?Sized> Table<'_, V> {
     /// Raises `worst` if a triangle is stretched more; `None` beyond the limit.
     #[cold]
     #[inline(never)]
-    fn look_closer<I: Index, M: Measure>(
+    fn measure_triangle<I: Index, M: Measure>(
         &self,
         metric: &impl MetricBits,
         corners: &I::Corners,

@@ -3,7 +3,7 @@
 // Requirement: A-12
 
 /// A set of labels: one bit each. A tracker has it, so that a control tick can tell a label that no triangle has without a
-/// look at every triangle.
+/// test of every triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct LabelSet([u64; 4]);
 

@@ -122,14 +122,14 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn every_flipped_bit_is_found_whatever_the_share() {
+    fn every_flipped_bit_is_found_whatever_the_step() {
         let mesh = dibs_build::generate::heart(320).expect("a valid size").mesh;
         let built = dibs_build::Builder::new().build(&mesh).expect("a valid mesh");
         let sound: Vec<u8> = built.blob().into();
-        for share in [1, 7, 61, 64, 1_000, usize::MAX] {
+        for count in [1, 7, 61, 64, 1_000, usize::MAX] {
             let mut scrub = Scrub::new(&sound);
             while scrub.rounds() < 3 {
-                assert_eq!(scrub.step(share), Ok(()), "{share} bytes a call");
+                assert_eq!(scrub.step(count), Ok(()), "{count} bytes a call");
             }
         }
         let mut bytes = sound;

@@ -101,13 +101,13 @@ pub(crate) const fn find<'a, I: Index>(
             if rule.kind == kind {
                 is_known = true;
                 let part = format::range(bytes, offset, length);
-                let placed = (offset as usize).is_multiple_of(SECTION_ALIGN)
+                let is_valid = (offset as usize).is_multiple_of(SECTION_ALIGN)
                     && offset as usize >= HEADER_BYTES
                     && match rule.length {
                         Some(expected) => length as u64 == expected,
                         None => true,
                     };
-                if part.is_none() || !placed || found[slot].is_some() {
+                if part.is_none() || !is_valid || found[slot].is_some() {
                     return Err(FormatError::Section { kind });
                 }
                 found[slot] = part;
@@ -170,8 +170,8 @@ impl<'a> Sections<'a> {
     /// Checks that each section is still at its offset in the bytes.
     pub fn check<I: Index>(&self, bytes: &[u8], header: &Header) -> Result<(), FormatError> {
         let found = find::<I>(bytes, header)?;
-        let places = self.all().into_iter().zip(found.all());
-        for (rule, (here, there)) in rules::<I>(header).into_iter().zip(places) {
+        let sections = self.all().into_iter().zip(found.all());
+        for (rule, (here, there)) in rules::<I>(header).into_iter().zip(sections) {
             let is_elsewhere = !here.is_empty() && !core::ptr::eq(here, there);
             if here.len() != there.len() || is_elsewhere {
                 return Err(FormatError::Section { kind: rule.kind });

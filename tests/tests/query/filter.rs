@@ -402,16 +402,24 @@ fn a_search_costs_what_the_filter_was_told() {
     let by_default = asked(ample);
     assert_eq!(asked(ample.cost(Cost::M7_TICK)), by_default);
     let Cost { base, node_test, triangle_test } = Cost::M7_TICK;
-    let (base, node_test, triangle_test) = (3 * base, 3 * node_test, 3 * triangle_test);
-    let dear = ample.cost(Cost { base, node_test, triangle_test });
-    let dearer = asked(dear);
-    assert_eq!((dearer.reason, dearer.queries), (by_default.reason, by_default.queries));
-    // The motion that was tried costs the same: its rows and paths, not three times as much.
-    let rest = (3 * by_default.instructions).abs_diff(dearer.instructions);
-    assert!(rest > 0 && rest < 3_000, "{by_default:?} {dearer:?}");
-    let none = asked(dear.budget(base - 1));
+    let times = |factor: u32| Cost {
+        base: factor * base,
+        node_test: factor * node_test,
+        triangle_test: factor * triangle_test,
+    };
+    let [free, twice, thrice] = [0, 2, 3].map(|factor| asked(ample.cost(times(factor))));
+    for found in [&free, &twice, &thrice] {
+        assert_eq!((found.reason, found.queries), (by_default.reason, by_default.queries));
+    }
+    // Searches alone scale with the cost; rows and paths take what `Filter::budget` says.
+    assert!((1..=800 + 1_400).contains(&free.instructions), "{free:?}");
+    let searches = by_default.instructions - free.instructions;
+    assert!(searches > base, "{by_default:?}");
+    assert_eq!(twice.instructions - free.instructions, 2 * searches);
+    assert_eq!(thrice.instructions - free.instructions, 3 * searches);
+    let none = asked(ample.cost(times(3)).budget(3 * base - 1));
     assert_eq!((none.reason, none.queries), (Reason::NoSafeMotion, 0));
-    assert!(none.instructions < base, "{none:?}");
+    assert!(none.instructions < 3 * base, "{none:?}");
 }
 
 /// A budget for little more than the queries' base costs leaves no pair out: each has the last tick's interval, less the

@@ -163,9 +163,9 @@ impl Filter {
         labels: [(u8, f32); LABELS],
     ) -> Result<Filter<LABELS>, FilterError> {
         let mut of_labels = [Part { label: 0, more: 0.0 }; LABELS];
-        for (place, (label, stand_off)) in of_labels.iter_mut().zip(labels) {
+        for (slot, (label, stand_off)) in of_labels.iter_mut().zip(labels) {
             checked("stand_off_of", stand_off, stand_off >= self.stand_off)?;
-            *place = Part { label, more: stand_off - self.stand_off };
+            *slot = Part { label, more: stand_off - self.stand_off };
         }
         let Self { stand_off, speed, lever, approach, instructions, cost, options, .. } = self;
         Ok(Filter { stand_off, of_labels, speed, lever, approach, instructions, cost, options })

@@ -272,9 +272,9 @@ mod tests {
             add(&mut residual, &found.point, -1.0);
             let others = (0..60_u8).map(|step| {
                 let mut other = inside;
-                let (axis, share) = (step % 6, f32::from(step / 6) * 0.2 - 1.0);
+                let (axis, shift) = (step % 6, f32::from(step / 6) * 0.2 - 1.0);
                 if let Some(x) = other.get_mut(usize::from(axis)) {
-                    *x += share;
+                    *x += shift;
                 }
                 other
             });

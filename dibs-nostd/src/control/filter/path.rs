@@ -30,15 +30,15 @@ pub(super) fn least(start: f32, end: f32, moved: f32, grow: f32) -> f32 {
     if !(moved > grow) {
         return ends - slack;
     }
-    // The distance's square is `lowest + (moved (s - place))^2`.
-    let place = (moved + (start - end) * (start + end) / moved) / (2.0 * moved);
-    let along = moved * place;
+    // The distance's square is `lowest + (moved (s - s_lowest))^2`.
+    let s_lowest = (moved + (start - end) * (start + end) / moved) / (2.0 * moved);
+    let along = moved * s_lowest;
     let lowest = start * start - along * along;
     if !(lowest > 0.0) {
-        let is_between = place > 0.0 && place < 1.0;
+        let is_between = s_lowest > 0.0 && s_lowest < 1.0;
         return (if is_between && by_motion < ends { by_motion } else { ends }) - slack;
     }
-    let s = place + grow * sqrt(lowest / (moved * moved - grow * grow)) / moved;
+    let s = s_lowest + grow * sqrt(lowest / (moved * moved - grow * grow)) / moved;
     if !(s > 0.0 && s < 1.0) {
         return ends - slack;
     }
@@ -59,8 +59,8 @@ mod tests {
     /// Along a wall a straight path loses an amount proportional to the square of its length.
     #[test]
     fn a_path_along_a_wall_loses_little() {
-        let lost = 3.0 - least(3.0, 3.0, 0.2, 0.0);
-        assert!((lost - 0.04 / 24.0).abs() < 2e-5, "{lost}");
+        let loss = 3.0 - least(3.0, 3.0, 0.2, 0.0);
+        assert!((loss - 0.04 / 24.0).abs() < 2e-5, "{loss}");
         // Out of the surface, the start is nearest; into it, the end.
         assert!((least(-1.0, 5.0, 0.0, 0.0) + 1.0).abs() < 2e-5);
         assert!((least(1.0, -1.0, 2.0, 0.0) + 1.0).abs() < 2e-5);
@@ -95,11 +95,11 @@ mod tests {
         #[test]
         fn no_point_outside_of_both_balls_is_nearer(
             start in 0.01_f32..10.0, end in 0.01_f32..10.0, moved in 0.0_f32..12.0, grow in 0.0_f32..2.0,
-            places in prop::collection::vec((0.0_f64..1.0, -12.0_f64..24.0, 0.0_f64..1.0), 20),
+            samples in prop::collection::vec((0.0_f64..1.0, -12.0_f64..24.0, 0.0_f64..1.0), 20),
         ) {
             let bound = f64::from(least(start, end, moved, grow));
             let (a, b, length) = (f64::from(start), f64::from(end), f64::from(moved));
-            for (s, z, more) in places {
+            for (s, z, more) in samples {
                 // A point of the plane at `z` along the path and just outside of both balls, or a little farther.
                 let from_a = a * a - z * z;
                 let from_b = b * b - (z - length) * (z - length);

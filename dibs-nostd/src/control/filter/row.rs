@@ -126,14 +126,14 @@ impl Rows {
         if self.walls.len() + self.own.len() >= MOST {
             let point = at.to_vector(self.lever);
             let clear = |wall: &Wall| dot(&wall.factors, &point) - wall.zero;
-            let (mut farthest, mut place) = (f32::NEG_INFINITY, None);
+            let (mut farthest, mut slot) = (f32::NEG_INFINITY, None);
             for other in &mut self.walls {
                 if clear(other) > farthest {
-                    (farthest, place) = (clear(other), Some(other));
+                    (farthest, slot) = (clear(other), Some(other));
                 }
             }
-            if let Some(place) = place {
-                *place = wall;
+            if let Some(slot) = slot {
+                *slot = wall;
             }
         } else {
             let _ = self.walls.push(wall);

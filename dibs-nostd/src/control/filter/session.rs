@@ -40,12 +40,12 @@ const TESTS_OF_DUE: u64 = 10;
 /// Motions (mm) of a period within which a wall is near.
 const NEAR: f32 = 4.0;
 
-/// Instructions of work besides searches: a product or sum of two vectors, a pair's path, its distances on it, and a look at an
-/// opened node. Fitted so that no tick on the emulated board takes more than its budget.
+/// Instructions of work besides searches: a product or sum of two vectors, a pair's path, its distances on it, and an
+/// estimate's part for each opened node. Fitted so that no tick on the emulated board takes more than its budget.
 const PRODUCT: u32 = 32;
 const PATH: u32 = 300;
 const DISTANCES: u32 = 200;
-const LOOK: u32 = 6;
+const ESTIMATE: u32 = 6;
 
 /// Instructions of the active set's first steps, which the searches at the start leave, besides those for each row.
 const FIRST_SOLUTION: u32 = 24 * PRODUCT;
@@ -83,7 +83,7 @@ pub(super) struct Session<'f, const LABELS: usize> {
     margin: f32,
     grow: f32,
     /// The fraction of the distance beyond the least one that a motion may use up.
-    share: f32,
+    fraction: f32,
     /// The cost of a search.
     cost: Cost,
     queries: u32,
@@ -116,7 +116,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             most,
             margin: uncertainty.now,
             grow: uncertainty.grown(period),
-            share: if filter.approach > period { period / filter.approach } else { 1.0 },
+            fraction: if filter.approach > period { period / filter.approach } else { 1.0 },
             cost,
             queries: 0,
             instructions: 0,
@@ -248,8 +248,11 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         let wanted = kept + self.grow;
         let wanted = if is_below && farthest < wanted { farthest } else { wanted };
         let room = distance - wanted;
-        let wanted =
-            if room > 0.0 && room < f32::INFINITY { distance - room * self.share } else { wanted };
+        let wanted = if room > 0.0 && room < f32::INFINITY {
+            distance - room * self.fraction
+        } else {
+            wanted
+        };
         let number = self.states.len();
         if let Some(found) = found
             && distance < wanted + NEAR * self.most
@@ -284,7 +287,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     }
 
     /// The instructions of the first motion besides its searches, for so many pairs and parts: its rows, and the paths at
-    /// rest, of the look and of the motion.
+    /// rest, of its estimate and of the motion.
     fn price_of_first_motion(&self, pairs: usize) -> u32 {
         let walls = pairs as u32;
         let rows = (self.rows.own() + walls).saturating_mul(2 * PRODUCT);
@@ -329,16 +332,16 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
     fn shorten<P: Pair>(&mut self, pairs: &[P], proposal: &Proposal, extent: &mut Extent) -> bool {
         let before = self.instructions;
         let needed = self.needed(pairs, &proposal.at(*extent));
-        let look = u64::from(self.instructions - before);
+        let estimate = u64::from(self.instructions - before);
         let last = if proposal.least == [0.0; 6] { Extent::SMALLEST } else { Extent::LAST };
         if needed.is_some_and(|needed| self.covers(needed)) || *extent >= last {
             return needed.is_some_and(|needed| self.covers(needed));
         }
-        // Bisection, because most often a shorter motion needs less. Another look is taken only if the budget still covers
-        // the searches of the longest motion found so far.
+        // Bisection, because most often a shorter motion needs less. Another estimate is made only if the budget still
+        // covers the searches of the longest motion found so far.
         let (mut longer, mut shorter, mut kept) = (*extent, last, None);
         while let Some(middle) = longer.middle(shorter) {
-            if !self.covers(kept.unwrap_or(0) + look) {
+            if !self.covers(kept.unwrap_or(0) + estimate) {
                 break;
             }
             match self.needed(pairs, &proposal.at(middle)) {
@@ -444,7 +447,8 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         Ok(())
     }
 
-    /// Instructions that the searches at a motion's end probably take; `None` if the budget does not cover the look.
+    /// Instructions that the searches at a motion's end probably take; `None` if the budget does not cover this
+    /// estimate.
     fn needed<P: Pair>(&mut self, pairs: &[P], point: &Vector) -> Option<u64> {
         let motion = RigidMotion::from_vector(self.about, point, self.lever);
         let mut needed = 0_u64;
@@ -457,7 +461,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
             if nearest >= state.least - EPSILON {
                 continue;
             }
-            self.pay(pair.opened().saturating_mul(LOOK)).then_some(())?;
+            self.pay(pair.opened().saturating_mul(ESTIMATE)).then_some(())?;
             // Each bound falls by the motion, and the distance may grow by it.
             let due = pair.due_within(state.axis_distance + 2.0 * moved);
             let tests = TESTS_OF_DUE * u64::from(due);

@@ -28,10 +28,10 @@ use crate::unavailable::QueryError;
 use crate::{Budget, Index, Tool, Tree, VertexTable};
 
 /// Most points of the axis searched.
-const LOOKS: u32 = 5;
+const MOST_SAMPLES: u32 = 5;
 
 /// The work for a point outside of its search, in node tests.
-const LOOK_COST: u32 = 16;
+const SAMPLE_COST: u32 = 16;
 
 /// Largest step along the axis, as a fraction of the depth.
 const STEP: f32 = 0.75;
@@ -89,7 +89,7 @@ impl ProfilePoint {
 }
 
 /// A search for a point's closest triangle.
-struct Look<'a, 't, I, V: ?Sized> {
+struct Sampler<'a, 't, I, V: ?Sized> {
     tree: &'a Tree<'t, I>,
     vertices: &'a V,
     roots: RootSet,
@@ -97,7 +97,7 @@ struct Look<'a, 't, I, V: ?Sized> {
     spent: Tests,
 }
 
-impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
+impl<I: Index, V: VertexTable + ?Sized> Sampler<'_, '_, I, V> {
     /// The closest triangle; `None` if the budget ends.
     #[cold]
     #[inline(never)]
@@ -107,14 +107,14 @@ impl<I: Index, V: VertexTable + ?Sized> Look<'_, '_, I, V> {
         point: Vec3,
     ) -> Result<Option<Proximity>, QueryError> {
         let Self { tree, vertices, roots, options, spent } = self;
-        let left = options.after(*spent).budget.tests().checked_sub(1 + LOOK_COST);
+        let left = options.after(*spent).budget.tests().checked_sub(1 + SAMPLE_COST);
         let Some(left) = left else { return Ok(None) };
         let options = options.within(Budget::new(left));
         let (point, first) = (AxisPoint(point), options.first(None));
         let search = Search::start(*roots, tree, stack, *vertices, &point, &options, first, None)?;
         let found = search.run::<WHOLE>(f32::INFINITY)?;
         *spent = spent.and(found.tests());
-        spent.node_tests = spent.node_tests.saturating_add(LOOK_COST);
+        spent.node_tests = spent.node_tests.saturating_add(SAMPLE_COST);
         Ok(Some(found).filter(|found| !found.is_cut_short()))
     }
 }
@@ -131,7 +131,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         options: &Options,
     ) -> Result<(AcrossPoint, Tests), QueryError> {
         let &Self { tree, vertices, tool, closest, .. } = self;
-        let mut look = Look {
+        let mut sampler = Sampler {
             tree,
             vertices,
             roots: tree.shells_of(tree.root_of(own.triangle.0)),
@@ -150,12 +150,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
         let first = ProfilePoint { along: 0.0, depth, slope: growth.abs() };
         let has_inward = first.slope * end > accuracy && depth > NO_DIRECTION * accuracy;
         if !has_inward {
-            return Ok((AcrossPoint::NONE, look.spent));
+            return Ok((AcrossPoint::NONE, sampler.spent));
         }
         // Upper bound on the depth of any point of the axis.
         let most = -closest.lower - tool.radius() + accuracy;
         let (mut near, mut far) = (first, None);
-        for _ in 0..LOOKS {
+        for _ in 0..MOST_SAMPLES {
             let (along, expected) = match &far {
                 Some((far, _)) => near.meeting(far),
                 None => {
@@ -174,17 +174,17 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
                 break;
             }
             let point = on_axis + inward * along;
-            let Some(found) = look.at(stack, point)? else { break };
+            let Some(found) = sampler.at(stack, point)? else { break };
             // From the point inside to the surface.
             let slope = found.direction.dot(inward);
-            let place = ProfilePoint { along, depth: found.axis_distance, slope };
-            if far.is_some() && place.depth >= expected - accuracy {
+            let sample = ProfilePoint { along, depth: found.axis_distance, slope };
+            if far.is_some() && sample.depth >= expected - accuracy {
                 break;
             }
             if !(slope > 0.0) {
-                far = Some((place, found));
-            } else if place.depth > near.depth {
-                near = place;
+                far = Some((sample, found));
+            } else if sample.depth > near.depth {
+                near = sample;
                 if !(along < end) && far.is_none() {
                     break;
                 }
@@ -194,22 +194,22 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
                 far = None;
             }
         }
-        let Some((far, other)) = far else { return Ok((AcrossPoint::NONE, look.spent)) };
+        let Some((far, other)) = far else { return Ok((AcrossPoint::NONE, sampler.spent)) };
         let (along, _) = near.meeting(&far);
         let point = on_axis + inward * along;
         let corners = positions(vertices, other.corners)?;
         let pair = AxisPoint(point).closest_on_triangle(&corners, f32::INFINITY);
-        let Some(pair) = pair else { return Ok((AcrossPoint::NONE, look.spent)) };
+        let Some(pair) = pair else { return Ok((AcrossPoint::NONE, sampler.spent)) };
         let outward = pair.on_surface - point;
         let normal = outward / sqrt(outward.length_squared());
         let fall = normal.dot(inward);
         let weight = first.slope / (first.slope + fall);
         if !(fall > 0.0 && weight < 1.0) {
-            return Ok((AcrossPoint::NONE, look.spent));
+            return Ok((AcrossPoint::NONE, sampler.spent));
         }
         let barycentric = pair.barycentric;
         let (on_axis, corners) = (point, other.corners);
         let across = AcrossPoint { weight, normal, on_axis, corners, barycentric, speed: 0.0 };
-        Ok((across, look.spent))
+        Ok((across, sampler.spent))
     }
 }

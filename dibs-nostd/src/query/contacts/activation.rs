@@ -1,13 +1,13 @@
 //! A contact's activation, so that its force neither starts nor ends with a step.
 //!
 //! A contact starts next to a lower one, while the path down to that one crosses no ridge. There its activation is 0.
-//! It grows with the ridge, and is 1 once the ridge is a 64th of the contact's distance: some 10 degrees, seen from the
-//! axis. The closest contact has activation 1. So has one at the same distance, whatever the ridge, so that nothing
-//! jumps when two contacts change their order; the activation falls with the difference in height.
+//! It grows with the prominence, and is 1 once that is a 64th of the contact's distance: some 10 degrees, seen from the
+//! axis. The closest contact has activation 1. So has one at the same distance, whatever the prominence, so that
+//! nothing jumps when two contacts change their order; the activation falls with the difference in height.
 //!
-//! A change of all heights by `e` changes a ridge by at most `2 e` (persistence: Cohen-Steiner, Edelsbrunner & Harer
-//! 2007). So an activation changes by at most `256 / distance` of the motion. Between flat walls it is at most
-//! `45 / distance`, since a ridge there grows by the sine of the 10 degrees.
+//! A change of all heights by `e` changes a prominence by at most `2 e` (persistence: Cohen-Steiner, Edelsbrunner &
+//! Harer 2007). So an activation changes by at most `256 / distance` of the motion. Between flat walls it is at most
+//! `45 / distance`, since a prominence there grows by the sine of the 10 degrees.
 
 // Requirement: C-04
 
@@ -20,8 +20,8 @@ use crate::query::prices::ACTIVATION;
 use crate::unavailable::QueryError;
 use crate::{Budget, Index, Tool, Tree, VertexTable};
 
-/// A contact has activation 0 up to a ridge of this fraction of its distance, and 1 from twice that on.
-const RIDGE: f32 = 1.0 / 128.0;
+/// A contact has activation 0 up to a prominence of this fraction of its distance, and 1 from twice that on.
+const PROMINENCE: f32 = 1.0 / 128.0;
 
 /// Most paths at a time that lead out of the visited triangles.
 const PATHS: usize = 48;
@@ -29,10 +29,10 @@ const PATHS: usize = 48;
 /// Most triangles visited.
 const STEPS: usize = 128;
 
-/// The ridge (mm) up to which a contact at this distance has activation 0.
-pub(super) fn least_ridge(distance: f32, (most, error): (f32, f32)) -> f32 {
-    let ridge = distance * RIDGE;
-    smaller(most, ridge) + error
+/// The prominence (mm) up to which a contact at this distance has activation 0.
+pub(super) fn least_prominence(distance: f32, (most, error): (f32, f32)) -> f32 {
+    let prominence = distance * PROMINENCE;
+    smaller(most, prominence) + error
 }
 
 #[derive(Clone, Copy)]
@@ -88,13 +88,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> TriangleTester<'_, '_, I, V, T>
 impl<const N: usize> Basins<N> {
     /// The activation of the contact at a triangle, from 0 to 1. It is 1 if memory or budget ran out.
     ///
-    /// Follows the paths out of its basin, the lowest first. `most` limits the ridge below which the activation is 0,
-    /// for a distant axis; `error` is that of two heights. Triangles that `is_left_out` are not crossed.
+    /// Follows the paths out of its basin, the lowest first. `most` limits the prominence below which the activation is
+    /// 0, for a distant axis; `error` is that of two heights. Triangles that `is_left_out` are not crossed.
     pub fn activation<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
         row: u32,
-        ridges: (f32, f32),
+        prominences: (f32, f32),
         is_left_out: impl Fn(u32) -> bool,
         tester: &mut TriangleTester<'_, '_, I, V, T>,
     ) -> Result<f32, QueryError> {
@@ -105,15 +105,15 @@ impl<const N: usize> Basins<N> {
             return Ok(1.0);
         };
         let Some(()) = tester.pay_for(ACTIVATION) else { return Ok(1.0) };
-        let none = least_ridge(own, ridges);
+        let none = least_prominence(own, prominences);
         let full = 2.0 * none;
         let mut least = full;
         let mut paths = [Path { height: own, entry }; PATHS];
         let mut count = 1;
         for _ in 0..STEPS {
             let Some(Path { height, entry }) = take_lowest(&mut paths, &mut count) else { break };
-            let ridge = height - own;
-            if !(ridge < least) {
+            let prominence = height - own;
+            if !(prominence < least) {
                 break;
             }
             if self.is_marked(entry) {
@@ -121,9 +121,9 @@ impl<const N: usize> Basins<N> {
             }
             self.mark(entry);
             let (Some(near), Some(())) = (self.at(entry), tester.pay()) else { return Ok(1.0) };
-            // Next to a point that is hardly lower, the ridge does not matter.
+            // Next to a point that is hardly lower, the prominence does not matter.
             let tied = full - (own - sqrt(near.square));
-            let parted = larger(ridge, tied);
+            let parted = larger(prominence, tied);
             if parted < least {
                 least = parted;
             }
@@ -140,7 +140,7 @@ impl<const N: usize> Basins<N> {
                 if self.is_marked(next) || !(over - own < least) {
                     continue;
                 }
-                if !near.place.is_on(edge) {
+                if !near.point.is_on(edge) {
                     let Some(edge) = tester.edge(near.row, edge)? else { return Ok(1.0) };
                     over = larger(over, edge);
                 }
@@ -180,13 +180,13 @@ mod tests {
     use crate::{Capsule, Contacts, Options, Query, Tree};
 
     /// Adds a strip of squares of half a millimetre, 40 mm long and 4 mm wide.
-    fn add_strip(mesh: &mut Mesh, place: impl Fn(f32, f32) -> Vec3) {
+    fn add_strip(mesh: &mut Mesh, position: impl Fn(f32, f32) -> Vec3) {
         const LONG: u32 = 80;
         const WIDE: u32 = 8;
         let first = mesh.positions.len() as u32;
         for y in 0..=WIDE {
             for x in 0..=LONG {
-                mesh.positions.push(place(0.5 * x as f32 - 20.0, 0.5 * y as f32 - 2.0));
+                mesh.positions.push(position(0.5 * x as f32 - 20.0, 0.5 * y as f32 - 2.0));
                 if x < LONG && y < WIDE {
                     let a = first + y * (LONG + 1) + x;
                     let (b, c, d) = (a + 1, a + LONG + 1, a + LONG + 2);

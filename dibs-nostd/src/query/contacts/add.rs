@@ -19,8 +19,8 @@ use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 
-/// Ridges above a contact are examined up to this fraction of the margin: the largest for an activation of 1.
-const RIDGE: f32 = 1.0 / 64.0;
+/// Prominences of a contact are examined up to this fraction of the margin: the largest for an activation of 1.
+const PROMINENCE: f32 = 1.0 / 64.0;
 
 /// Within this many accuracies two points are too close to give a direction.
 pub(super) const NO_DIRECTION: f32 = 16.0;
@@ -118,8 +118,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         // How triangles lie to each other depends on the error of their distances only: a tracker's pair is less exact.
         let mut error = accuracy;
         let extent = |error: f32| {
-            let ridge = (margin * RIDGE) + 2.0 * error;
-            (tool.radius() + margin + ridge, ridge)
+            let prominence = (margin * PROMINENCE) + 2.0 * error;
+            (tool.radius() + margin + prominence, prominence)
         };
         let SearchExtent { complete, beyond, tests: mut made } = if is_begun {
             let search = pair.over_range(stack, options)?;
@@ -128,14 +128,14 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         } else {
             SearchExtent::NOT_BEGUN
         };
-        let (limit, ridge) = extent(error);
+        let (limit, prominence) = extent(error);
         let is_crossing = matches!(closest.side, Side::Crossing | Side::Either);
         let has_crossing = is_crossing && own.is_some();
         if let Some(contact) = own.filter(|_| is_crossing) {
             found.insert(contact);
         }
         let left = options.after(made).budget.tests();
-        let (limit_above, is_priced) = (limit + ridge, options.is_priced);
+        let (limit_above, is_priced) = (limit + prominence, options.is_priced);
         let mut tester = TriangleTester {
             pair,
             limit: limit_above,
@@ -146,7 +146,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         };
         let (mut least, mut inner, mut meets) = (f32::INFINITY, f32::INFINITY, 0_u32);
         let is_left_out = |row| !is_of(TriangleRow(row));
-        let ridges = (0.5 * RIDGE * margin, 2.0 * error);
+        let prominences = (0.5 * PROMINENCE * margin, 2.0 * error);
         let visit = |near: NearTriangle| {
             let is_on = sqrt(near.square) <= accuracy;
             meets += u32::from(is_on);
@@ -174,7 +174,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         };
         // A search that was not begun has left an earlier one's triangles.
         let missing = if is_begun {
-            basins.each_basin(tree, ridges, is_left_out, &mut tester, visit)?
+            basins.each_basin(tree, prominences, is_left_out, &mut tester, visit)?
         } else {
             None
         };
@@ -182,8 +182,8 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         if let Some(missing) = missing.map(sqrt).filter(|&missing| missing < from) {
             from = missing;
         }
-        // A basin's lowest triangle is less than a ridge below the visited low triangle.
-        let bound = if from < limit { from - ridge - tool.radius() } else { f32::INFINITY };
+        // A basin's lowest triangle is less than the prominence below the visited low triangle.
+        let bound = if from < limit { from - prominence - tool.radius() } else { f32::INFINITY };
         let is_met = is_crossing || closest.is_at_surface();
         let is_certain = is_met || !closest.is_cut_short();
         // Nothing that is missing is deeper than what the search has found; or it has found all.
@@ -195,7 +195,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
             if is_own && contact.separation > deepest {
                 let row = contact.triangle.0;
                 contact.activation =
-                    basins.activation(tree, row, ridges, is_left_out, &mut tester)?;
+                    basins.activation(tree, row, prominences, is_left_out, &mut tester)?;
             }
         }
         made = made.and(tester.made);
@@ -208,12 +208,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
                 found.insert(contact);
             } else if !is_certain && !is_found {
                 // Nothing is deeper than the least separation that an uncertain pair may have.
-                let place = |at: &Contact| (at.surface, at.tool, at.triangle);
+                let key = |at: &Contact| (at.surface, at.tool, at.triangle);
                 let is_near = |at: &Contact| {
                     at.point_on_surface.distance_squared(contact.point_on_surface)
                         <= accuracy * accuracy
                 };
-                found.list.retain(|other| place(other) != place(&contact) && !is_near(other));
+                found.list.retain(|other| key(other) != key(&contact) && !is_near(other));
                 found.insert(contact);
             }
         }
@@ -253,7 +253,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Pair<'_, I, V, T> {
             Some(found) => Ok(near(row, &found, accuracy)),
             None => match rows.into_iter().zip(corners).find(|(_, corner)| !corner.is_finite()) {
                 Some((vertex, _)) => Err(QueryError::Position { vertex }),
-                None => Ok(NearTriangle { square: f32::INFINITY, row, place: ClosestPoint::NONE }),
+                None => Ok(NearTriangle { square: f32::INFINITY, row, point: ClosestPoint::NONE }),
             },
         }
     }
@@ -312,8 +312,8 @@ fn may_be_inside(closest: &Proximity) -> bool {
 
 /// A triangle at this pair. Within some accuracies it has no direction.
 pub(super) fn near(row: u32, pair: &AxisPair, accuracy: f32) -> NearTriangle {
-    let place = ClosestPoint::of(pair, NO_DIRECTION * accuracy);
-    NearTriangle { square: pair.distance_squared, row, place }
+    let point = ClosestPoint::of(pair, NO_DIRECTION * accuracy);
+    NearTriangle { square: pair.distance_squared, row, point }
 }
 
 /// The pair of a tool and the lowest triangle of a basin.

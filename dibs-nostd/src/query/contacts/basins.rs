@@ -1,19 +1,19 @@
 //! Selects the triangles near a tool that are closer than their surroundings.
 //!
-//! The distance from the tool is a height over the surface, and each basin of it is a contact. A flood from each low
-//! triangle, the lowest first, descends to a triangle with no lower neighbour. Then it rises over triangles in nearly
-//! the same direction by a ridge. This is the ridge up to which a contact has activation 0, so no contact ends while it
-//! acts. If it meets the flood of a lower triangle in nearly the same direction, both are one basin: a flat wall along
+//! The distance from the tool is a height over the surface, and each basin of it is a contact. A basin grows from each
+//! low triangle, the lowest first: it descends to a triangle with no lower neighbour. Then it rises over triangles in
+//! nearly the same direction by the prominence up to which a contact has activation 0, so no contact ends while it
+//! acts. If it meets the basin of a lower triangle in nearly the same direction, both are one basin: a flat wall along
 //! a capsule is one basin, however many triangles are equally far; two walls are two, however low the ridge between
 //! them.
 //!
 //! Over a triangle the height is convex. So the path from its lowest point to a neighbour crosses no ridge exactly if
 //! that point is on their common edge.
 //!
-//! If memory or budget runs out, a flood does not rise. Then one basin may be reported as two, but none is lost,
+//! If memory or budget runs out, a basin does not rise. Then one basin may be reported as two, but none is missing,
 //! unless the neighbours of a triangle could not be tested.
 //!
-//! One file, because floods and triangles keep their fields private.
+//! One file, because basins and triangles keep their fields private.
 
 // Requirement: S-04
 
@@ -31,7 +31,7 @@ use crate::{Index, Tool, Tree, VertexTable};
 pub(super) struct NearTriangle {
     pub square: f32,
     pub row: u32,
-    pub place: ClosestPoint,
+    pub point: ClosestPoint,
 }
 
 /// The closest point of a triangle: the direction to the tool, in 9 bits per axis, and the edges that contain it, one
@@ -83,14 +83,14 @@ impl ClosestPoint {
 struct Key {
     square: u32,
     row: u32,
-    place: ClosestPoint,
+    point: ClosestPoint,
 }
 
 impl Key {
-    const NONE: Self = Self { square: 0, row: 0, place: ClosestPoint::NONE };
+    const NONE: Self = Self { square: 0, row: 0, point: ClosestPoint::NONE };
 
     fn of(near: NearTriangle) -> Self {
-        Self { square: near.square.to_bits(), row: near.row, place: near.place }
+        Self { square: near.square.to_bits(), row: near.row, point: near.point }
     }
 
     fn square(self) -> f32 {
@@ -98,13 +98,13 @@ impl Key {
     }
 
     fn near(self) -> NearTriangle {
-        NearTriangle { square: self.square(), row: self.row, place: self.place }
+        NearTriangle { square: self.square(), row: self.row, point: self.point }
     }
 }
 
 const NONE: u16 = u16::MAX;
 
-/// The nearest low triangles, at most half of `N`; then the triangles that floods have reached.
+/// The nearest low triangles, at most half of `N`; then the triangles that basins have reached.
 #[derive(Clone, Debug)]
 pub(super) struct Basins<const N: usize> {
     near: [Key; N],
@@ -114,18 +114,19 @@ pub(super) struct Basins<const N: usize> {
     /// remainder.
     heads: [u16; N],
     next: [u16; N],
-    /// For each entry, the low triangle whose flood reached it.
+    /// For each entry, the low triangle whose basin reached it.
     reached_by: [u16; N],
-    /// Entries that the current flood has reached, in order.
+    /// Entries that the current basin has reached, in order.
     reached: [u16; N],
     count: usize,
 }
 
-enum Flood {
+/// How the growth of a basin ended.
+enum BasinEnd {
     /// It has reached everything below its level; the lowest triangle. If that is beyond a ridge and in another
     /// direction, also the lowest before the ridge.
-    Ended(NearTriangle, Option<NearTriangle>),
-    /// It has met the flood of a lower triangle in nearly the same direction.
+    Complete(NearTriangle, Option<NearTriangle>),
+    /// It has met the basin of a lower triangle in nearly the same direction.
     Joined,
     /// Memory or budget ran out; a neighbour may be lower.
     CutShort,
@@ -152,8 +153,8 @@ impl<const N: usize> Basins<N> {
     pub fn push(&mut self, near: NearTriangle) -> Option<f32> {
         let key = Key::of(near);
         let low = self.near.get_mut(..N.div_ceil(2))?;
-        if let Some(place) = low.get_mut(self.count) {
-            *place = key;
+        if let Some(slot) = low.get_mut(self.count) {
+            *slot = key;
             self.count += 1;
             return None;
         }
@@ -168,15 +169,15 @@ impl<const N: usize> Basins<N> {
     }
 
     /// Finds the basins. Between basins in nearly the same direction, ridges that leave the higher one without
-    /// activation are ignored (`ridges`: see [`activation::least_ridge`]). Calls back with the lowest triangle of each,
-    /// nearest first. Points that differ by at most the ridges' error count as equally far. Triangles that
-    /// `is_left_out` are skipped.
+    /// activation are ignored (`prominences`: see [`activation::least_prominence`]). Calls back with the lowest
+    /// triangle of each, nearest first. Points that differ by at most the prominences' error count as equally far.
+    /// Triangles that `is_left_out` are skipped.
     ///
     /// Returns the square of the distance beyond which basins may be missing, if any.
     pub fn each_basin<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
-        ridges: (f32, f32),
+        prominences: (f32, f32),
         is_left_out: impl Fn(u32) -> bool,
         tester: &mut TriangleTester<'_, '_, I, V, T>,
         mut visit: impl FnMut(NearTriangle) -> Result<(), QueryError>,
@@ -195,8 +196,8 @@ impl<const N: usize> Basins<N> {
             }
         };
         for entry in 0..low {
-            match self.flood(tree, entry as u16, ridges, &is_left_out, tester)? {
-                Flood::Ended(lowest, beside) => {
+            match self.grow(tree, entry as u16, prominences, &is_left_out, tester)? {
+                BasinEnd::Complete(lowest, beside) => {
                     for basin in [Some(lowest), beside].into_iter().flatten() {
                         match tester.pay_for(BASIN) {
                             Some(()) => visit(basin)?,
@@ -204,8 +205,8 @@ impl<const N: usize> Basins<N> {
                         }
                     }
                 }
-                Flood::Joined => (),
-                Flood::CutShort => {
+                BasinEnd::Joined => (),
+                BasinEnd::CutShort => {
                     if let Some(key) = self.near.get(entry) {
                         miss(key.square());
                     }
@@ -215,30 +216,31 @@ impl<const N: usize> Basins<N> {
         Ok(missing)
     }
 
-    /// Floods the surroundings of a low triangle up to a ridge above the lowest point.
-    fn flood<I: Index, V: VertexTable + ?Sized, T: Tool>(
+    /// Grows a basin around a low triangle up to a prominence above the lowest point.
+    fn grow<I: Index, V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         tree: &Tree<'_, I>,
         low: u16,
-        ridges: (f32, f32),
+        prominences: (f32, f32),
         is_left_out: &impl Fn(u32) -> bool,
         tester: &mut TriangleTester<'_, '_, I, V, T>,
-    ) -> Result<Flood, QueryError> {
+    ) -> Result<BasinEnd, QueryError> {
         let Some(&(mut lowest)) = self.near.get(usize::from(low)) else {
-            return Ok(Flood::Joined);
+            return Ok(BasinEnd::Joined);
         };
         let mut height = sqrt(lowest.square());
-        let (ridge, error) = (activation::least_ridge(height, ridges), ridges.1);
+        let (prominence, error) =
+            (activation::least_prominence(height, prominences), prominences.1);
         // The lowest before any ridge; the entry of the lowest; whether that is beyond a ridge; the lowest triangle
-        // there that another flood has reached.
+        // there that another basin has reached.
         let (mut own, mut at_lowest, mut has_crossed, mut other_lowest) =
             (lowest, low, false, None);
         let mut count = 0;
         if !self.reach(low, low, &mut count) {
-            return Ok(Flood::Joined);
+            return Ok(BasinEnd::Joined);
         }
         // Numbers of entries whose lower neighbours have been visited, and whose other edges have been crossed. The
-        // flood rises only if no way down is left; otherwise it would take a slope for a basin.
+        // basin rises only if no way down is left; otherwise it would take a slope for a basin.
         let (mut descended, mut risen) = (0, 0);
         for _ in 0..2 * N {
             let rises = descended == count;
@@ -250,17 +252,17 @@ impl<const N: usize> Basins<N> {
                 if rises {
                     break;
                 }
-                return Ok(Flood::CutShort);
+                return Ok(BasinEnd::CutShort);
             };
             for edge in 0..3 {
-                let is_over = from.place.is_on(edge);
+                let is_over = from.point.is_on(edge);
                 let is_level = is_over && sqrt(from.square()) <= height + error;
                 if !(rises || is_level) {
                     continue;
                 }
                 let Some(()) = tester.pay_for(EDGE) else {
                     if is_level {
-                        return Ok(Flood::CutShort);
+                        return Ok(BasinEnd::CutShort);
                     }
                     continue;
                 };
@@ -270,7 +272,7 @@ impl<const N: usize> Basins<N> {
                 }
                 let Some(next) = self.entry(across, &mut |row| tester.triangle(row))? else {
                     if is_level {
-                        return Ok(Flood::CutShort);
+                        return Ok(BasinEnd::CutShort);
                     }
                     continue;
                 };
@@ -278,25 +280,25 @@ impl<const N: usize> Basins<N> {
                 let (Some(&key), Some(&by)) = (self.near.get(at), self.reached_by.get(at)) else {
                     continue;
                 };
-                let top = height + ridge;
+                let top = height + prominence;
                 let is_within = sqrt(key.square()) <= top;
-                if by == low || !is_within || !(is_level || key.place.is_like(own.place)) {
+                if by == low || !is_within || !(is_level || key.point.is_like(own.point)) {
                     continue;
                 }
-                // Both may be low with a high edge between them. If the budget runs out, the flood does not rise.
+                // Both may be low with a high edge between them. If the budget runs out, the basin does not rise.
                 if !is_over && !tester.edge(from.row, edge)?.is_some_and(|over| over <= top) {
                     continue;
                 }
                 if !self.reach(next, low, &mut count) {
                     let other = self.near.get(usize::from(by));
-                    let is_other = other.is_some_and(|other| !other.place.is_like(own.place));
+                    let is_other = other.is_some_and(|other| !other.point.is_like(own.point));
                     if (has_crossed || !is_level) && is_other {
                         if other_lowest.is_none_or(|met| key < met) {
                             other_lowest = Some(key);
                         }
                         continue;
                     }
-                    return Ok(Flood::Joined);
+                    return Ok(BasinEnd::Joined);
                 }
                 if key < lowest {
                     (lowest, at_lowest) = (key, next);
@@ -308,31 +310,31 @@ impl<const N: usize> Basins<N> {
                 }
             }
         }
-        // The flood's direction is that of its lowest triangle.
+        // The basin's direction is that of its lowest triangle.
         for entry in self.reached.iter().take(count) {
             if let Some(by) = self.reached_by.get_mut(usize::from(*entry)) {
                 *by = at_lowest;
             }
         }
         let leads_away = other_lowest.is_some_and(|met| met < lowest);
-        if !has_crossed || !leads_away && lowest.place.is_like(own.place) {
-            return Ok(Flood::Ended(lowest.near(), None));
+        if !has_crossed || !leads_away && lowest.point.is_like(own.point) {
+            return Ok(BasinEnd::Complete(lowest.near(), None));
         }
         Ok(if leads_away {
-            Flood::Ended(own.near(), None)
+            BasinEnd::Complete(own.near(), None)
         } else {
-            Flood::Ended(lowest.near(), Some(own.near()))
+            BasinEnd::Complete(lowest.near(), Some(own.near()))
         })
     }
 
-    /// Adds an entry to the flood of `low`, of `count` entries. Returns whether it was in no flood before.
+    /// Adds an entry to the basin of `low`, of `count` entries. Returns whether it was in no basin before.
     fn reach(&mut self, entry: u16, low: u16, count: &mut usize) -> bool {
         let by = self.reached_by.get_mut(usize::from(entry));
-        let (Some(by), Some(place)) = (by, self.reached.get_mut(*count)) else { return false };
+        let (Some(by), Some(slot)) = (by, self.reached.get_mut(*count)) else { return false };
         if *by != NONE {
             return false;
         }
-        (*by, *place) = (low, entry);
+        (*by, *slot) = (low, entry);
         *count += 1;
         true
     }
@@ -347,9 +349,9 @@ impl<const N: usize> Basins<N> {
         if known.is_some() {
             return Ok(known);
         }
-        let Some(place) = self.near.get_mut(self.count) else { return Ok(None) };
+        let Some(slot) = self.near.get_mut(self.count) else { return Ok(None) };
         let Some(near) = test(row)? else { return Ok(None) };
-        *place = Key::of(near);
+        *slot = Key::of(near);
         self.enter(self.count);
         self.count += 1;
         Ok(Some((self.count - 1) as u16))
@@ -363,7 +365,7 @@ impl<const N: usize> Basins<N> {
         self.at(entry).map(|near| sqrt(near.square))
     }
 
-    /// Clears the marks of all entries, including those of floods.
+    /// Clears the marks of all entries, including those of basins.
     pub(super) fn forget(&mut self) {
         self.reached_by.get_mut(..self.count).unwrap_or_default().fill(NONE);
     }
@@ -429,7 +431,7 @@ fn heap(keys: &mut [Key]) {
     }
 }
 
-/// Replaces the key at `at` and moves the new key down to its place in the heap.
+/// Replaces the key at `at` and moves the new key down to its slot in the heap.
 fn sink(heap: &mut [Key], mut at: usize, key: Key) {
     while let Some(&left) = heap.get(2 * at + 1) {
         let right = heap.get(2 * at + 2).copied().filter(|&right| right > left);
@@ -437,12 +439,12 @@ fn sink(heap: &mut [Key], mut at: usize, key: Key) {
         if farther <= key {
             break;
         }
-        if let Some(place) = heap.get_mut(at) {
-            *place = farther;
+        if let Some(slot) = heap.get_mut(at) {
+            *slot = farther;
         }
         at = child;
     }
-    if let Some(place) = heap.get_mut(at) {
-        *place = key;
+    if let Some(slot) = heap.get_mut(at) {
+        *slot = key;
     }
 }

@@ -35,10 +35,10 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         stack: &mut [WaitingNode],
         options: &Options,
     ) -> Result<Tests, QueryError> {
-        self.add_from(pair, stack, options, |basins, search, options, (limit, ridge)| {
+        self.add_from(pair, stack, options, |basins, search, options, (limit, prominence)| {
             let mut low = Low::new(basins, limit, search.accuracy());
             let visit = |row, at: &AxisPair| low.add(row, at);
-            let (beyond, tests) = search.each_low(limit, (ridge, options), visit)?;
+            let (beyond, tests) = search.each_low(limit, (prominence, options), visit)?;
             Ok(SearchExtent { complete: low.complete, beyond, tests })
         })
     }
@@ -53,12 +53,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     ) -> Result<Tests, QueryError> {
         let mut is_begun = false;
         let made =
-            self.add_from(pair, stack, options, |basins, search, options, (limit, ridge)| {
+            self.add_from(pair, stack, options, |basins, search, options, (limit, prominence)| {
                 is_begun = true;
                 let mut low = Low::new(basins, limit, search.accuracy());
                 let visit = |row, at: &AxisPair| low.add(row, at);
                 let (beyond, tests) =
-                    search.each_low_from(&mut front, limit, (ridge, options), visit)?;
+                    search.each_low_from(&mut front, limit, (prominence, options), visit)?;
                 front.keep(beyond == f32::INFINITY);
                 Ok(SearchExtent { complete: low.complete, beyond, tests })
             })?;

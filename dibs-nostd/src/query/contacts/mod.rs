@@ -298,7 +298,11 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
 
     /// Transforms each contact to another frame, by functions for points and vectors.
     #[cfg(all(feature = "bus", feature = "control"))]
-    pub(crate) fn place(&mut self, point: impl Fn(Vec3) -> Vec3, vector: impl Fn(Vec3) -> Vec3) {
+    pub(crate) fn transform(
+        &mut self,
+        point: impl Fn(Vec3) -> Vec3,
+        vector: impl Fn(Vec3) -> Vec3,
+    ) {
         for contact in &mut self.found.list {
             contact.normal = vector(contact.normal);
             contact.point_on_surface = point(contact.point_on_surface);

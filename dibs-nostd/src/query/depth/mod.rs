@@ -18,8 +18,8 @@
 
 // Requirement: S-03
 
-mod look;
 mod part;
+mod sample;
 mod start;
 mod touches;
 mod walk;
@@ -38,15 +38,15 @@ use crate::tool::Tool;
 use crate::tree::RootSet;
 use crate::unavailable::QueryError;
 use crate::{Index, Tree, TriangleRow, VertexTable};
-use look::LOOK_COST;
 use part::{Bound, Fit, MOST_DISTANCES, Part, Parts, Sample};
+use sample::SAMPLE_COST;
 use touches::Touches;
 
 /// A limit that never ends a search early.
 const EXACT: f32 = f32::NEG_INFINITY;
 
 /// Most points of the axis that are searched.
-const LOOKS: u32 = 27;
+const MOST_SAMPLES: u32 = 27;
 
 /// Node tests that any depth may take, however small the tree.
 const LEAST_WORK: u32 = 4_608;
@@ -75,7 +75,7 @@ pub(super) struct Depth<'s, 't, I, V: ?Sized, T> {
     deepest: f32,
     /// Its parameter; NaN if no point is inside.
     deepest_at: f32,
-    looks: u32,
+    samples: u32,
     remembered: Option<RememberedDepth<'s>>,
     /// Whether a tick's [work besides its tests](super::prices) counts.
     is_priced: bool,
@@ -123,7 +123,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             answer: *closest,
             deepest,
             deepest_at,
-            looks: 0,
+            samples: 0,
             is_priced: options.is_priced && remembered.is_some(),
             remembered,
             roots,
@@ -190,7 +190,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
         tolerance: f32,
         last: Option<f32>,
     ) -> Result<f32, QueryError> {
-        self.look_again(parts, last)?;
+        self.measure_again(parts, last)?;
         if self.searched().is_some_and(|at| !at.is_nan()) {
             self.go_on(parts)?;
         }
@@ -211,7 +211,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                 self.spend_if_priced(TURN);
                 for row in ends {
                     if split.is_none() {
-                        self.place(parts, row)?;
+                        self.load_corners(parts, row)?;
                     } else {
                         self.walk(parts, row)?;
                     }
@@ -226,10 +226,10 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
             if self.remembered.is_some() {
                 self.spend_if_priced(TURN);
                 if let Some(end) = ends.into_iter().find(|&row| is_open(&parts.sample(row))) {
-                    if self.looks >= LOOKS || self.is_spent() {
+                    if self.samples >= MOST_SAMPLES || self.is_spent() {
                         return Ok(bound);
                     }
-                    let sample = self.look(parts.sample(end), enough)?;
+                    let sample = self.measure(parts.sample(end), enough)?;
                     parts.set_sample(end, sample);
                     if self.lacks(BOUND_COST) {
                         return Ok(bound);
@@ -238,25 +238,25 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
                     continue;
                 }
             }
-            let Some(place) = self.room(parts, enough) else { return Ok(bound) };
+            let Some(free) = self.room(parts, enough) else { return Ok(bound) };
             let (from, to) = (parts.sample(row), parts.sample(next));
             let is_nearer = split - from.along < to.along - split;
             let ends = if is_nearer { [&from, &to] } else { [&to, &from] };
             let mut middle = self.between(split, ends, enough)?;
             if middle.depth > enough {
-                middle = self.look(middle, enough)?;
+                middle = self.measure(middle, enough)?;
             }
             let enough = self.enough(tolerance);
             if self.lacks(2 * BOUND_COST) {
                 // A later turn, of this tick or another, bounds them.
-                parts.set(row, Part::remembered(from, place, bound));
+                parts.set(row, Part::remembered(from, free, bound));
                 parts.push(Part::remembered(middle, next, bound));
                 continue;
             }
             let before = Bound::between(&from, &middle, enough, &self.touches);
             let after = Bound::between(&middle, &to, enough, &self.touches);
             self.spend((before.distances + after.distances) * DISTANCE_COST);
-            parts.set(row, Part::new(from, place, &before, bound));
+            parts.set(row, Part::new(from, free, &before, bound));
             parts.push(Part::new(middle, next, &after, bound));
         }
     }
@@ -305,7 +305,7 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'s, 't, I, V, T> 
 
     /// The row for another part, if one may be divided.
     fn room(&self, parts: &mut Parts, enough: f32) -> Option<usize> {
-        if self.looks >= LOOKS || self.is_spent_for(2 * LOOK_COST) {
+        if self.samples >= MOST_SAMPLES || self.is_spent_for(2 * SAMPLE_COST) {
             return None;
         }
         if parts.free().is_none() {

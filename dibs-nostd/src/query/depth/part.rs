@@ -267,8 +267,8 @@ impl Parts {
     }
 
     pub fn set(&mut self, row: usize, part: Part) {
-        if let Some(place) = self.rows.get_mut(row) {
-            *place = part;
+        if let Some(slot) = self.rows.get_mut(row) {
+            *slot = part;
         }
     }
 

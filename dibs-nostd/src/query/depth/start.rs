@@ -25,8 +25,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let mut next = 0;
         loop {
             let row = match (self.ties.touched_from(next), self.closest.triangle) {
-                (Some((place, row)), _) => {
-                    next = place + 1;
+                (Some((at, row)), _) => {
+                    next = at + 1;
                     row
                 }
                 // A tracker's accuracy is larger than a search's, so the closest triangle may not be among the touched
@@ -68,11 +68,11 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let start = self.end(0.0, &closest, tolerance)?;
         let end = self.end(1.0, &closest, tolerance)?;
         parts.push(Part::remembered(start, 1, reach));
-        for place in self.touches.places() {
-            let row = place.triangle.0;
+        for touch in self.touches.touches() {
+            let row = touch.triangle.0;
             let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;
-            let touch = self.sample(place.parameter, depth, Some(place.triangle), corners)?;
-            parts.push(Part::remembered(touch, parts.count() + 1, reach));
+            let sample = self.sample(touch.parameter, depth, Some(touch.triangle), corners)?;
+            parts.push(Part::remembered(sample, parts.count() + 1, reach));
         }
         let is_end = axis_parameter <= 0.0 || axis_parameter >= 1.0;
         if parts.count() < 2 && !is_end {
@@ -100,7 +100,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             return Ok(self.at(parameter, 0.0, near));
         }
         let most = near.depth + (along - near.along).abs();
-        self.look(self.at(parameter, most, near), self.enough(tolerance))
+        self.measure(self.at(parameter, most, near), self.enough(tolerance))
     }
 
     /// The last tick's parts, each at most `reach` deep. Returns the parameter of the deepest point, if there are any.

@@ -9,7 +9,7 @@ use crate::math::sqrt::sqrt;
 use crate::tool::{AxisPair, AxisPoint, SLIVER, Tool};
 
 /// Most intervals kept apart.
-const PLACES: usize = 8;
+const TOUCHES: usize = 8;
 
 /// Square of the sine of the angle between axis and triangle plane, 1/16. Below it, the length that touches the
 /// triangle is found by bisection.
@@ -20,7 +20,7 @@ const HALVINGS: u32 = 8;
 /// The disjoint intervals in which an axis may meet the surface.
 #[derive(Clone, Debug)]
 pub(super) struct Touches {
-    places: Vec<Touch, PLACES>,
+    touches: Vec<Touch, TOUCHES>,
 }
 
 /// An interval of the axis that may meet the surface, in lengths from its start.
@@ -54,7 +54,7 @@ impl Touch {
 
 impl Touches {
     /// No interval.
-    pub const NONE: Self = Self { places: Vec::new() };
+    pub const NONE: Self = Self { touches: Vec::new() };
 
     /// The whole axis.
     pub fn anywhere() -> Self {
@@ -118,45 +118,45 @@ impl Touches {
     }
 
     /// Adds an interval, joined with all that it overlaps.
-    fn insert(&mut self, mut place: Touch) {
-        self.places.retain(|other| {
-            let is_apart = other.last < place.first || other.first > place.last;
+    fn insert(&mut self, mut touch: Touch) {
+        self.touches.retain(|other| {
+            let is_apart = other.last < touch.first || other.first > touch.last;
             if !is_apart {
-                place = place.joined(other);
+                touch = touch.joined(other);
             }
             is_apart
         });
-        for other in &mut self.places {
-            if other.first > place.first {
-                core::mem::swap(other, &mut place);
+        for other in &mut self.touches {
+            if other.first > touch.first {
+                core::mem::swap(other, &mut touch);
             }
         }
-        self.push(place);
+        self.push(touch);
     }
 
     /// Appends an interval; if there is no room, joins it to the last one.
-    fn push(&mut self, place: Touch) {
-        if let Err(place) = self.places.push(place)
-            && let Some(last) = self.places.last_mut()
+    fn push(&mut self, touch: Touch) {
+        if let Err(touch) = self.touches.push(touch)
+            && let Some(last) = self.touches.last_mut()
         {
-            *last = Touch { before: None, after: None, ..last.joined(&place) };
+            *last = Touch { before: None, after: None, ..last.joined(&touch) };
         }
     }
 
     /// The intervals, unless they are unknown.
-    pub fn places(&self) -> impl Iterator<Item = &Touch> {
-        self.places.iter().filter(|place| place.last < f32::INFINITY)
+    pub fn touches(&self) -> impl Iterator<Item = &Touch> {
+        self.touches.iter().filter(|touch| touch.last < f32::INFINITY)
     }
 
     /// Notes that the axis is outside at this length.
     pub fn add_outside(&mut self, along: f32) {
         let mut previous: Option<&mut Touch> = None;
-        for place in &mut self.places {
-            if place.first > along {
-                place.before.get_or_insert(true);
+        for touch in &mut self.touches {
+            if touch.first > along {
+                touch.before.get_or_insert(true);
                 break;
             }
-            previous = (place.last < along).then_some(place);
+            previous = (touch.last < along).then_some(touch);
             if previous.is_none() {
                 return;
             }
@@ -171,14 +171,14 @@ impl Touches {
     pub fn ahead(&self, along: f32) -> Free {
         let mut free = Free { from: along, to: f32::INFINITY, is_outside: false };
         let mut previous = None;
-        for place in &self.places {
-            if place.first > free.from {
-                return Free { to: place.first, ..free.between(previous, place.before) };
+        for touch in &self.touches {
+            if touch.first > free.from {
+                return Free { to: touch.first, ..free.between(previous, touch.before) };
             }
-            if place.last >= free.from {
-                free.from = place.last;
+            if touch.last >= free.from {
+                free.from = touch.last;
             }
-            previous = place.after;
+            previous = touch.after;
         }
         free.between(previous, None)
     }
@@ -188,14 +188,14 @@ impl Touches {
     pub fn behind(&self, along: f32) -> Free {
         let mut free = Free { from: along, to: f32::NEG_INFINITY, is_outside: false };
         let mut next = None;
-        for place in self.places.iter().rev() {
-            if place.last < free.from {
-                return Free { to: place.last, ..free.between(place.after, next) };
+        for touch in self.touches.iter().rev() {
+            if touch.last < free.from {
+                return Free { to: touch.last, ..free.between(touch.after, next) };
             }
-            if place.first <= free.from {
-                free.from = place.first;
+            if touch.first <= free.from {
+                free.from = touch.first;
             }
-            next = place.before;
+            next = touch.before;
         }
         free.between(None, next)
     }
@@ -229,7 +229,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_that_overlap_are_one() {
+    fn touches_that_overlap_are_one() {
         let mut rng = Rng::with_seed(7);
         let (mut joined, mut full) = (0, 0);
         for _ in 0..2_000 {
@@ -249,13 +249,13 @@ mod tests {
                 expected.push(one);
                 expected.sort_by(|a, b| a.0.total_cmp(&b.0));
                 // Without room the last two are joined.
-                if expected.len() > PLACES
+                if expected.len() > TOUCHES
                     && let Some((_, last)) = expected.pop()
                 {
                     full += 1;
-                    expected[PLACES - 1].1 = last;
+                    expected[TOUCHES - 1].1 = last;
                 }
-                let found: Vec<_> = touches.places().map(|at| (at.first, at.last)).collect();
+                let found: Vec<_> = touches.touches().map(|at| (at.first, at.last)).collect();
                 assert_eq!(found, expected);
             }
         }

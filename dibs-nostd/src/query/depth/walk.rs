@@ -21,7 +21,7 @@ struct Walk {
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Reads the corners of a remembered sample's triangle.
-    pub(super) fn place(&self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
+    pub(super) fn load_corners(&self, parts: &mut Parts, row: usize) -> Result<(), QueryError> {
         let mut sample = parts.sample(row);
         if let (Fit::Remembered, Some(TriangleRow(row))) = (sample.fit, sample.triangle) {
             let corners = self.tree.triangle(row).ok_or(QueryError::Corrupt { row })?;

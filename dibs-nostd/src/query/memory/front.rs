@@ -63,7 +63,7 @@ pub(in crate::query) struct ChildSlot {
 }
 
 impl ChildSlot {
-    /// The child's place as a word on the search's stack.
+    /// The child's slot as a word on the search's stack.
     #[inline(always)]
     pub fn to_word(self) -> u32 {
         u32::from(self.node) << 3 | u32::from(self.slot)
@@ -87,10 +87,10 @@ pub(in crate::query) struct Front<const OPENED: usize> {
     free: u16,
     /// The slot at which the last tick's budget ended; zero after a complete one.
     resume: u16,
-    /// The closest triangle's place.
+    /// The closest triangle's slot.
     pub best: Option<ChildSlot>,
-    /// The clock hand: the slot last examined for closing.
-    hand: u16,
+    /// The slot last examined for closing.
+    clock_hand: u16,
 }
 
 impl<const OPENED: usize> Front<OPENED> {
@@ -104,7 +104,7 @@ impl<const OPENED: usize> Front<OPENED> {
             free: NO_FREE,
             resume: 0,
             best: None,
-            hand: 0,
+            clock_hand: 0,
         }
     };
 }
@@ -118,14 +118,14 @@ pub(in crate::query) struct FrontMut<'f> {
     free: &'f mut u16,
     pub resume: &'f mut u16,
     pub best: &'f mut Option<ChildSlot>,
-    hand: &'f mut u16,
+    clock_hand: &'f mut u16,
 }
 
 impl<const OPENED: usize> Front<OPENED> {
     #[inline(always)]
     pub fn borrow(&mut self) -> FrontMut<'_> {
-        let Self { due, nodes, end, free, resume, best, hand } = self;
-        FrontMut { due, nodes, end, free, resume, best, hand }
+        let Self { due, nodes, end, free, resume, best, clock_hand } = self;
+        FrontMut { due, nodes, end, free, resume, best, clock_hand }
     }
 }
 
@@ -155,7 +155,7 @@ impl<const OPENED: usize> Front<OPENED> {
 
 #[cfg(feature = "control")]
 impl<const OPENED: usize> Front<OPENED> {
-    /// Number of slots that [`count_due`](Self::count_due) looks at.
+    /// Number of slots that [`count_due`](Self::count_due) reads.
     pub fn opened(&self) -> usize {
         self.end
     }
@@ -174,7 +174,7 @@ fn due(deadlines: &[Deadline], threshold: Deadline) -> usize {
 impl FrontMut<'_> {
     /// Frees all slots.
     pub fn clear(&mut self) {
-        (*self.end, *self.free, *self.best, *self.hand) = (0, NO_FREE, None, 0);
+        (*self.end, *self.free, *self.best, *self.clock_hand) = (0, NO_FREE, None, 0);
         *self.resume = 0;
     }
 
@@ -194,9 +194,9 @@ impl FrontMut<'_> {
 
     /// The first slot in a range whose node is due.
     #[inline(always)]
-    pub fn next_due(&self, places: Range<usize>, threshold: Deadline) -> Option<usize> {
-        let from = places.start;
-        let due = self.due.get(places)?;
+    pub fn next_due(&self, slots: Range<usize>, threshold: Deadline) -> Option<usize> {
+        let from = slots.start;
+        let due = self.due.get(slots)?;
         // Eight at a time: usually none of them is due.
         let (eights, _) = due.as_chunks::<8>();
         let waits = |eight: &&[Deadline; 8]| {
@@ -239,12 +239,12 @@ impl FrontMut<'_> {
     pub fn close(&mut self, at: u16, deadline: Deadline, clock: &MotionClock) -> Option<()> {
         let free = *self.free;
         let node = self.node(at)?;
-        let place = ChildSlot { node: node.parent, slot: node.slot };
+        let child = ChildSlot { node: node.parent, slot: node.slot };
         *node = FrontNode { parent: free, ..FrontNode::FREE };
         *self.free = at.wrapping_add(1);
         *self.due.get_mut(usize::from(at))? = clock.never();
-        *self.node(place.node)?.deadlines.get_mut(usize::from(place.slot))? = deadline;
-        self.put_back(place)
+        *self.node(child.node)?.deadlines.get_mut(usize::from(child.slot))? = deadline;
+        self.put_back(child)
     }
 
     /// Gives a child a bound of its node again.
@@ -279,11 +279,11 @@ impl FrontMut<'_> {
     /// Advances the clock hand by one slot. Returns the node there and its earliest deadline, if it may be closed:
     /// opened, below a root, all children with bounds.
     pub fn next_closable(&mut self) -> Option<(u16, Deadline)> {
-        let next = self.hand.saturating_add(1);
-        *self.hand = if usize::from(next) < *self.end { next } else { 0 };
-        let at = usize::from(*self.hand);
+        let next = self.clock_hand.saturating_add(1);
+        *self.clock_hand = if usize::from(next) < *self.end { next } else { 0 };
+        let at = usize::from(*self.clock_hand);
         let (node, &due) = (self.nodes.get(at)?, self.due.get(at)?);
         (node.apart == 0 && node.link != UNUSED && node.parent != NOWHERE)
-            .then_some((*self.hand, due))
+            .then_some((*self.clock_hand, due))
     }
 }

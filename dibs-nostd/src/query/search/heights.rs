@@ -34,8 +34,8 @@ pub(super) struct Vertex {
     pub position: Vec3,
     /// The shortest vector from the axis.
     pub towards: Vec3,
-    /// The representative: a triangle whose lowest corner it is, or [`NO_TRIANGLE`], or [`NOT_LOWEST`].
-    standing: u32,
+    /// The candidate: a triangle whose lowest corner it is, or [`NO_TRIANGLE`], or [`NOT_LOWEST`].
+    candidate: u32,
 }
 
 impl Vertex {
@@ -44,13 +44,13 @@ impl Vertex {
         square: f32::INFINITY,
         position: Vec3::ZERO,
         towards: Vec3::ZERO,
-        standing: NO_TRIANGLE,
+        candidate: NO_TRIANGLE,
     };
 
     /// The triangle that represents the vertex, until a lower vertex is seen next to it.
     #[inline(always)]
-    pub const fn standing(&self) -> Option<u32> {
-        if self.standing < NOT_LOWEST { Some(self.standing) } else { None }
+    pub const fn candidate(&self) -> Option<u32> {
+        if self.candidate < NOT_LOWEST { Some(self.candidate) } else { None }
     }
 }
 
@@ -75,7 +75,7 @@ impl CacheSlot {
         if second == first {
             second = second.next();
         }
-        let is_taken = |place| place == first || place == second;
+        let is_taken = |slot| slot == first || slot == second;
         if is_taken(third) {
             third = third.next();
             if is_taken(third) {
@@ -96,14 +96,14 @@ pub(super) struct Heights {
     part: Option<u8>,
     /// Whether the search's [work besides tests](crate::query::prices) counts.
     pub is_priced: bool,
-    places: [Vertex; SLOTS],
+    slots: [Vertex; SLOTS],
     /// Vertices evicted while a triangle represented them: at most one for each corner of a triangle.
     evicted: Vec<Vertex, 3>,
 }
 
 impl Heights {
     pub const fn new(&Options { part, is_priced, .. }: &Options) -> Self {
-        Self { part, is_priced, places: [Vertex::UNSEEN; SLOTS], evicted: Vec::new() }
+        Self { part, is_priced, slots: [Vertex::UNSEEN; SLOTS], evicted: Vec::new() }
     }
 
     /// The price of a leaf's triangles, in node tests.
@@ -126,21 +126,21 @@ impl Heights {
 
     #[inline(always)]
     pub const fn at(&self, CacheSlot(at): CacheSlot) -> &Vertex {
-        &self.places[at % SLOTS]
+        &self.slots[at % SLOTS]
     }
 
     /// Notes that a lower vertex is next to this one.
     #[inline(always)]
-    pub fn settle(&mut self, CacheSlot(at): CacheSlot) {
-        self.places[at % SLOTS].standing = NOT_LOWEST;
+    pub fn resolve(&mut self, CacheSlot(at): CacheSlot) {
+        self.slots[at % SLOTS].candidate = NOT_LOWEST;
     }
 
     /// Makes a triangle represent this vertex, its lowest corner, if none does.
     #[inline(always)]
-    pub fn stand(&mut self, CacheSlot(at): CacheSlot, triangle: u32) {
-        let vertex = &mut self.places[at % SLOTS];
-        if vertex.standing == NO_TRIANGLE {
-            vertex.standing = triangle;
+    pub fn add_candidate(&mut self, CacheSlot(at): CacheSlot, triangle: u32) {
+        let vertex = &mut self.slots[at % SLOTS];
+        if vertex.candidate == NO_TRIANGLE {
+            vertex.candidate = triangle;
         }
     }
 
@@ -156,47 +156,47 @@ impl Heights {
     }
 
     /// The least squared distance of a vertex that a triangle represents.
-    pub fn least_standing(&self) -> f32 {
-        let standing =
-            self.places.iter().chain(&self.evicted).filter(|vertex| vertex.standing().is_some());
-        standing.fold(f32::INFINITY, |least, vertex| smaller(least, vertex.square))
+    pub fn least_candidate(&self) -> f32 {
+        let candidates =
+            self.slots.iter().chain(&self.evicted).filter(|vertex| vertex.candidate().is_some());
+        candidates.fold(f32::INFINITY, |least, vertex| smaller(least, vertex.square))
     }
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// The slots of a triangle's corners, which are loaded if missing.
     #[inline(always)]
-    pub(super) fn places(
+    pub(super) fn slots(
         &self,
         heights: &mut Heights,
         [a, b, c]: [u32; 3],
     ) -> Result<[CacheSlot; 3], QueryError> {
         let [first, second, third] = CacheSlot::of_corners([a, b, c]);
-        self.look(heights, first, a)?;
-        self.look(heights, second, b)?;
-        self.look(heights, third, c)?;
+        self.measure(heights, first, a)?;
+        self.measure(heights, second, b)?;
+        self.measure(heights, third, c)?;
         Ok([first, second, third])
     }
 
     /// Loads a vertex, unless it is in its slot.
     #[inline(always)]
-    fn look(
+    fn measure(
         &self,
         heights: &mut Heights,
         CacheSlot(at): CacheSlot,
         row: u32,
     ) -> Result<(), QueryError> {
-        let vertex = &mut heights.places[at % SLOTS];
+        let vertex = &mut heights.slots[at % SLOTS];
         if vertex.row == row {
             return Ok(());
         }
-        if vertex.standing().is_some() {
+        if vertex.candidate().is_some() {
             let _ = heights.evicted.push(*vertex);
         }
         let position = self.position(row)?;
         let towards = self.tool.axis_to(position);
         let square = finite(row, towards.dot(towards))?;
-        *vertex = Vertex { row, square, position, towards, standing: NO_TRIANGLE };
+        *vertex = Vertex { row, square, position, towards, candidate: NO_TRIANGLE };
         Ok(())
     }
 
@@ -222,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_two_corners_of_a_triangle_have_one_place() {
+    fn no_two_corners_of_a_triangle_have_one_slot() {
         let near = || (0..6).chain(SLOTS as u32 - 3..SLOTS as u32 + 3);
         for (a, b) in near().flat_map(|a| near().map(move |b| (a, b))) {
             for c in near() {

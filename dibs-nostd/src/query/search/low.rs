@@ -2,13 +2,13 @@
 //!
 //! The square of the distance from the axis is convex in space, and its gradient is twice the vector from the axis. So
 //! over a triangle it is at least the value at the lowest corner plus the least rise towards the other two. If that is
-//! at most `ridge / 2` below the corner's distance, and at most a 512th of it, and a vertex next to that corner is
+//! at most `prominence / 2` below the corner's distance, and at most a 512th of it, and a vertex next to that corner is
 //! lower, the triangle is no local minimum: the triangles around the corner lead down, over no ridge of that height.
 //! Nor is it if its lowest point is on an edge and the opposite vertex of the edge's other triangle is lower. All other
 //! triangles may be local minima.
 //!
 //! Each step down leads to a triangle with a lower lowest corner, so it ends at a triangle that is kept, at most
-//! `ridge / 2` above the first one.
+//! `prominence / 2` above the first one.
 
 // Requirement: S-04
 
@@ -17,13 +17,13 @@ use glam::Vec3;
 use super::Search;
 use super::heights::{CacheSlot, Heights, Vertex};
 use crate::math::order::smaller;
-use crate::query::prices::{FACING, ON_EDGE, STANDING};
+use crate::query::prices::{CANDIDATE, FACING, ON_EDGE};
 use crate::tool::{AxisPair, SLIVER, Tool};
 use crate::tree::{MAX_RING, after, before};
 use crate::unavailable::QueryError;
 use crate::{Index, VertexTable};
 
-/// A fall by less than this fraction of the squared distance is ignored: a ridge of a 512th of the distance.
+/// A fall by less than this fraction of the squared distance is ignored: a prominence of a 512th of the distance.
 const FLAT: f32 = 1.0 / 256.0;
 
 /// A triangle as seen from the axis.
@@ -45,9 +45,9 @@ enum Dip {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Visits a leaf's triangles within the cutoff that may be local minima, ignoring ridges up to `ridge`. A visit
-    /// returns the next limit. Returns the least lower bound on a triangle's squared distance; `None` if the budget ran
-    /// out.
+    /// Visits a leaf's triangles within the cutoff that may be local minima, ignoring ridges up to `prominence`. A
+    /// visit returns the next limit. Returns the least lower bound on a triangle's squared distance; `None` if the
+    /// budget ran out.
     ///
     /// Triangles that represent their lowest corners are visited later, when the cache evicts these.
     #[inline(never)]
@@ -55,7 +55,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         &mut self,
         first: u32,
         count: u32,
-        ridge: f32,
+        prominence: f32,
         heights: &mut Heights,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<Option<f32>, QueryError> {
@@ -66,7 +66,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if heights.leaves_out(tree, triangle) {
                 continue;
             }
-            let seen = self.see(rows, ridge, heights)?;
+            let seen = self.see(rows, prominence, heights)?;
             if seen.low < least {
                 least = seen.low;
             }
@@ -75,7 +75,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             } else {
                 match seen.dip {
                     Dip::Nowhere => {
-                        heights.stand(seen.lowest, triangle);
+                        heights.add_candidate(seen.lowest, triangle);
                         Some(false)
                     }
                     Dip::Edge(edge) => {
@@ -89,7 +89,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 return Ok(None);
             }
             while let Some(&vertex) = heights.evicted() {
-                if !self.visit_standing(&vertex, heights, visit)? {
+                if !self.visit_candidate(&vertex, heights, visit)? {
                     return Ok(None);
                 }
                 heights.drop_evicted();
@@ -100,14 +100,14 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
 
     /// Visits the triangle that represents a vertex, unless a lower vertex is next to it. Its side is not checked,
     /// since other triangles around the vertex may face the tool. Returns `false` if the budget ran out.
-    pub(super) fn visit_standing(
+    pub(super) fn visit_candidate(
         &mut self,
         vertex: &Vertex,
         heights: &Heights,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
-        let Some(triangle) = vertex.standing() else { return Ok(true) };
-        if self.pay(heights.is_priced, STANDING).is_none() {
+        let Some(triangle) = vertex.candidate() else { return Ok(true) };
+        if self.pay(heights.is_priced, CANDIDATE).is_none() {
             return Ok(false);
         }
         match self.is_lowest(triangle, vertex, heights)? {
@@ -140,10 +140,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     fn see(
         &self,
         rows: [u32; 3],
-        ridge: f32,
+        prominence: f32,
         heights: &mut Heights,
     ) -> Result<TriangleHeight, QueryError> {
-        let [a, b, c] = self.places(heights, rows)?;
+        let [a, b, c] = self.slots(heights, rows)?;
         let is_below = |one: CacheSlot, other: CacheSlot| {
             let (one, other) = (heights.at(one), heights.at(other));
             one.square < other.square || one.square == other.square && one.row < other.row
@@ -155,8 +155,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         } else {
             (2, c, a, b)
         };
-        heights.settle(next);
-        heights.settle(last);
+        heights.resolve(next);
+        heights.resolve(last);
         let &Vertex { square, position, towards, .. } = heights.at(lowest);
         let rise = |to: CacheSlot| towards.dot(heights.at(to).position - position);
         let (along, across) = (rise(next), rise(last));
@@ -166,9 +166,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         }
         // The slack of the tilt covers the rounding of a rise and of the square.
         let fall = (if least < 0.0 { -2.0 * least } else { 0.0 }) + 3.0 * self.tilt_slack;
-        // `h - sqrt(h^2 - fall) <= ridge / 2` without roots: `fall + ridge^2 / 4 <= ridge h`.
-        let quarter = 0.25 * ridge * ridge;
-        let is_level = (fall + quarter) * (fall + quarter) <= ridge * ridge * square;
+        // `h - sqrt(h^2 - fall) <= prominence / 2` without roots: `fall + prominence^2 / 4 <= prominence h`.
+        let quarter = 0.25 * prominence * prominence;
+        let is_level = (fall + quarter) * (fall + quarter) <= prominence * prominence * square;
         let dip = if is_level && fall <= square * FLAT {
             Dip::Nowhere
         } else if across >= self.tilt_slack {
@@ -270,8 +270,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 
     /// Whether a triangle whose lowest point seems to be on `edge` may be a local minimum. It is not if that point is
-    /// certainly on the edge and the vertex beyond is lower, nor if the axis is on its inner side. `None` if the budget
-    /// ran out.
+    /// certainly on the edge and the vertex beyond is lower, nor if the axis is on its inner side. `None` if the
+    /// budget ran out.
     fn may_be_low_at_edge(
         &mut self,
         triangle: u32,

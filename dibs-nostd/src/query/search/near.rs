@@ -44,12 +44,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 
     /// Visits, with its pair, every triangle within `limit` of the axis that may be a local minimum, ignoring ridges up
-    /// to `ridge`. A visit returns the next limit. Returns a lower bound on the distance of unvisited triangles; the
-    /// tests made are in `budget`. With a label in the options, only that part of the surface is visited.
+    /// to `prominence`. A visit returns the next limit. Returns a lower bound on the distance of unvisited triangles;
+    /// the tests made are in `budget`. With a label in the options, only that part of the surface is visited.
     pub fn each_low(
         mut self,
         limit: f32,
-        (ridge, options): (f32, &Options),
+        (prominence, options): (f32, &Options),
         mut visit: impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<(f32, Tests), QueryError> {
         self.set_limit(limit);
@@ -57,13 +57,13 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             return Ok((0.0, self.meter.made()));
         }
         let mut heights = Heights::new(options);
-        let least = match self.visit_waiting(ridge, &mut heights, &mut visit)? {
+        let least = match self.visit_waiting(prominence, &mut heights, &mut visit)? {
             Some(waiting) => {
-                let standing = least_standing(&heights, ridge);
-                smaller(waiting, standing)
+                let candidate = least_candidate(&heights, prominence);
+                smaller(waiting, candidate)
             }
             None if self.visit_rest(&heights, &mut visit)? => f32::INFINITY,
-            None => least_standing(&heights, ridge),
+            None => least_candidate(&heights, prominence),
         };
         Ok((least, self.meter.made()))
     }
@@ -91,7 +91,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             Some(()) => self.each_low(limit, (0.0, &Options::new().contacts_of(label)), visit)?,
             None => (0.0, self.meter.made()),
         };
-        // A triangle that stands for its lowest corner may be lower by the rounding of its tilt.
+        // A triangle that represents its lowest corner may be lower by the rounding of its tilt.
         let square = beyond * beyond - tilt;
         // A bound below zero is none, and neither is one that is not a number.
         let beyond = if beyond > 0.0 && square > 0.0 { sqrt(square) } else { 0.0 };
@@ -110,7 +110,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     #[inline(always)]
     pub(super) fn visit_waiting(
         &mut self,
-        ridge: f32,
+        prominence: f32,
         heights: &mut Heights,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<Option<f32>, QueryError> {
@@ -132,7 +132,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                         true
                     }
                     NodeLink::Leaf { first, count } => {
-                        self.visit_low(first, count, ridge, heights, visit)?.is_some()
+                        self.visit_low(first, count, prominence, heights, visit)?.is_some()
                     }
                 };
             if !is_done {
@@ -149,9 +149,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         heights: &Heights,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
-        for place in CacheSlot::all() {
-            let vertex = heights.at(place);
-            if vertex.standing().is_some() && !self.visit_standing(vertex, heights, visit)? {
+        for slot in CacheSlot::all() {
+            let vertex = heights.at(slot);
+            if vertex.candidate().is_some() && !self.visit_candidate(vertex, heights, visit)? {
                 return Ok(false);
             }
         }
@@ -170,9 +170,10 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     }
 }
 
-/// Lower bound on the distances of the triangles that represent a vertex: they reach at most half a ridge below it.
-pub(super) fn least_standing(heights: &Heights, ridge: f32) -> f32 {
-    sqrt(heights.least_standing()) - 0.5 * ridge
+/// Lower bound on the distances of the triangles that represent a vertex: they reach at most half the prominence below
+/// it.
+pub(super) fn least_candidate(heights: &Heights, prominence: f32) -> f32 {
+    sqrt(heights.least_candidate()) - 0.5 * prominence
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 mod tests;
 
 use super::heights::Heights;
-use super::near::least_standing;
+use super::near::least_candidate;
 use super::{Search, WaitingNode};
 use crate::math::order::{larger, smaller};
 use crate::math::sqrt::sqrt;
@@ -27,12 +27,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         mut self,
         front: &mut RangeFrontMut<'_>,
         limit: f32,
-        (ridge, options): (f32, &Options),
+        (prominence, options): (f32, &Options),
         mut visit: impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<(f32, Tests), QueryError> {
         self.set_limit(limit);
         if front.is_empty() && front.start(self.tree.roots()).is_none() {
-            return self.each_low(limit, (ridge, options), visit);
+            return self.each_low(limit, (prominence, options), visit);
         }
         self.waiting = 0;
         if self.pay(options.is_priced, LIST + front.opened() / PASSED).is_none() {
@@ -47,9 +47,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
                 at += 1;
                 continue;
             }
-            let is_done = (!is_due || self.look_farther(front, at, node, heights.is_priced)?)
-                && self.visit_waiting(ridge, &mut heights, &mut visit)?.is_none()
-                && self.visit_near(front, at, ridge, &mut heights, &mut visit)?;
+            let is_done = (!is_due || self.test_farther(front, at, node, heights.is_priced)?)
+                && self.visit_waiting(prominence, &mut heights, &mut visit)?.is_none()
+                && self.visit_near(front, at, prominence, &mut heights, &mut visit)?;
             if !is_done {
                 break;
             }
@@ -58,8 +58,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             at += 1;
         }
         if front.node(at).is_some() || !self.visit_rest(&heights, &mut visit)? {
-            let (beyond, standing) = (self.least_from(front, at)?, least_standing(&heights, ridge));
-            let least = smaller(beyond, standing);
+            let (beyond, candidate) =
+                (self.least_from(front, at)?, least_candidate(&heights, prominence));
+            let least = smaller(beyond, candidate);
             return Ok((least, self.meter.made()));
         }
         Ok((f32::INFINITY, self.meter.made()))
@@ -68,7 +69,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
     /// Tests the children that were beyond the range. Those without a free slot go on the stack. Returns `false` if the
     /// budget ran out.
     #[inline(always)]
-    fn look_farther(
+    fn test_farther(
         &mut self,
         front: &mut RangeFrontMut<'_>,
         at: usize,
@@ -143,7 +144,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         &mut self,
         front: &mut RangeFrontMut<'_>,
         at: usize,
-        ridge: f32,
+        prominence: f32,
         heights: &mut Heights,
         visit: &mut impl FnMut(u32, &AxisPair) -> f32,
     ) -> Result<bool, QueryError> {
@@ -165,7 +166,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
             if self.meter.nodes(heights.price_of(count)).is_none() {
                 return Ok(false);
             }
-            let Some(low) = self.visit_low(first, count, ridge, heights, visit)? else {
+            let Some(low) = self.visit_low(first, count, prominence, heights, visit)? else {
                 return Ok(false);
             };
             if low > self.cutoff_squared {

@@ -80,9 +80,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         let corrupt = QueryError::Corrupt { row: 0 };
         self.search.waiting = 0;
         if self.search.best.is_none()
-            && let Some(place) = self.front.best.take()
+            && let Some(child) = self.front.best.take()
         {
-            self.front.put_back(place).ok_or(corrupt)?;
+            self.front.put_back(child).ok_or(corrupt)?;
         }
         let restarted =
             moved > LARGE_STEP && 2 * self.front.count_due(self.threshold()) > self.front.used();
@@ -105,15 +105,15 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         // Where the last tick's budget ended: nodes near the tool are due in every tick, and the others would never have
         // their turn.
         let first = usize::from(*self.front.resume).min(end);
-        let (mut places, mut before) = (first..end, Some(0..first));
+        let (mut slots, mut before) = (first..end, Some(0..first));
         loop {
-            let Some(at) = self.front.next_due(places.clone(), self.threshold()) else {
+            let Some(at) = self.front.next_due(slots.clone(), self.threshold()) else {
                 let Some(next) = before.take() else { break };
-                places = next;
+                slots = next;
                 continue;
             };
             match self.visit(at as u16)? {
-                Visit::Done => places.start = at + 1,
+                Visit::Done => slots.start = at + 1,
                 Visit::OutOfBudget => {
                     // A node that took a whole tick waits for its next turn.
                     *self.front.resume = (at as u16).saturating_add(u16::from(at == first));
@@ -156,9 +156,9 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     /// The answer. No unsearched part of the surface is closer to the axis than `lower`.
     #[inline(always)]
     pub fn finish(&mut self, lower: f32) -> Result<Proximity, QueryError> {
-        if let Some(place) = *self.front.best {
+        if let Some(child) = *self.front.best {
             let deadline = self.deadline(sqrt(self.search.best_squared));
-            *self.deadline_of(place).ok_or(QueryError::Corrupt { row: 0 })? = deadline;
+            *self.deadline_of(child).ok_or(QueryError::Corrupt { row: 0 })? = deadline;
         }
         let mut closest = self.search.finish(lower)?;
         // A triangle that is closer by less than the accuracy may have been skipped.
@@ -167,8 +167,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     }
 
     #[inline(always)]
-    fn deadline_of(&mut self, place: ChildSlot) -> Option<&mut Deadline> {
-        self.front.node(place.node)?.deadlines.get_mut(usize::from(place.slot))
+    fn deadline_of(&mut self, child: ChildSlot) -> Option<&mut Deadline> {
+        self.front.node(child.node)?.deadlines.get_mut(usize::from(child.slot))
     }
 
     /// Tests the due bounds below an opened node, and opens the children within the cutoff.
@@ -179,15 +179,15 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         while let Some(top) = self.search.waiting.checked_sub(1) {
             let corrupt = QueryError::Corrupt { row: top as u32 };
             let &WaitingNode { lower, link: word } = self.search.stack.get(top).ok_or(corrupt)?;
-            let place = ChildSlot::from_word(word);
+            let child = ChildSlot::from_word(word);
             if lower > self.search.cutoff {
                 self.search.waiting = top;
-                self.front.put_back(place).ok_or(corrupt)?;
+                self.front.put_back(child).ok_or(corrupt)?;
                 continue;
             }
-            let deadline = *self.deadline_of(place).ok_or(corrupt)?;
-            let link = self.record(place).ok_or(corrupt)?.link;
-            let Some(opened) = self.front.open(link, place, deadline) else {
+            let deadline = *self.deadline_of(child).ok_or(corrupt)?;
+            let link = self.record(child).ok_or(corrupt)?.link;
+            let Some(opened) = self.front.open(link, child, deadline) else {
                 return Ok(Visit::Full);
             };
             self.search.waiting = top;
@@ -199,10 +199,10 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     }
 
     #[inline(always)]
-    fn record(&mut self, place: ChildSlot) -> Option<Node> {
-        match NodeLink::decode(self.front.node(place.node)?.link) {
-            NodeLink::Children { first, count } if u32::from(place.slot) < count => {
-                self.search.tree.whole_record(first + u32::from(place.slot))
+    fn record(&mut self, child: ChildSlot) -> Option<Node> {
+        match NodeLink::decode(self.front.node(child.node)?.link) {
+            NodeLink::Children { first, count } if u32::from(child.slot) < count => {
+                self.search.tree.whole_record(first + u32::from(child.slot))
             }
             _ => None,
         }
@@ -296,10 +296,10 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
     ) -> Result<Expansion, QueryError> {
         let corrupt = QueryError::Corrupt { row: first };
         while let Some(slot) = next(&mut due) {
-            let (triangle, place) = (first + u32::from(slot), ChildSlot { node: at, slot });
+            let (triangle, child) = (first + u32::from(slot), ChildSlot { node: at, slot });
             if triangle == self.search.best_triangle {
                 self.front.node(at).ok_or(corrupt)?.apart |= 1 << slot;
-                *self.front.best = Some(place);
+                *self.front.best = Some(child);
                 continue;
             }
             let search = &mut self.search;
@@ -315,13 +315,13 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 }
                 facing
             } else {
-                match self.test_closely(triangle, &corners, place)? {
+                match self.test_closely(triangle, &corners, child)? {
                     Some(bound) => bound,
                     None => continue,
                 }
             };
             let deadline = self.deadline(bound);
-            *self.deadline_of(place).ok_or(corrupt)? = deadline;
+            *self.deadline_of(child).ok_or(corrupt)? = deadline;
         }
         Ok(Expansion::Done)
     }
@@ -331,7 +331,7 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         &mut self,
         triangle: u32,
         corners: &[Vec3; 3],
-        place: ChildSlot,
+        child: ChildSlot,
     ) -> Result<Option<f32>, QueryError> {
         let before = self.search.best_squared;
         let (bound, is_closest) = self.search.bound_triangle(triangle, corners)?;
@@ -340,13 +340,13 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
         }
         self.facing = FacingPlane::new(&self.search);
         let corrupt = QueryError::Corrupt { row: triangle };
-        if let Some(place) = self.front.best.replace(place) {
+        if let Some(child) = self.front.best.replace(child) {
             // It was the closest in this tick, too: its bound is not older than that.
             let deadline = self.deadline(sqrt(before));
-            *self.deadline_of(place).ok_or(corrupt)? = deadline;
-            self.front.put_back(place).ok_or(corrupt)?;
+            *self.deadline_of(child).ok_or(corrupt)? = deadline;
+            self.front.put_back(child).ok_or(corrupt)?;
         }
-        self.front.node(place.node).ok_or(corrupt)?.apart |= 1 << place.slot;
+        self.front.node(child.node).ok_or(corrupt)?.apart |= 1 << child.slot;
         Ok(None)
     }
 
@@ -364,8 +364,8 @@ impl<'s, 't, 'f, I: Index, V: VertexTable + ?Sized, T: Tool> Tick<'s, 't, 'f, I,
                 return Ok(());
             }
             let opened = self.front.node(at).ok_or(corrupt)?;
-            let place = ChildSlot { node: opened.parent, slot: opened.slot };
-            let node = self.record(place).ok_or(corrupt)?;
+            let child = ChildSlot { node: opened.parent, slot: opened.slot };
+            let node = self.record(child).ok_or(corrupt)?;
             let distance =
                 sqrt(self.search.tool.axis_distance_squared(self.search.position(node.pin)?));
             let own = self.deadline(distance - node.radius_code as f32 * self.search.radius_scale);

@@ -140,8 +140,8 @@ impl Ties {
 
     /// The first triangle at or after an index that the axis may touch, with its index. A loop over an iterator takes
     /// three times the code.
-    pub fn touched_from(&self, place: usize) -> Option<(usize, u32)> {
-        let mut rest = self.rows.iter().enumerate().skip(place);
+    pub fn touched_from(&self, from: usize) -> Option<(usize, u32)> {
+        let mut rest = self.rows.iter().enumerate().skip(from);
         rest.find(|(_, tie)| tie.square <= self.touching).map(|(at, tie)| (at, tie.row))
     }
 }
@@ -204,10 +204,10 @@ mod tests {
     }
 
     fn touched(ties: &Ties) -> Option<Vec<u32>> {
-        let mut place = 0;
+        let mut next_at = 0;
         let next = || {
-            let (at, row) = ties.touched_from(place)?;
-            place = at + 1;
+            let (at, row) = ties.touched_from(next_at)?;
+            next_at = at + 1;
             Some(row)
         };
         ties.has_touched().then(|| std::iter::from_fn(next).collect())

@@ -118,8 +118,8 @@ impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V
             if subtrees > 0 && search.waiting + all > *room + subtrees + 1 {
                 break;
             }
-            let place = records.get_mut(children * node_bytes::<I>()..)?;
-            search.tree.copy_nodes(first, count, place)?;
+            let slots = records.get_mut(children * node_bytes::<I>()..)?;
+            search.tree.copy_nodes(first, count, slots)?;
             *parents.get_mut(children..)?.first_chunk_mut()? = [lower; MAX_CHILDREN as usize];
             children = if lower > search.cutoff { children } else { all };
             subtrees += 1;

@@ -231,7 +231,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let moved_by = moved.ok().map(|units| memory.clock.length(units));
         let mut fallback = match moved {
             Ok(_) => memory.front.borrow().is_empty().then_some(Fallback::Start),
-            Err(lost) => Some(lost.into()),
+            Err(cause) => Some(cause.into()),
         };
         let moved = moved.unwrap_or(0);
         let has_depth = options.is_signed && tool.axis_length() > 0.0 && self.tree.is_closed();

@@ -107,7 +107,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
             && found.closest.tests().work() < 2 * AHEAD.tests()
             && let Some((tracker, surface, tool)) = pairs.get_mut(at)
         {
-            let tests = tracker.look_ahead(*surface, *tool, found.closest.separation, &rest)?;
+            let tests = tracker.search_ahead(*surface, *tool, found.closest.separation, &rest)?;
             found.closest.add_tests(tests);
         }
         Ok(found)
@@ -115,7 +115,7 @@ impl<I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
 
     /// Searches a pair partly in advance, so that the tick that needs it has less to do. Earlier certain bounds stay.
     /// Returns the tests made.
-    fn look_ahead<S: MovingSurface + ?Sized, T: Tool>(
+    fn search_ahead<S: MovingSurface + ?Sized, T: Tool>(
         &mut self,
         surface: &S,
         tool: &T,

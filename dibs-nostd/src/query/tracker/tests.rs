@@ -23,8 +23,8 @@ use crate::{
 };
 
 struct Bound {
-    /// The opened node's slot, and the child.
-    place: (u16, u32),
+    /// The slots of the opened node and of the child.
+    slots: (u16, u32),
     /// The reading at which it runs out; distinguishes it from a later bound.
     deadline: Deadline,
     bound: f64,
@@ -40,12 +40,12 @@ fn bounds<const STACK: usize, const OPENED: usize>(
     let (tree, clock) = (tracker.tree, tracker.memory.clock);
     let mut front = tracker.memory.front.borrow();
     let mut bounds = Vec::new();
-    for place in 0..front.used() as u16 {
-        let node = *front.node(place).expect("a place");
+    for at in 0..front.used() as u16 {
+        let node = *front.node(at).expect("a slot");
         if node.link == UNUSED {
             continue;
         }
-        assert!((node.parent == NOWHERE) == (place == 0), "{node:?}");
+        assert!((node.parent == NOWHERE) == (at == 0), "{node:?}");
         let (first, count, is_leaf) = match NodeLink::decode(node.link) {
             NodeLink::Children { first, count } => (first, count, false),
             NodeLink::Leaf { first, count } => (first, count, true),
@@ -60,7 +60,7 @@ fn bounds<const STACK: usize, const OPENED: usize>(
             let bound = f64::from(clock.left(deadline));
             let distance = least(&tree, link, far);
             assert!(bound <= distance, "{node:?} {slot}: {bound} {distance}");
-            bounds.push(Bound { place: (place, slot), deadline, bound, distance });
+            bounds.push(Bound { slots: (at, slot), deadline, bound, distance });
         }
     }
     bounds
@@ -96,11 +96,11 @@ fn no_bound_exceeds_the_distance() {
             if tick % 3 == 2 {
                 options = options.budget(Budget::new(28));
             }
-            let share = tick as f32 / 8.0;
-            tracker.closest(&step.at(share), &tool, &options).expect("an answer");
+            let t = tick as f32 / 8.0;
+            tracker.closest(&step.at(t), &tool, &options).expect("an answer");
             let at = |row: u32| {
                 let (a, b) = (before[row as usize].as_dvec3(), after[row as usize].as_dvec3());
-                (a + (b - a) * f64::from(share)).as_vec3()
+                (a + (b - a) * f64::from(t)).as_vec3()
             };
             let bounds = bounds(&mut tracker, &|row| distance(&tool, at(row)));
             checked += bounds.len();
@@ -211,8 +211,8 @@ fn approach(built: &BuiltTree, moves_tool: bool) -> f64 {
     let mut before = rest.clone();
     let (mut first, mut spare) = (Vec::new(), f64::INFINITY);
     for tick in 0..300_u16 {
-        let way = f32::from(tick) * 0.37;
-        let (along, back) = if moves_tool { (way, 0.0) } else { (0.0, way) };
+        let displacement = f32::from(tick) * 0.37;
+        let (along, back) = if moves_tool { (displacement, 0.0) } else { (0.0, displacement) };
         let after: Vec<Vec3> = rest.iter().map(|&p| p - Vec3::X * back).collect();
         let surface = odometer.step(before.as_slice(), after.as_slice()).after();
         let tool = Sphere::new(Vec3::new(along, 0.0, 0.2), 0.1).expect("a valid sphere");
@@ -222,11 +222,11 @@ fn approach(built: &BuiltTree, moves_tool: bool) -> f64 {
         assert_eq!(found.fallback.is_some(), tick == 0, "{tick}: {found:?}");
         let bounds = bounds(&mut tracker, &|row| distance(&tool, after[row as usize]));
         if tick == 0 {
-            first = bounds.iter().map(|bound| (bound.place, bound.deadline)).collect();
+            first = bounds.iter().map(|bound| (bound.slots, bound.deadline)).collect();
         } else {
-            let old = bounds.iter().filter(|bound| first.contains(&(bound.place, bound.deadline)));
+            let old = bounds.iter().filter(|bound| first.contains(&(bound.slots, bound.deadline)));
             let least = old.map(|bound| bound.distance - bound.bound).fold(f64::INFINITY, f64::min);
-            spare = spare.min(least / f64::from(way));
+            spare = spare.min(least / f64::from(displacement));
         }
         before = after;
     }
@@ -239,7 +239,7 @@ fn bounds_are_used_up_as_fast_as_tool_and_surface_move() {
     let built = Builder::new().stretch(1.5).build(&band(160)).expect("builds");
     for moves_tool in [true, false] {
         let spare = approach(&built, moves_tool);
-        std::println!("{spare:.1e} of the way to spare");
+        std::println!("{spare:.1e} of the displacement to spare");
         assert!(spare < 3e-4, "{spare}");
     }
 }

@@ -203,9 +203,9 @@ fn hostile_numbers_are_no_pose() {
         |rotation: [f32; 4], shift: Vec3| RigidPose::new(Quat::from_array(rotation), shift).err();
     let unit = [0.0, 0.0, 0.0, 1.0];
     for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        for place in 0..4 {
+        for slot in 0..4 {
             let mut rotation = unit;
-            rotation[place] = wrong;
+            rotation[slot] = wrong;
             assert_eq!(refused(rotation, Vec3::ZERO), Some(PoseError::NotFinite));
         }
         for shift in [Vec3::X, Vec3::Y, Vec3::Z] {

@@ -105,8 +105,8 @@ fn chunk<'r, T: Copy + Default, const N: usize>(
 #[cold]
 fn fill_up<T: Copy + Default, const N: usize>(rows: &[T]) -> [T; N] {
     let mut all = [T::default(); N];
-    for (place, row) in all.iter_mut().zip(rows) {
-        *place = *row;
+    for (slot, row) in all.iter_mut().zip(rows) {
+        *slot = *row;
     }
     all
 }

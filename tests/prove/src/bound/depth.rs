@@ -35,12 +35,12 @@ const STACK: i64 = probe::track::STACK as i64;
 const POINTS: i64 = 28;
 const REMEMBERED: i64 = 20;
 /// Most places where an axis meets the surface.
-const PLACES: i64 = 8;
+const TOUCHES: i64 = 8;
 /// Most leaves around a point.
 const LEAVES: i64 = 48;
 
 const DIVISION: &str = "dibs-nostd/src/query/depth/mod.rs";
-const LOOK: &str = "dibs-nostd/src/query/depth/look.rs";
+const SAMPLE: &str = "dibs-nostd/src/query/depth/sample.rs";
 const PART: &str = "dibs-nostd/src/query/depth/part.rs";
 const START: &str = "dibs-nostd/src/query/depth/start.rs";
 const TOUCHES: &str = "dibs-nostd/src/query/depth/touches.rs";
@@ -63,14 +63,14 @@ const KEPT_TEST: Count = Count::Calls(&[Function("take_tied")], "closest_to_");
 const LAST_TEST: Count = Count::Calls(&[Function("take_pair")], "closest_to_");
 
 const SEARCH: &str = "Depth<I,V,T>>::search";
-const LOOKED: Count = Count::Calls(
-    &[Line(LOOK, "let Some(mut found) = self.search(&sample, &options, enough)?")],
+const MEASURED: Count = Count::Calls(
+    &[Line(SAMPLE, "let Some(mut found) = self.search(&sample, &options, enough)?")],
     SEARCH,
 );
-const SEARCHED: Count = Count::Calls(&[Function("look")], SEARCH);
+const SEARCHED: Count = Count::Calls(&[Function("measure")], SEARCH);
 const FOUND: Count =
-    Count::Passes(&[Function("look"), Line(LOOK, "self.answer.add_tests(found.tests());")]);
-const FOUND_AGAIN: Count = Count::Passes(&[Line(LOOK, "found.add_tests(first);")]);
+    Count::Passes(&[Function("measure"), Line(SAMPLE, "self.answer.add_tests(found.tests());")]);
+const FOUND_AGAIN: Count = Count::Passes(&[Line(SAMPLE, "found.add_tests(first);")]);
 const TIE: Count = Count::Passes(&[Function("clearly_above"), Function("is_above_plane")]);
 const TURN: Count = Count::Heads(&[Line(DIVISION, "let row = parts.highest();")]);
 const BOUND_DISTANCE: Count = Count::Calls(
@@ -126,7 +126,7 @@ const COUNTED: &[Fact] = &[
             (136, ACROSS_F64),
             (8, BOUNDED_PLANE),
             (2, BOUNDED_TRIANGLE),
-            (32, LOOKED),
+            (32, MEASURED),
             (4, TIE),
             (8, TURN),
             (6, BOUND_DISTANCE),
@@ -177,7 +177,7 @@ const COUNTED: &[Fact] = &[
 const DEPTH: &[Fact] = &[
     Fact {
         name: "points of the axis",
-        terms: &[(1, LOOKED)],
+        terms: &[(1, MEASURED)],
         most: Most::base(27),
         because: "after 27 the division ends",
     },
@@ -316,28 +316,28 @@ const DEPTH: &[Fact] = &[
     },
     turns!("halvings", &[Line(TOUCHES, "let half = (inside + outside) * 0.5;")], 8, "eight"),
     Fact {
-        name: "places that are joined",
+        name: "touches that are joined",
         terms: &[
             (1, Count::Heads(&[Function("insert"), Function("retain")])),
-            (-(PLACES + 2), Count::Calls(&[], "Touches::insert")),
+            (-(TOUCHES + 2), Count::Calls(&[], "Touches::insert")),
         ],
         most: Most::base(0),
-        because: "a list has at most eight places, which two loops share; each loop has a turn more where it ends",
+        because: "a list has at most eight touches, which two loops share; each loop has a turn more where it ends",
     },
     turns!(
-        "places after a new one",
-        &[Line(TOUCHES, "if other.first > place.first {")],
-        PLACES,
+        "touches after a new one",
+        &[Line(TOUCHES, "if other.first > touch.first {")],
+        TOUCHES,
         "at most eight"
     ),
     turns!(
-        "places that begin a search",
-        &[Line(START, "for place in self.touches.places() {")],
-        PLACES,
+        "touches that begin a search",
+        &[Line(START, "for touch in self.touches.touches() {")],
+        TOUCHES,
         "at most eight"
     ),
-    turns!("places beside a point outside", &[Function("add_outside")], PLACES, "at most eight"),
-    turns!("places ahead", &[Function("ahead")], PLACES, "at most eight"),
-    turns!("places behind", &[Function("behind")], PLACES, "at most eight"),
+    turns!("touches beside a point outside", &[Function("add_outside")], TOUCHES, "at most eight"),
+    turns!("places ahead", &[Function("ahead")], TOUCHES, "at most eight"),
+    turns!("places behind", &[Function("behind")], TOUCHES, "at most eight"),
     turns!("roots of a triangle", &[Function("root_of")], 0, "the tree has one root"),
 ];

@@ -197,7 +197,8 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
     }
     writeln!(
         text,
-        "\nThe typical constants are those of `Cost`, a plane above measured queries plus a margin: it has one for unsigned queries of a table of vertices, and for a tick a line above those of a path, so elsewhere the column is empty. \
+        "\nThe typical constants are those of `Cost`: for unsigned queries of a table of vertices a plane above measured ones plus a margin, \
+         and for a tick a line above those of a path. Elsewhere the column is empty. \
          The bound's worst leaf is one \
          that two planes scan to the last vertex in vain, which queries seldom do: most of all a sphere's node test pays for it. On a surface of modes an exact test costs less than the node test that is \
          counted before it, so its own price is 0. The proof takes {:.1} s.\n\n\

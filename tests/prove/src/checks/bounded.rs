@@ -222,8 +222,8 @@ const SMALLEST: &str = "The goals were 5, 10 and 20 mm, 10 mm in or crossing, an
 const SMALL: &str = "The goals were 0.4, 1 and 4 mm, 0.75 mm in or crossing, and 0.3 %: not reached. The budget is the largest whose dearest \
      tick was measured within the instructions; the median tick that uses it up takes {bounded.40k.spent}, because a test's \
      price is its mean cost. Four designs did not narrow the interval: an unfinished search among the leaves as its lower end, \
-     a certain depth of the last deepest point from its leaves, half of the budget for dividing the axis, and no look at \
-     a point while another search waits.";
+     a certain depth of the last deepest point from its leaves, half of the budget for dividing the axis, and no search \
+     of a point while another waits.";
 
 /// What two larger budgets were meant to reach.
 const MIDDLE: &str = "The goals were 0.25, 0.4 and 2 mm, 0.3 mm in or crossing, and 0.1 %: not reached, \

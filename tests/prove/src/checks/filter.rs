@@ -58,7 +58,7 @@ pub const CHECK: Check = Check {
             criterion: TIMING,
             bound: Bound::Is(0.0),
             unit: "of {filter.ticks} ticks, with budgets of 30,000, 60,000 and 200,000; {filter.most} by the cost model at most",
-            limits: "The same walks. Searches, rows, paths and looks, each at its price; what they take is measured on the board.",
+            limits: "The same walks. Searches, rows, paths and estimates, each at its price; what they take is measured on the board.",
         },
         note("filter.most"),
         Promise {

@@ -22,7 +22,7 @@ use crate::unavailable::QueryError;
 use crate::{Budget, Capsule, MovingSurface, Odometer, Options, Tree};
 
 const LIMIT: f32 = 6.0;
-const RIDGE: f32 = 0.1;
+const PROMINENCE: f32 = 0.1;
 
 /// The bounds in the front, in mm: none exceeds the distance of the nearest vertex below it, and after a whole search
 /// none is less than the limit, except for rounding. Every triangle is below exactly one of them, or in a leaf within
@@ -45,10 +45,7 @@ fn bounds<const M: usize>(
             if node.near >> slot & 1 == 0 {
                 let distance = least(tree, link, far);
                 assert!(bound <= distance, "{node:?} {slot}: {bound} {distance}");
-                assert!(
-                    bound > f64::from(LIMIT) - 1e-4,
-                    "{node:?} {slot}: {bound} was not looked at"
-                );
+                assert!(bound > f64::from(LIMIT) - 1e-4, "{node:?} {slot}: {bound} was not tested");
                 bounds.push(distance - bound);
             }
         }
@@ -93,8 +90,8 @@ fn no_bound_of_a_range_exceeds_the_distance() {
                 (tip, span) = (tip * 0.999 + vector(size), span * 0.999 + vector(size));
             }
             let tool = Capsule::new(tip, tip + span, 2.0).expect("a valid capsule");
-            let share = tick as f32 / 8.0;
-            let surface = step.at(share);
+            let t = tick as f32 / 8.0;
+            let surface = step.at(t);
             let motion = surface.motion().expect("measured");
             let moved = memory.moved(&tool, Some(motion));
             memory.begin(moved);
@@ -115,7 +112,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
                 let visit = |_, _: &_| LIMIT;
                 let search = search.expect("valid");
                 let (beyond, _) =
-                    search.each_low_from(&mut moved, LIMIT, (RIDGE, options), visit)?;
+                    search.each_low_from(&mut moved, LIMIT, (PROMINENCE, options), visit)?;
                 let is_whole = beyond == f32::INFINITY;
                 moved.keep(is_whole);
                 Ok::<_, QueryError>(is_whole)
@@ -128,7 +125,7 @@ fn no_bound_of_a_range_exceeds_the_distance() {
             assert!(is_whole);
             let at = |row: u32| {
                 let (a, b) = (before[row as usize].as_dvec3(), after[row as usize].as_dvec3());
-                (a + (b - a) * f64::from(share)).as_vec3()
+                (a + (b - a) * f64::from(t)).as_vec3()
             };
             checked += bounds(&mut memory, &tree, &|row| distance(&tool, at(row))).len();
         }
@@ -175,7 +172,7 @@ fn a_node_that_no_search_reaches_stays_due() {
             LIMIT
         };
         let search = search.expect("valid");
-        let found = search.each_low_from(&mut front, LIMIT, (RIDGE, &options), visit);
+        let found = search.each_low_from(&mut front, LIMIT, (PROMINENCE, &options), visit);
         front.keep(found.expect("an answer").0 == f32::INFINITY);
     }
     assert!(visited > 0, "{:?}", memory.clock);

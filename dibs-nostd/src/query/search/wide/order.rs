@@ -55,12 +55,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
                     farther = array::from_fn(|i| farther[i] + u32::from(*key > own[i]));
                 }
             }
-            for (key, place) in own.iter().zip(farther) {
+            for (key, slot) in own.iter().zip(farther) {
                 let at = INDEX - (*key as u32 & INDEX);
                 // Out of range where the block is longer than the stack.
-                if let Some(place) = stack.get_mut(place as usize) {
+                if let Some(subtree) = stack.get_mut(slot as usize) {
                     let link = whole_node::<I>(records, at)?.link;
-                    *place = WaitingNode { lower: *lowers.get(at as usize)?, link };
+                    *subtree = WaitingNode { lower: *lowers.get(at as usize)?, link };
                 }
             }
         }

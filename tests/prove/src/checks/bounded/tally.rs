@@ -34,10 +34,10 @@ pub struct Tally {
 impl Tally {
     /// The width that this part of the intervals near the wall does not exceed.
     pub fn width(&self, part: f64) -> f64 {
-        width(&self.widths, part)
+        hundredths(quantile(&self.widths, part))
     }
 
-    /// Notes what a budget does not cause, of ticks without one.
+    /// Notes steps and turned pairs of ticks without a budget.
     pub fn note_uncut(&self, name: &str, figures: &mut Figures) {
         self.steps.note_force(&format!("{name}.uncut"), figures);
         figures.note(&format!("{name}.uncut.turned"), self.share_of_turned());
@@ -45,8 +45,7 @@ impl Tally {
 
     /// The work, in node tests, that 95 % of the ticks near the wall do not exceed.
     pub fn usual_tests(&self) -> f64 {
-        let last = self.near_work.len().saturating_sub(1) as f64;
-        self.near_work.get((last * 0.95) as usize).copied().unwrap_or_default().into()
+        quantile(&self.near_work, 0.95).into()
     }
 
     /// In per cent.
@@ -61,17 +60,21 @@ impl Tally {
         for (end, part) in [("95", 0.95), ("99", 0.99), ("largest", 1.0)] {
             figures.note(&format!("{name}.{end}"), self.width(part));
         }
-        figures.note(&format!("{name}.inner"), width(&self.inner, 0.95));
+        figures.note(&format!("{name}.inner"), hundredths(quantile(&self.inner, 0.95)));
         figures.note(&format!("{name}.turned"), self.share_of_turned());
         self.steps.note_size(name, figures);
         self.steps.note_force(name, figures);
     }
 }
 
-/// The width that this part of the intervals does not exceed, to a hundredth of a millimetre.
-fn width(widths: &[f32], part: f64) -> f64 {
-    let last = widths.len().saturating_sub(1) as f64;
-    let width = widths.get((last * part) as usize).copied().unwrap_or_default();
+/// The value that this part of sorted ones does not exceed.
+fn quantile<T: Copy + Default>(sorted: &[T], part: f64) -> T {
+    let last = sorted.len().saturating_sub(1) as f64;
+    sorted.get((last * part) as usize).copied().unwrap_or_default()
+}
+
+/// To a hundredth of a millimetre.
+fn hundredths(width: f32) -> f64 {
     (f64::from(width) * 100.0).round() / 100.0
 }
 

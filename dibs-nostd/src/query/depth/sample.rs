@@ -18,14 +18,14 @@ use crate::{Index, VertexTable};
 
 /// The work for a point of the axis outside of its search, in node tests. Without it a budget would not bound a
 /// tracker's tick, which may visit many points and triangles without a search.
-pub(super) const LOOK_COST: u32 = 16;
+pub(super) const SAMPLE_COST: u32 = 16;
 
 /// With this many node tests left, a search is expected to finish within a tick.
 const ONE_TICK: u32 = 768;
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Completes the search of the last tick's deepest point; the leaves around it are remembered.
-    pub(super) fn look_again(
+    pub(super) fn measure_again(
         &mut self,
         parts: &mut Parts,
         last: Option<f32>,
@@ -39,7 +39,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
             }
         }
         if let Some(row) = row {
-            let sample = self.look(parts.sample(row), EXACT)?;
+            let sample = self.measure(parts.sample(row), EXACT)?;
             parts.set_sample(row, sample);
         }
         Ok(())
@@ -52,7 +52,7 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
         let Some(searched) = self.searched() else { return Ok(()) };
         match parts.row_of(searched) {
             Some(row) => {
-                let sample = self.look(parts.sample(row), EXACT)?;
+                let sample = self.measure(parts.sample(row), EXACT)?;
                 parts.set_sample(row, sample);
             }
             None => self.end_search(),
@@ -132,9 +132,9 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Depth<'_, '_, I, V, T> {
     /// Searches a point of the axis. Out of budget, returns the sample unchanged. Only a tracker completes the search
     /// of a point no deeper than `enough`.
     #[inline(never)] // Small code, see `side::of_point`.
-    pub(super) fn look(&mut self, sample: Sample, enough: f32) -> Result<Sample, QueryError> {
-        self.looks += 1;
-        self.spend(LOOK_COST);
+    pub(super) fn measure(&mut self, sample: Sample, enough: f32) -> Result<Sample, QueryError> {
+        self.samples += 1;
+        self.spend(SAMPLE_COST);
         let Sample { parameter, on_axis, .. } = sample;
         // The budget must cover the root's test.
         if self.is_spent() {
