@@ -13,7 +13,7 @@
 /// | `Frames` | a double buffer for its vertices, a [`Frames`](crate::Frames), for your own loop |
 /// | `Receiver` | the bus's end of it (feature `bus`), an [`Assembler`](crate::Assembler) that measures stretch in slices; `receiver` makes one |
 /// | `Reader` | the control loop's end of it |
-/// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; with the feature `wide`, `WideQuery` for large processors |
+/// | `Query` | a [`Query`](crate::Query) with the stack that the tree needs; with the feature `batched`, `BatchedQuery` for large processors |
 /// | `Tracker` | a [`Tracker`](crate::Tracker) with that stack; you choose the size of its front |
 /// | `VERTICES`, `STACK`, `Index` | the sizes, for your own types |
 /// | `CENTRE`, `REACH` | the rest shape's bounding box, if the tree has its rest shape |
@@ -61,19 +61,19 @@ macro_rules! if_guard {
     ($($item:item)*) => {};
 }
 
-/// Items of the generated module that need the feature `wide`.
-#[cfg(feature = "wide")]
+/// Items of the generated module that need the feature `batched`.
+#[cfg(feature = "batched")]
 #[doc(hidden)]
 #[macro_export]
-macro_rules! if_wide {
+macro_rules! if_batched {
     ($($item:item)*) => { $($item)* };
 }
 
 /// Nothing: the feature is off.
-#[cfg(not(feature = "wide"))]
+#[cfg(not(feature = "batched"))]
 #[doc(hidden)]
 #[macro_export]
-macro_rules! if_wide {
+macro_rules! if_batched {
     ($($item:item)*) => {};
 }
 

@@ -49,7 +49,7 @@
 //!
 //! - `bus`, `control`, `modes`, `nodes`, on by default: packets and the [`Assembler`]; [`constraint`], [`filter`] and
 //!   [`failsafe`]; [`modes`]; [`nodes`].
-//! - `wide`: `Query::closest_wide`, which tests several subtrees at once, for large processors.
+//! - `batched`: `Query::closest_batched`, which tests several subtrees at once, for large processors.
 //! - `defmt`: `defmt::Format` for every public value and error.
 //! - `serde`: `Serialize` for answers, limits and states; `Deserialize` for [`Budget`], [`Cost`], [`SurfaceLimits`] and times,
 //!   which are checked when used. Other limits are made by calls that check them.

@@ -17,7 +17,7 @@ use gungraun::prelude::*;
 
 dibs_nostd::include_tree!("heart");
 
-/// As the wide search wants it.
+/// As the batched search wants it.
 const STACK: usize = heart::STACK + 128;
 
 fn tree() -> heart::Tree {
@@ -85,16 +85,16 @@ fn capsule_closest(mut scene: Scene) -> Proximity {
 
 #[library_benchmark]
 #[bench::whole(setup = cold)]
-fn sphere_closest_wide(mut scene: Scene) -> Proximity {
+fn sphere_closest_batched(mut scene: Scene) -> Proximity {
     let Scene { query, rows, options } = &mut scene;
-    black_box(query.closest_wide(rows.as_slice(), &sphere(), options).expect("a sound tree"))
+    black_box(query.closest_batched(rows.as_slice(), &sphere(), options).expect("a sound tree"))
 }
 
 #[library_benchmark]
 #[bench::whole(setup = cold)]
-fn capsule_closest_wide(mut scene: Scene) -> Proximity {
+fn capsule_closest_batched(mut scene: Scene) -> Proximity {
     let Scene { query, rows, options } = &mut scene;
-    black_box(query.closest_wide(rows.as_slice(), &capsule(), options).expect("a sound tree"))
+    black_box(query.closest_batched(rows.as_slice(), &capsule(), options).expect("a sound tree"))
 }
 
 fn beside() -> [Vec3; 3] {
@@ -178,8 +178,8 @@ library_benchmark_group!(
     benchmarks = [
         sphere_closest,
         capsule_closest,
-        sphere_closest_wide,
-        capsule_closest_wide,
+        sphere_closest_batched,
+        capsule_closest_batched,
         sphere_triangle,
         capsule_triangle,
         stretch_of_a_thousand_triangles,

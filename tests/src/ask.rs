@@ -24,23 +24,23 @@ pub fn closest<I: Index, const D: usize>(
     }
 }
 
-/// The same with the wide (batched) search.
+/// The same with the batched search.
 ///
 /// # Errors
 /// The query's.
 ///
 /// # Panics
 /// If the instrument is not a valid tool.
-pub fn closest_wide<I: Index, const D: usize>(
+pub fn closest_batched<I: Index, const D: usize>(
     query: &mut Query<'_, I, D>,
     vertices: &(impl VertexTable + ?Sized),
     tool: &Instrument,
     options: &Options,
 ) -> Result<Proximity, QueryError> {
     if tool.start == tool.end {
-        query.closest_wide(vertices, &sphere(tool), &options.unsigned())
+        query.closest_batched(vertices, &sphere(tool), &options.unsigned())
     } else {
-        query.closest_wide(vertices, &capsule(tool), &options.unsigned())
+        query.closest_batched(vertices, &capsule(tool), &options.unsigned())
     }
 }
 

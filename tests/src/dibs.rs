@@ -1,4 +1,4 @@
-//! The library under test as a method of the benchmark. It uses the wide (batched) search, which is the one for hosts.
+//! The library under test as a method of the benchmark. It uses the batched search, which is the one for hosts.
 
 use dibs_build::BuiltTree;
 use dibs_nostd::format::MAX_STACK;
@@ -163,8 +163,8 @@ fn ask<I: Index>(
 ) -> (Found, Option<TriangleRow>) {
     let options = &options.unsigned();
     let answer = match tool {
-        Probe::Sphere(sphere) => query.closest_wide(vertices, sphere, options),
-        Probe::Capsule(capsule) => query.closest_wide(vertices, capsule, options),
+        Probe::Sphere(sphere) => query.closest_batched(vertices, sphere, options),
+        Probe::Capsule(capsule) => query.closest_batched(vertices, capsule, options),
     };
     let answer = answer.expect("streams hold finite positions");
     let tests = Some([answer.node_tests, answer.triangle_tests]);

@@ -243,7 +243,7 @@ fn core_crate(cross: &Cross) -> Result<Outcome> {
     run(check().args(["--features", "defmt,embedded-can,embedded-io,mint,serde"]))?;
     for layer in [
         "",
-        "wide",
+        "batched",
         "bus",
         "control",
         "modes",

@@ -69,8 +69,8 @@ impl Surface {
             for (pose, number, numbers) in chunk.tools() {
                 let wrong = |error: String| chunk.wrong(pose, number, error);
                 let closest = match AnyTool::of(numbers, self.tree.origin).map_err(wrong)? {
-                    AnyTool::Sphere(sphere) => query.closest_wide(rows, &sphere, &options),
-                    AnyTool::Capsule(capsule) => query.closest_wide(rows, &capsule, &options),
+                    AnyTool::Sphere(sphere) => query.closest_batched(rows, &sphere, &options),
+                    AnyTool::Capsule(capsule) => query.closest_batched(rows, &capsule, &options),
                 };
                 found(pose, number, closest.map_err(|error| wrong(error.to_string()))?);
             }

@@ -115,9 +115,9 @@ pub mod {name} {{
     /// A tracker with the same stack and room for so many opened nodes.
     pub type Tracker<const OPENED: usize, const RANGE: usize = 0> = ::dibs_nostd::Tracker<'static, Index, STACK, OPENED, RANGE>;
 
-    ::dibs_nostd::if_wide! {{
-        /// A query with the longer stack of the wide search, for large processors.
-        pub type WideQuery = ::dibs_nostd::Query<'static, Index, {{ STACK + 128 }}>;
+    ::dibs_nostd::if_batched! {{
+        /// A query with the longer stack of the batched search, for large processors.
+        pub type BatchedQuery = ::dibs_nostd::Query<'static, Index, {{ STACK + 128 }}>;
     }}
 {extent}{origin}{modal}{embedded}}}
 "#

@@ -2,7 +2,7 @@
 
 use glam::{Mat4, Vec3, Vec4};
 
-#[cfg(feature = "wide")]
+#[cfg(feature = "batched")]
 use crate::math::sqrt::sqrt;
 
 /// Four points or vectors. Each operation rounds like that of [`Vec3`].
@@ -54,7 +54,7 @@ impl Vec3x4 {
 }
 
 /// Four square roots, correctly rounded.
-#[cfg(feature = "wide")]
+#[cfg(feature = "batched")]
 #[inline(always)]
 pub fn roots(squares: Vec4) -> Vec4 {
     Vec4::from_array(squares.to_array().map(sqrt))

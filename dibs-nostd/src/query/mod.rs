@@ -45,8 +45,8 @@ pub use tracker::{Fallback, Tracker, TrackerAnswer};
 use crate::tree::{RootSet, ValidTree};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, TriangleRow, VertexTable};
-#[cfg(feature = "wide")]
-use search::WideSearch;
+#[cfg(feature = "batched")]
+use search::BatchedSearch;
 use search::{Search, Ties, WHOLE, WaitingNode};
 use separation::signed;
 
@@ -122,15 +122,15 @@ impl<'t, I: Index, const STACK: usize> Query<'t, I, STACK> {
     ///
     /// # Errors
     /// Same as [`closest`](Self::closest).
-    #[cfg(feature = "wide")]
-    pub fn closest_wide<V: VertexTable + ?Sized, T: Tool>(
+    #[cfg(feature = "batched")]
+    pub fn closest_batched<V: VertexTable + ?Sized, T: Tool>(
         &mut self,
         vertices: &V,
         tool: &T,
         options: &Options,
     ) -> Result<Proximity, QueryError> {
         let first = options.first(self.triangle);
-        let found = WideSearch::new(self.search(vertices, tool, options, first)?).run()?;
+        let found = BatchedSearch::new(self.search(vertices, tool, options, first)?).run()?;
         self.sided(vertices, tool, options, found)
     }
 }

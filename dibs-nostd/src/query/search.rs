@@ -2,6 +2,8 @@
 
 // Requirements
 
+#[cfg(feature = "batched")]
+mod batched;
 mod finish;
 mod heights;
 mod leaf;
@@ -15,16 +17,14 @@ mod roots;
 mod slack;
 mod tick;
 mod ties;
-#[cfg(feature = "wide")]
-mod wide;
 
 pub(super) use super::memory::waiting::WaitingNode;
+#[cfg(feature = "batched")]
+pub(super) use batched::BatchedSearch;
 #[cfg(feature = "control")]
 pub(crate) use near::LabelDistance;
 pub(super) use tick::{Outcome, Tick};
 pub(super) use ties::Ties;
-#[cfg(feature = "wide")]
-pub(super) use wide::WideSearch;
 
 use meter::Meter;
 use node::CLOSEST;

@@ -8,7 +8,7 @@
 
 // Requirement: F-02
 
-mod wide;
+mod batched;
 
 use core::ops::Range;
 
@@ -144,7 +144,7 @@ fn run_on<I: Index, V: VertexTable + ?Sized, M: Measure, R: MetricBits>(
     if WIDE && tree.sections().limits.is_empty() && ready as usize >= surface.len() {
         let row;
         (row, *worst, *size) =
-            wide::measure::<I, V, M, R>(surface, metrics, triangles, limit, first, largest, sum);
+            batched::measure::<I, V, M, R>(surface, metrics, triangles, limit, first, largest, sum);
         return Some(row);
     }
     let row;

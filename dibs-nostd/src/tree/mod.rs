@@ -41,7 +41,7 @@ use core::marker::PhantomData;
 
 use glam::Vec3;
 
-#[cfg(feature = "wide")]
+#[cfg(feature = "batched")]
 use format::several;
 use format::{Metric, Node, NodeLink, section};
 use header::Header;
@@ -372,19 +372,19 @@ impl<'a, I: Index> Tree<'a, I> {
         format::whole_node::<I>(self.sections.nodes, row)
     }
 
-    #[cfg(feature = "wide")]
+    #[cfg(feature = "batched")]
     #[inline(always)]
     pub(crate) fn copy_nodes(&self, first: u32, count: u32, to: &mut [u8]) -> Option<()> {
         several::copy_nodes::<I>(self.sections.nodes, first, count, to)
     }
 
-    #[cfg(feature = "wide")]
+    #[cfg(feature = "batched")]
     #[inline(always)]
     pub(crate) fn leaf_vertices(&self, first: u32, count: u32) -> Option<[u32; 12]> {
         several::leaf_vertices::<I>(self.sections.triangles, first, count)
     }
 
-    #[cfg(feature = "wide")]
+    #[cfg(feature = "batched")]
     #[inline(always)]
     pub(crate) fn four_triangles(&self, first: u32, count: u32) -> Option<[[u32; 4]; 3]> {
         several::four_triangles::<I>(self.sections.triangles, first, count)

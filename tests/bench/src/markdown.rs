@@ -46,7 +46,7 @@ const READING: &str = "\n\
     measurement of the whole frame, which in a controller belongs to the path by which vertices arrive: \
     it has a column of its own, and a total that includes it; after it, the frame is taken in once \
     more, untimed, so that it does not leave the query with cold caches. Queries are independent of each other \
-    (no warm start) except where a row says so, and DIBS is asked by `closest_wide`. Methods take turns of ten steps in one process, in changing order, the first step \
+    (no warm start) except where a row says so, and DIBS is asked by `closest_batched`. Methods take turns of ten steps in one process, in changing order, the first step \
     of a turn being done once before it is timed. Their answers are compared at every step, and the run stops if two exact methods \
     differ by more than 0.001 mm. Intervals are 95 % confidence intervals of the median (order \
     statistics). Node tests of DIBS are spheres, of the others boxes; exact counts. \
@@ -283,7 +283,7 @@ fn control_loop(page: &mut String, records: &Records) {
         }
     }
     page.push_str(
-        "\n**The query alone**: a whole query with a warm start (`closest_wide`) against a tick of \
+        "\n**The query alone**: a whole query with a warm start (`closest_batched`) against a tick of \
          the tracker, both with measured stretch, µs a tick. The last column is the median over the \
          imaging periods with its 95 % interval.\n\n\
          | surface | triangles | warm query | tracker | ratio | of each period |\n\

@@ -104,9 +104,9 @@ fn ask(
     let plain = options.unsigned();
     let answers = [
         query.closest(rows, tool, options),
-        query.closest_wide(rows, tool, options),
+        query.closest_batched(rows, tool, options),
         query.closest(rows, tool, &plain),
-        query.closest_wide(rows, tool, &plain),
+        query.closest_batched(rows, tool, &plain),
     ];
     for answer in answers.into_iter().flatten() {
         let (nodes, triangles) = most(&tree, tool, answer.side);

@@ -35,7 +35,7 @@ pub mod command {
     pub const FRAME: u32 = 2;
     /// A query: [`QUERY_WORDS`](super::QUERY_WORDS). Answered by [`ANSWER_WORDS`](super::ANSWER_WORDS).
     pub const QUERY: u32 = 3;
-    /// The same by the wide search, on a frame of rows.
+    /// The same by the batched search, on a frame of rows.
     pub const QUERY_IN_ROUNDS: u32 = 5;
     /// A modal frame, of a tree with modes: 1 for queries that remember positions and 0 for others, the number of
     /// weights, then an `f32` each. Answered by the clock's counts for bounding its stretch and the bound's bits; then
@@ -80,8 +80,8 @@ const SLOTS: usize = 256;
 enum Table<'a> {
     /// From the rows of a frame.
     Rows,
-    /// From the rows of a frame, for the wide search.
-    Wide,
+    /// From the rows of a frame, for the batched search.
+    Batched,
     /// From weights.
     Modal(ModalSurface<'a, MAX_MODES>),
     /// From weights, with a cache.
@@ -180,7 +180,7 @@ fn queries(
                 put(machine, &answer)?;
             }
             command::QUERY_IN_ROUNDS => {
-                let answer = ask(&mut query, &Table::Wide, rows, measured, machine)?;
+                let answer = ask(&mut query, &Table::Batched, rows, measured, machine)?;
                 put(machine, &answer)?;
             }
             command::WEIGHTS => {
@@ -328,7 +328,7 @@ fn timed(
     match table {
         Table::Rows if how & how::CONTACTS != 0 => contacts(query, rows, tool, options, machine),
         Table::Rows => clocked(machine, || query.closest(rows, tool, options)),
-        Table::Wide => clocked(machine, || query.closest_wide(rows, tool, options)),
+        Table::Batched => clocked(machine, || query.closest_batched(rows, tool, options)),
         // The code of all tables is larger than the memory for code of a Cortex-M55's board.
         _ if cfg!(m55) => Err(Fault),
         Table::Modal(surface) => clocked(machine, || query.closest(surface, tool, options)),

@@ -21,7 +21,7 @@ const AREAS: [(&str, &[&str], &[&str]); 7] = [
     (
         "dibs-nostd/src/query",
         &["query"],
-        &["refusals", "slack", "wide", "positions", "tracker", "differential", "chain"],
+        &["refusals", "slack", "batched", "positions", "tracker", "differential", "chain"],
     ),
     ("dibs-nostd/src/tree", &["tree", "query"], &["format", "refusals"]),
     ("dibs-nostd/src/stretch", &["surface"], &["stretch", "plausible"]),

@@ -152,7 +152,7 @@ impl<'n, 't> Machine<'n, 't> {
         let answers = [
             ("with the limit", false, ask::closest(query, &surface, tool, &Options::cold())),
             ("measured", false, ask::closest(query, &surface, tool, &warm)),
-            ("wide", false, ask::closest_wide(query, &surface, tool, &warm)),
+            ("batched", false, ask::closest_batched(query, &surface, tool, &warm)),
             ("asked", self.is_signed, asked),
             ("tracked", self.is_signed, tracked),
         ];

@@ -186,9 +186,9 @@ fn one_by_one(script: &mut Script) {
             });
         });
     }
-    script.add("wide", |all| {
+    script.add("batched", |all| {
         poses(all, |all, query, rows, tool| {
-            all.pair(&query.closest_wide(rows, tool, &cold).expect("an answer"));
+            all.pair(&query.closest_batched(rows, tool, &cold).expect("an answer"));
         });
     });
     script.add("within", |all| {

@@ -66,7 +66,7 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
                 for options in &all[rng.usize(..2)..] {
                     let both = [
                         ask::closest(&mut query, rows.as_slice(), &tool, options),
-                        ask::closest_wide(&mut query, rows.as_slice(), &tool, options),
+                        ask::closest_batched(&mut query, rows.as_slice(), &tool, options),
                     ];
                     for found in both {
                         let found = found.unwrap_or_else(|e| {
@@ -87,7 +87,7 @@ fn run_with<I: Index>(case: &Case<'_>, tree: &Tree<'_, I>, seed: u64) -> Tally {
                 let options = Options::cold().budget(budget);
                 let both = [
                     ask::closest(&mut query, rows.as_slice(), &tool, &options),
-                    ask::closest_wide(&mut query, rows.as_slice(), &tool, &options),
+                    ask::closest_batched(&mut query, rows.as_slice(), &tool, &options),
                 ];
                 for cut in both {
                     check_interval(&truth, &cut.expect("a short budget is no error"), budget);

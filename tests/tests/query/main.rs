@@ -2,6 +2,7 @@
 
 mod answers;
 mod at_surface;
+mod batched;
 mod chain;
 mod climbed_budget;
 mod cold_start;
@@ -41,4 +42,3 @@ mod tracked_direction;
 mod tracker;
 mod walls;
 mod whole_lists;
-mod wide;

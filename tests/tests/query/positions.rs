@@ -41,9 +41,9 @@ fn a_position_that_is_not_finite_is_named() {
             let (rows, options) = (rows.as_slice(), &Options::cold());
             let answers: [Result<Proximity, QueryError>; 6] = [
                 query.closest(rows, &sphere, options),
-                query.closest_wide(rows, &sphere, options),
+                query.closest_batched(rows, &sphere, options),
                 query.closest(rows, &capsule, options),
-                query.closest_wide(rows, &capsule, options),
+                query.closest_batched(rows, &capsule, options),
                 first_tick(&tree, rows, &sphere),
                 first_tick(&tree, rows, &capsule),
             ];

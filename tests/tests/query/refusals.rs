@@ -46,7 +46,7 @@ fn a_measurement_of_any_other_frame_is_refused() {
     for expected in [0, 6, 8, u32::MAX] {
         let refused = Err(QueryError::OtherFrame { expected, found: 7 });
         assert_eq!(query.closest(&numbered(expected), &sphere, &options), refused);
-        assert_eq!(query.closest_wide(&numbered(expected), &sphere, &options), refused);
+        assert_eq!(query.closest_batched(&numbered(expected), &sphere, &options), refused);
     }
     // The measured frame itself is accepted, and so is a table without an epoch.
     assert!(query.closest(&numbered(7), &sphere, &options).is_ok());
@@ -90,7 +90,7 @@ fn a_budget_of_nothing_tests_no_triangle() {
             let options = unsigned.warm_start(whole.triangle).budget(budget);
             for found in [
                 query.closest(rows.as_slice(), &sphere, &options),
-                query.closest_wide(rows.as_slice(), &sphere, &options),
+                query.closest_batched(rows.as_slice(), &sphere, &options),
             ] {
                 let found = found.expect("a short budget is no error");
                 assert_eq!((found.triangle, found.triangle_tests), (None, 0), "{found:?}");

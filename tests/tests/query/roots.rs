@@ -8,7 +8,7 @@ use dibs_nostd::{
     Budget, Capsule, Contacts, Fallback, FormatError, Odometer, Options, Query, QueryError, Side,
     Sphere, Tracker, Tree, TriangleRow,
 };
-use dibs_tests::ask::{closest, closest_wide};
+use dibs_tests::ask::{closest, closest_batched};
 use dibs_tests::deform::{Deformation, unit};
 use dibs_tests::oracle::exhaustive;
 use dibs_tests::poses::pose;
@@ -70,7 +70,7 @@ fn the_answer_is_that_of_exhaustive_search() {
                 let answers = [
                     closest(&mut query, &rows[..], &tool, &cold),
                     closest(&mut query, &rows[..], &tool, &Options::new()),
-                    closest_wide(&mut query, &rows[..], &tool, &cold),
+                    closest_batched(&mut query, &rows[..], &tool, &cold),
                     closest(&mut query, &rows[..], &tool, &cold.budget(budget)),
                 ];
                 for (at, found) in answers.into_iter().enumerate() {

@@ -45,7 +45,7 @@ impl<'b> Searched<'b> {
         for options in [Options::cold(), options, options.warm_start(known)] {
             let both = [
                 ask::closest(&mut query, rows, tool, &options),
-                ask::closest_wide(&mut query, rows, tool, &options),
+                ask::closest_batched(&mut query, rows, tool, &options),
             ];
             for found in both {
                 let found = found.unwrap_or_else(|error| panic!("{tool:?}: {error}"));

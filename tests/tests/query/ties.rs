@@ -236,12 +236,12 @@ impl<'t> Asked<'t> {
         }
         let inside = is_inside(&self.rows, &self.triangles, at.as_dvec3())?;
         let lead = self.lead(pair.on_axis, inside);
-        let wide = self.query.closest_wide(self.rows.as_slice(), tool, &options);
+        let batched = self.query.closest_batched(self.rows.as_slice(), tool, &options);
         let mut odometer = Odometer::new(self.tree);
         let surface = odometer.start(self.rows.as_slice());
         let tracked = self.tracker.closest(&surface, tool, &Options::new()).expect("an answer");
         self.note("query", &query, inside, lead);
-        self.note("wide", &wide.expect("an answer"), inside, lead);
+        self.note("batched", &batched.expect("an answer"), inside, lead);
         self.note("tracker", &tracked.closest, inside, lead);
         Some(lead)
     }
@@ -287,7 +287,7 @@ impl<'t> Asked<'t> {
     }
 }
 
-/// Climbs to ties on every kind of surface: no side is wrong there, with a query, a wide one, or a tracker.
+/// Climbs to ties on every kind of surface: no side is wrong there, with a query, a batched one, or a tracker.
 #[test]
 fn no_side_is_wrong_where_sheets_tie() {
     climb_everywhere(1.0);

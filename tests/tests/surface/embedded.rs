@@ -151,7 +151,7 @@ fn frames_beyond_the_limit_are_refused() {
     }
 }
 
-/// The wide query, the side and a tracker give the same answers as on the same vertices in a table.
+/// The batched query, the side and a tracker give the same answers as on the same vertices in a table.
 #[test]
 fn every_query_takes_embedded_surfaces() {
     let mut rng = Rng::with_seed(5);
@@ -178,8 +178,8 @@ fn every_query_takes_embedded_surfaces() {
             let tracked = tracker.closest(&surface, &tool, &options).expect("sound");
             let table = rows(&surface);
             let plain = query.closest(table.as_slice(), &tool, &options).expect("sound");
-            let wide = query.closest_wide(&surface, &tool, &options).expect("sound");
-            assert_eq!(wide.separation.to_bits(), plain.separation.to_bits());
+            let batched = query.closest_batched(&surface, &tool, &options).expect("sound");
+            assert_eq!(batched.separation.to_bits(), plain.separation.to_bits());
             let tracked = tracked.closest;
             let error = (tracked.separation - plain.separation).abs();
             assert!(error <= tracked.accuracy + plain.accuracy, "{tracked:?} {plain:?}");

@@ -79,8 +79,11 @@ fn a_frame_is_searched_with_its_own_stretch_and_error() {
         for options in [cold, cold.unsigned()] {
             let mut ask = |surface: &dyn VertexTable, options: &Options| {
                 let found = query.closest(surface, &tool, options).expect("an answer");
-                let wide = query.closest_wide(surface, &tool, options).expect("an answer");
-                assert_eq!((found.separation, found.accuracy), (wide.separation, wide.accuracy));
+                let batched = query.closest_batched(surface, &tool, options).expect("an answer");
+                assert_eq!(
+                    (found.separation, found.accuracy),
+                    (batched.separation, batched.accuracy)
+                );
                 found
             };
             let by_hand = ask(&rows, &options.stretch(measured)).widened(ERROR);
@@ -217,14 +220,14 @@ fn a_query_starts_from_its_last_answer_unless_it_is_told_not_to() {
         let ask = Options::new().unsigned();
         let first = query.closest(rows, &tool, &ask).expect("an answer");
         let second = query.closest(rows, &tool, &ask).expect("an answer");
-        let wide = query.closest_wide(rows, &tool, &ask).expect("an answer");
+        let batched = query.closest_batched(rows, &tool, &ask).expect("an answer");
         let cold = query.closest(rows, &tool, &ask.warm_start(None)).expect("an answer");
         let stated = ask.warm_start(first.triangle);
-        let stated_wide = query.closest_wide(rows, &tool, &stated).expect("an answer");
+        let stated_batched = query.closest_batched(rows, &tool, &stated).expect("an answer");
         let stated = query.closest(rows, &tool, &stated).expect("an answer");
         assert!(same(&first, &cold), "{first:?} {cold:?}");
         assert!(same(&second, &stated), "{second:?} {stated:?}");
-        assert!(same(&wide, &stated_wide), "{wide:?} {stated_wide:?}");
+        assert!(same(&batched, &stated_batched), "{batched:?} {stated_batched:?}");
         assert_eq!(second.separation, first.separation);
         saved += i64::from(first.node_tests) - i64::from(second.node_tests);
     }

@@ -235,7 +235,7 @@ fn a_query_on_damaged_bytes_ends() {
         let tool = Sphere::new(rows[rng.usize(..rows.len())] * 1.3, 1.0).expect("valid");
         let both = [
             query.closest(rows.as_slice(), &tool, &Options::cold()),
-            query.closest_wide(rows.as_slice(), &tool, &Options::cold()),
+            query.closest_batched(rows.as_slice(), &tool, &Options::cold()),
         ];
         for result in both {
             match result {

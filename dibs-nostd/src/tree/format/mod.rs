@@ -8,7 +8,7 @@
 // Requirement: M-01
 
 mod metric;
-#[cfg(feature = "wide")]
+#[cfg(feature = "batched")]
 pub(crate) mod several;
 
 pub use super::unit::Unit;

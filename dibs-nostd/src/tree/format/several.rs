@@ -1,4 +1,4 @@
-//! Several rows of a table with one bounds check, for the wide search.
+//! Several rows of a table with one bounds check, for the batched search.
 //!
 //! Reads have one size, so that no loop depends on a count. They may include rows after the requested ones, and zeros
 //! past the end of the table.

@@ -85,8 +85,8 @@ fn idle(
     #[cfg(feature = "planted-overflow")]
     line.fill(overflow(1));
     let mut status = [0; STATUS_MTU];
-    #[cfg(feature = "wide")]
-    core::hint::black_box(wide());
+    #[cfg(feature = "batched")]
+    core::hint::black_box(batched());
     #[cfg(feature = "filter")]
     core::hint::black_box(filtered());
     #[cfg(feature = "planted-panic")]
@@ -141,14 +141,14 @@ fn overflow(depth: u8) -> u8 {
     overflow(depth | 1).wrapping_add(below.iter().fold(0, |sum, byte| sum ^ byte))
 }
 
-/// A wide query, to prove that it has no panic path either.
-#[cfg(feature = "wide")]
-fn wide() -> Option<f32> {
+/// A batched query, to prove that it has no panic path either.
+#[cfg(feature = "batched")]
+fn batched() -> Option<f32> {
     let tree = surface::TREE.validate().ok()?;
-    let mut query = surface::WideQuery::new(&tree).ok()?;
+    let mut query = surface::BatchedQuery::new(&tree).ok()?;
     let rows = core::hint::black_box([glam::Vec3::ZERO; 4]);
     let tool = controller::instrument(core::hint::black_box(0)).ok()?;
-    Some(query.closest_wide(&rows[..], &tool, &dibs_nostd::Options::new()).ok()?.separation)
+    Some(query.closest_batched(&rows[..], &tool, &dibs_nostd::Options::new()).ok()?.separation)
 }
 
 /// A filter's tick with rows of the caller, to prove that it has no panic path either.

@@ -230,8 +230,8 @@ pub fn ask<I: Index>(
 ) -> Found {
     let options = Options::new().unsigned();
     let closest = match tool {
-        Probe::Sphere(sphere) => query.closest_wide(surface, sphere, &options),
-        Probe::Capsule(capsule) => query.closest_wide(surface, capsule, &options),
+        Probe::Sphere(sphere) => query.closest_batched(surface, sphere, &options),
+        Probe::Capsule(capsule) => query.closest_batched(surface, capsule, &options),
     };
     found(&closest.expect("finite positions"))
 }

@@ -34,8 +34,8 @@ const STACK: i64 = probe::track::STACK as i64;
 /// Most points of an axis, and of those that are remembered.
 const POINTS: i64 = 28;
 const REMEMBERED: i64 = 20;
-/// Most places where an axis meets the surface.
-const TOUCHES: i64 = 8;
+/// Most touches, where an axis meets the surface.
+const MOST_TOUCHES: i64 = 8;
 /// Most leaves around a point.
 const LEAVES: i64 = 48;
 
@@ -319,7 +319,7 @@ const DEPTH: &[Fact] = &[
         name: "touches that are joined",
         terms: &[
             (1, Count::Heads(&[Function("insert"), Function("retain")])),
-            (-(TOUCHES + 2), Count::Calls(&[], "Touches::insert")),
+            (-(MOST_TOUCHES + 2), Count::Calls(&[], "Touches::insert")),
         ],
         most: Most::base(0),
         because: "a list has at most eight touches, which two loops share; each loop has a turn more where it ends",
@@ -327,17 +327,22 @@ const DEPTH: &[Fact] = &[
     turns!(
         "touches after a new one",
         &[Line(TOUCHES, "if other.first > touch.first {")],
-        TOUCHES,
+        MOST_TOUCHES,
         "at most eight"
     ),
     turns!(
         "touches that begin a search",
         &[Line(START, "for touch in self.touches.touches() {")],
-        TOUCHES,
+        MOST_TOUCHES,
         "at most eight"
     ),
-    turns!("touches beside a point outside", &[Function("add_outside")], TOUCHES, "at most eight"),
-    turns!("places ahead", &[Function("ahead")], TOUCHES, "at most eight"),
-    turns!("places behind", &[Function("behind")], TOUCHES, "at most eight"),
+    turns!(
+        "touches beside a point outside",
+        &[Function("add_outside")],
+        MOST_TOUCHES,
+        "at most eight"
+    ),
+    turns!("touches ahead", &[Function("ahead")], MOST_TOUCHES, "at most eight"),
+    turns!("touches behind", &[Function("behind")], MOST_TOUCHES, "at most eight"),
     turns!("roots of a triangle", &[Function("root_of")], 0, "the tree has one root"),
 ];

@@ -27,7 +27,7 @@ pub const CHECK: Check = Check {
             bound: Bound::Is(0.0),
             unit: "of {carried.queries} queries, {carried.signed} of them with the side; the largest error without it was {carried.off} of \
                    the accuracy",
-            limits: "Spheres and capsules, with the built and the measured stretch, wide, with the side, and tracked. Truth in f64, \
+            limits: "Spheres and capsules, with the built and the measured stretch, batched, with the side, and tracked. Truth in f64, \
                      from the mesh's own vertices, without the rounding of weights, by exhaustive search and winding numbers. \
                      Climbed over tools and nodes in {carried.shapes} volumes: lattices, hulls, needles, flat elements, a rolled \
                      sheet, several surfaces, limits of each element, vertices outside, on the border, on faces, edges and nodes.",

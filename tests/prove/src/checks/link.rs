@@ -53,7 +53,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     ensure!(!build.status.success(), "a planted panic path did not break the link");
     ensure!(said.contains("a_panic_path_survived"), "it broke something else:\n{said}");
 
-    for (feature, what) in [("wide", "wide queries have"), ("filter", "a filter has")] {
+    for (feature, what) in [("batched", "batched queries have"), ("filter", "a filter has")] {
         let mut other = firmware::command(&cross, &surface);
         xtask::process::run(other.args(["--features", feature]))
             .with_context(|| format!("{what} a panic path"))?;

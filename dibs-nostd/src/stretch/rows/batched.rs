@@ -265,16 +265,16 @@ mod tests {
         let (metrics, triangles) = (&metrics[range.clone()], &triangles[range.clone()]);
         let (first, limit) = (range.start as u32, squared_limit(tree.stretch()));
         let size = 1.0;
-        let wide =
+        let batched =
             measure::<I, [Vec3], M, _>(surface, metrics, triangles, limit, first, worst, size);
         let ready = surface.len() as u32;
-        let narrow = rows::measure::<I, [Vec3], M, _, true>(
+        let single = rows::measure::<I, [Vec3], M, _, true>(
             surface, metrics, triangles, ready, limit, first, worst, size,
         );
         let bits = |(row, worst, sum): (u32, Worst, f32)| {
             (row, worst.squared.to_bits(), worst.triangle, sum.to_bits())
         };
-        assert_eq!(bits(wide), bits(narrow), "rows {range:?}");
-        narrow.0
+        assert_eq!(bits(batched), bits(single), "rows {range:?}");
+        single.0
     }
 }

@@ -3,7 +3,7 @@
 use core::array;
 use core::hint::black_box;
 
-use super::{WideSearch, next};
+use super::{BatchedSearch, next};
 use crate::query::search::WaitingNode;
 use crate::tree::format::{NodeLink, whole_node};
 use crate::{Index, Tool, VertexTable};
@@ -17,7 +17,7 @@ const INDEX: u32 = 63;
 /// A key that is below all others.
 const NONE: i32 = -1;
 
-impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> BatchedSearch<'_, '_, I, V, T> {
     /// Pushes the children in a set, the nearest on top.
     ///
     /// A child's position is the number of children that are farther. Counting takes more comparisons than an insertion

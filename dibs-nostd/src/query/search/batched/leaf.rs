@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-use super::{WideSearch, next};
+use super::{BatchedSearch, next};
 use crate::math::vec3x4::{Vec3x4, roots};
 use crate::query::plane::Plane;
 use crate::query::search::leaf::THIRD;
@@ -11,7 +11,7 @@ use crate::tree::format::{Node, NodeLink, whole_node};
 use crate::unavailable::QueryError;
 use crate::{Index, Tool, Tree, VertexTable};
 
-impl<I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'_, '_, I, V, T> {
+impl<I: Index, V: VertexTable + ?Sized, T: Tool> BatchedSearch<'_, '_, I, V, T> {
     /// Tests the planes of the children that are leaves. Returns the set of remaining children.
     #[inline(always)]
     pub(super) fn reject_leaves(&mut self, near: u64, mut leaves: u64) -> Option<u64> {

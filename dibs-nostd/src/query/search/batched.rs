@@ -1,4 +1,4 @@
-//! The wide search: batches of up to seven subtrees.
+//! The batched search: batches of up to seven subtrees.
 //!
 //! A search of one subtree at a time is a chain of dependences: its distances decide which subtree is next, and each
 //! child costs an unpredictable branch. This takes half of a query's time on a large processor. A batch overlaps the
@@ -33,7 +33,7 @@ const MOST_NODE_BYTES: usize = node_bytes::<u32>();
 /// a large stack.
 const MOST_WAITING: usize = 128;
 
-pub(in crate::query) struct WideSearch<'s, 't, I, V: ?Sized, T> {
+pub(in crate::query) struct BatchedSearch<'s, 't, I, V: ?Sized, T> {
     search: Search<'s, 't, I, V, T>,
     /// Most entries that a batch of several subtrees may leave: the rest of the stack suffices for one subtree at a
     /// time.
@@ -50,7 +50,7 @@ pub(in crate::query) struct WideSearch<'s, 't, I, V: ?Sized, T> {
     keys: [[i32; 4]; BLOCKS + 2],
 }
 
-impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> WideSearch<'s, 't, I, V, T> {
+impl<'s, 't, I: Index, V: VertexTable + ?Sized, T: Tool> BatchedSearch<'s, 't, I, V, T> {
     pub fn new(search: Search<'s, 't, I, V, T>) -> Self {
         let spare = search.stack.len().saturating_sub(search.tree.stack() as usize);
         Self {

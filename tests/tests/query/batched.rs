@@ -1,4 +1,4 @@
-//! The wide (batched) search: its counts, stacks and budgets. `differential.rs` tests the accuracy of both searches.
+//! The batched search: its counts, stacks and budgets. `differential.rs` tests the accuracy of both searches.
 
 // Requirement: A-01
 
@@ -40,7 +40,7 @@ fn counts_of_a_fixed_stream_are_what_they_were() {
             Options::cold().unsigned().stretch(measured).warm_start(last),
         ];
         for (count, options) in counts.iter_mut().zip(options) {
-            let found = query.closest_wide(rows.as_slice(), &tool, &options);
+            let found = query.closest_batched(rows.as_slice(), &tool, &options);
             let found = found.expect("an answer");
             *count = (count.0 + found.node_tests, count.1 + found.triangle_tests);
             last = found.triangle;
@@ -85,7 +85,7 @@ fn a_batch_may_fill_the_stack() {
                 if tree.stack() == $stack {
                     let mut query = Query::<u16, $stack>::new(&tree).expect("deep enough");
                     let options = Options::cold().unsigned();
-                    let found = query.closest_wide(rows.as_slice(), &tool, &options);
+                    let found = query.closest_batched(rows.as_slice(), &tool, &options);
                     let found = found.expect("an answer");
                     assert!((found.separation - 9.0).abs() <= found.accuracy, "{leaf}: {found:?}");
                     asked += 1;
@@ -107,10 +107,11 @@ fn tests_with<const D: usize>(mesh: &Mesh, built: &BuiltTree, rows: &[Vec3]) -> 
         let tool = tool(mesh, &mut rng);
         let one_at_a_time =
             query.closest(rows, &tool, &Options::cold().unsigned()).expect("an answer");
-        let wide = query.closest_wide(rows, &tool, &Options::cold().unsigned()).expect("an answer");
-        let apart = (one_at_a_time.separation - wide.separation).abs();
-        assert!(apart <= 2.0 * wide.accuracy, "{one_at_a_time:?} {wide:?}");
-        tests += wide.node_tests;
+        let batched =
+            query.closest_batched(rows, &tool, &Options::cold().unsigned()).expect("an answer");
+        let apart = (one_at_a_time.separation - batched.separation).abs();
+        assert!(apart <= 2.0 * batched.accuracy, "{one_at_a_time:?} {batched:?}");
+        tests += batched.node_tests;
     }
     tests
 }
@@ -132,7 +133,7 @@ fn more_budget_tells_no_less() {
         for node_tests in (0..400).step_by(9) {
             let budget = Budget::new(node_tests);
             let options = Options::cold().unsigned().budget(budget);
-            let found = query.closest_wide(rows.as_slice(), &tool, &options);
+            let found = query.closest_batched(rows.as_slice(), &tool, &options);
             let found = found.expect("a short budget is no error");
             assert!(found.work() <= budget.tests() + 1, "{budget:?} {found:?}");
             assert!(found.lower <= truth.separation + found.accuracy, "{found:?} {truth:?}");
