@@ -20,7 +20,7 @@ pub struct dibs_sweep {
     pub to: dibs_tool,
     /// The surface at the start and at the end: 0 is the tracker's surface before the last `dibs_tracker_set_frame`, 1
     /// the one since then.
-    pub share: [f32; 2],
+    pub t: [f32; 2],
     /// In mm, not negative.
     pub margin: f32,
     /// Largest number of queries; at least 1 is made, which is usually enough.
@@ -61,7 +61,7 @@ impl From<SweepAnswer> for dibs_swept {
 /// @param sweep    The motion.
 /// @param options  Options, or null.
 /// @param swept    Receives the result.
-/// @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a share out of
+/// @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a `t` out of
 ///         range.
 #[unsafe(no_mangle)]
 pub extern "C" fn dibs_tracker_sweep(
@@ -84,7 +84,7 @@ fn answer(
     options: &Options,
 ) -> Result<SweepAnswer, dibs_code> {
     let (tracker, step) = tracker.step()?;
-    let dibs_sweep { from, to, share: t, margin, samples } = *sweep;
+    let dibs_sweep { from, to, t, margin, samples } = *sweep;
     let capsule = |tool: dibs_tool| Capsule::new(tool.start.into(), tool.end.into(), tool.radius);
     // A sphere is a capsule without length.
     let tools = [capsule(from)?, capsule(to)?];

@@ -220,7 +220,7 @@ class Filter(Remade):
         tissue = (period, _at_least("tissue_speed", tissue_speed, 0), _at_least("error", error, 0))
         limits = [_row(number, row) for number, row in enumerate(rows)]
         if len(limits) > _ROWS:
-            raise ValueError(f"rows: {len(limits)} rows, and {_ROWS} have a place")
+            raise ValueError(f"rows: {len(limits)} rows, and {_ROWS} have a slot")
         native = self._native.admit(_surface(surface)._native, chain.tobytes(), vectors, tissue, limits)
         return admitted_of(vectors, native)
 

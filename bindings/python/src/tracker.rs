@@ -264,9 +264,7 @@ impl Filter {
         let mut labels = [(0, stand_off); LABELS];
         let found = of_labels.len();
         if found > LABELS {
-            return Err(invalid(format!(
-                "stand_off_of: {found} labels, and {LABELS} have a place"
-            )));
+            return Err(invalid(format!("stand_off_of: {found} labels, and {LABELS} have a slot")));
         }
         labels.iter_mut().zip(of_labels).for_each(|(place, of_label)| *place = of_label);
         let filter = filter.stand_off_of(labels).map_err(named)?;

@@ -56,9 +56,9 @@ pub struct MotionReading {
     /// Number of an unbroken sequence of measurements; no two sequences share one.
     run: u32,
     /// Length along the path through all frames, in the tree's units.
-    reading: u64,
+    displacement: u64,
     /// Distance of an extrapolated surface from that path; 0 for a frame.
-    aside: u32,
+    residual: u32,
     /// The extrapolated surface's step from the previous frame.
     prediction: Prediction,
 }
@@ -66,7 +66,8 @@ pub struct MotionReading {
 /// Equality ignores the prediction.
 impl PartialEq for MotionReading {
     fn eq(&self, other: &Self) -> bool {
-        let reading = |motion: &Self| (motion.tree, motion.run, motion.reading, motion.aside);
+        let reading =
+            |motion: &Self| (motion.tree, motion.run, motion.displacement, motion.residual);
         reading(self) == reading(other)
     }
 }
@@ -81,13 +82,16 @@ impl MotionReading {
         if self.tree != before.tree || self.run != before.run {
             return None;
         }
-        let along = self.reading.abs_diff(before.reading);
+        let along = self.displacement.abs_diff(before.displacement);
         if along == 0 {
-            return Some(self.aside.abs_diff(before.aside).into());
+            return Some(self.residual.abs_diff(before.residual).into());
         }
-        let asides = u64::from(self.aside) + u64::from(before.aside);
-        let farthest = along.saturating_add(asides);
-        match self.prediction.since(self.reading.wrapping_sub(before.reading), before.aside) {
+        let residuals = u64::from(self.residual) + u64::from(before.residual);
+        let farthest = along.saturating_add(residuals);
+        match self
+            .prediction
+            .since(self.displacement.wrapping_sub(before.displacement), before.residual)
+        {
             Some(units) if units < farthest => Some(units),
             _ => Some(farthest),
         }
@@ -96,23 +100,23 @@ impl MotionReading {
     /// Units from an earlier reading of a frame to this one; `None` if the motion was not measured over the whole time.
     pub(super) fn after(&self, before: &Self) -> Option<u64> {
         let is_one_run = self.tree == before.tree && self.run == before.run;
-        if is_one_run { self.reading.checked_sub(before.reading) } else { None }
+        if is_one_run { self.displacement.checked_sub(before.displacement) } else { None }
     }
 
     /// The reading at the start of an unbroken sequence of measurements.
     pub(crate) fn start(tree: u32) -> Self {
-        Self { tree, run: next_run(), reading: 0, aside: 0, prediction: Prediction::NONE }
+        Self { tree, run: next_run(), displacement: 0, residual: 0, prediction: Prediction::NONE }
     }
 
     /// The reading of a frame as words, for its label.
     pub(super) fn to_words(self) -> [u32; MotionReading::WORDS] {
-        [self.tree, self.run, self.reading as u32, (self.reading >> 32) as u32]
+        [self.tree, self.run, self.displacement as u32, (self.displacement >> 32) as u32]
     }
 
     /// The inverse of [`to_words`](Self::to_words). Memory that was never written gives no reading.
     pub(super) fn from_words([tree, run, low, high]: [u32; MotionReading::WORDS]) -> Option<Self> {
-        let reading = u64::from(high) << 32 | u64::from(low);
-        let start = Self { tree, run, reading, aside: 0, prediction: Prediction::NONE };
+        let displacement = u64::from(high) << 32 | u64::from(low);
+        let start = Self { tree, run, displacement, residual: 0, prediction: Prediction::NONE };
         (run != NO_RUN).then_some(start)
     }
 
@@ -129,16 +133,16 @@ impl MotionReading {
 
     /// A frame's reading, this many units farther along the path; a new start if they are too many to count.
     pub(crate) fn along(self, units: u64) -> Self {
-        match self.reading.checked_add(units) {
-            Some(reading) => Self { reading, ..self },
+        match self.displacement.checked_add(units) {
+            Some(displacement) => Self { displacement, ..self },
             None => Self::start(self.tree),
         }
     }
 
     /// The reading of a surface this many units off the path; `None` if they are too many to count.
     pub(crate) fn beside(self, units: u64) -> Option<Self> {
-        let aside = u32::try_from(units).ok()?;
-        Some(Self { aside, ..self })
+        let residual = u32::try_from(units).ok()?;
+        Some(Self { residual, ..self })
     }
 
     /// This reading for a surface extrapolated along a prediction.

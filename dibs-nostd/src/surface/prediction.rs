@@ -43,12 +43,12 @@ impl Prediction {
         }
     }
 
-    /// Upper bound on a vertex's distance from its position `aside` units beyond the previous frame, on that frame's
+    /// Upper bound on a vertex's distance from its position `residual` units beyond the previous frame, on that frame's
     /// prediction; `None` if the previous frame is not `along` units away.
     #[inline(always)]
-    pub fn since(&self, along: u64, aside: u32) -> Option<u64> {
+    pub fn since(&self, along: u64, residual: u32) -> Option<u64> {
         let is_next = along == u64::from(self.units);
-        is_next.then(|| u64::from(self.passed.abs_diff(aside)) + u64::from(self.off))
+        is_next.then(|| u64::from(self.passed.abs_diff(residual)) + u64::from(self.off))
     }
 }
 

@@ -8,7 +8,7 @@ mod basins;
 
 use std::sync::Mutex;
 
-use basins::{LIKE, MARGIN, Surroundings, basins, least_ridge};
+use basins::{LIKE, MARGIN, Surroundings, basins, least_prominence};
 use dibs_build::{Builder, BuiltTree, Mesh, generate};
 use dibs_nostd::constraint::{ConstraintState, ForbiddenRegion, Proxy, SpringDamper, VelocityRow};
 use dibs_nostd::format::MAX_STACK;
@@ -101,7 +101,7 @@ fn no_contact_is_missing_and_none_is_doubled() {
                 let reach = f64::from(MARGIN + radius);
                 let is_apart = !is_crossing || basin.distance > accuracy;
                 let is_clear = is_apart && basin.distance < reach - slack && basin.up > 0.05;
-                let is_parted = basin.ridge > least_ridge(basin.distance) + slack;
+                let is_parted = basin.prominence > least_prominence(basin.distance) + slack;
                 assert!(!is_clear || !is_parted || !listed.is_empty(), "{name}: no {basin:?}");
             }
             several += usize::from(contacts.len() > 1);

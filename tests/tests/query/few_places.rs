@@ -90,7 +90,7 @@ fn no_wall_is_missing_below_a_short_lists_bound() {
 }
 
 #[test]
-fn a_basin_whose_ridge_is_an_edge_with_something_lower_beyond_is_a_contact() {
+fn a_basin_whose_saddle_is_an_edge_with_something_lower_beyond_is_a_contact() {
     // Seen from above, the triangle's corner at the edge is obtuse, and the opposite edge is nearest to the tool.
     let [corner, along, third] = [[2.0, 0.0], [1.0, 6.0], [2.02, -2.0]];
     let flat = |[x, y]: [f32; 2]| Vec3::new(x, y, -6.0);

@@ -437,7 +437,7 @@ fn a_label_keeps_its_margin_beside_a_nearer_part() {
 
 /// If the list has too little room, its bound is a prominence below the farthest stored triangle.
 #[test]
-fn the_bound_of_a_list_leaves_room_for_a_ridge() {
+fn the_bound_of_a_list_leaves_room_for_a_prominence() {
     let mesh = generate::brain(2_000).expect("a valid size");
     let built = Builder::new().build(&mesh).expect("a valid mesh");
     let tree: Tree<'_, u16> = built.tree().expect("valid");

@@ -61,11 +61,11 @@ int main(int argc, char **argv) {
     sweep.margin = -1.0f;
     EXPECT(MARGIN, dibs_tracker_sweep(tracker, &sweep, NULL, &swept));
     sweep.margin = 1.5f;
-    sweep.share[1] = 1.5f;
+    sweep.t[1] = 1.5f;
     EXPECT(ARGUMENT, dibs_tracker_sweep(tracker, &sweep, NULL, &swept));
-    sweep.share[1] = NAN;
+    sweep.t[1] = NAN;
     EXPECT(ARGUMENT, dibs_tracker_sweep(tracker, &sweep, NULL, &swept));
-    sweep.share[1] = 1.0f;
+    sweep.t[1] = 1.0f;
     sweep.to.radius = -1.0f;
     EXPECT(TOOL_RADIUS, dibs_tracker_sweep(tracker, &sweep, NULL, &swept));
     return summary();

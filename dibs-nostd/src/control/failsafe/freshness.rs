@@ -33,12 +33,12 @@ impl Freshness {
     pub fn levels(&self, link: &Link, age: ThresholdPair) -> [(State, Unavailable); 3] {
         let Link { source_age, forgeries, .. } = *link;
         let transit = self.transit(link);
-        let watch = match self.transit {
-            Transit::Watched(watch) => watch,
+        let pair = match self.transit {
+            Transit::Watched(pair) => pair,
             Transit::AsAge | Transit::LeftOut => age,
         };
         [
-            (watch.level(transit), Unavailable::Delayed { transit }),
+            (pair.level(transit), Unavailable::Delayed { transit }),
             (self.source_age.level(source_age), Unavailable::SourceStale { age: source_age }),
             (self.forgeries.level(forgeries), Unavailable::Forgeries { count: forgeries }),
         ]
@@ -66,8 +66,8 @@ impl Limits {
     /// sender is needed. Normally it is the time between two statuses plus the latency in both directions. A frame
     /// without an echo is beyond every limit. By default these are the limits on age. The margin includes this time.
     #[must_use]
-    pub const fn transit(mut self, watch: ThresholdPair) -> Self {
-        self.freshness.transit = Transit::Watched(watch);
+    pub const fn transit(mut self, pair: ThresholdPair) -> Self {
+        self.freshness.transit = Transit::Watched(pair);
         self
     }
 
@@ -84,12 +84,12 @@ impl Limits {
     ///
     /// # Errors
     /// [`LimitError::Untrippable`] if the safe limit is 65,534 ms or more: no frame older than that is published.
-    pub const fn source_age(mut self, watch: ThresholdPair) -> Result<Self, LimitError> {
-        let safe = watch.safe();
+    pub const fn source_age(mut self, pair: ThresholdPair) -> Result<Self, LimitError> {
+        let safe = pair.safe();
         if safe.0 >= OLDEST.0 && safe.0 != Millis::MAX.0 {
             return Err(LimitError::Untrippable { safe: safe.0 });
         }
-        self.freshness.source_age = watch;
+        self.freshness.source_age = pair;
         Ok(self)
     }
 
@@ -99,12 +99,11 @@ impl Limits {
     /// # Errors
     /// [`LimitError::Untrippable`] if the second limit is at least [`Link::MOST_FORGERIES`], the largest count that a
     /// link reports. [`ThresholdPair::OFF`] is allowed.
-    pub const fn forgeries(mut self, watch: ThresholdPair<u32>) -> Result<Self, LimitError> {
-        if watch.safe() >= Link::MOST_FORGERIES && watch.safe() != ThresholdPair::<u32>::OFF.safe()
-        {
-            return Err(LimitError::Untrippable { safe: watch.safe() });
+    pub const fn forgeries(mut self, pair: ThresholdPair<u32>) -> Result<Self, LimitError> {
+        if pair.safe() >= Link::MOST_FORGERIES && pair.safe() != ThresholdPair::<u32>::OFF.safe() {
+            return Err(LimitError::Untrippable { safe: pair.safe() });
         }
-        self.freshness.forgeries = watch;
+        self.freshness.forgeries = pair;
         Ok(self)
     }
 }

@@ -155,20 +155,20 @@ impl Limits {
 
     /// Limits on the time since the last good packet.
     #[must_use]
-    pub const fn silence(self, watch: ThresholdPair) -> Self {
-        Self { silence: watch, ..self }
+    pub const fn silence(self, pair: ThresholdPair) -> Self {
+        Self { silence: pair, ..self }
     }
 
     /// Limits on the time since the last heartbeat.
     #[must_use]
-    pub const fn heartbeat(self, watch: ThresholdPair) -> Self {
-        Self { heartbeat: watch, ..self }
+    pub const fn heartbeat(self, pair: ThresholdPair) -> Self {
+        Self { heartbeat: pair, ..self }
     }
 
     /// Limits on the frames refused or abandoned since the last publication, each counted once.
     #[must_use]
-    pub const fn rejections(self, watch: ThresholdPair<u32>) -> Self {
-        Self { rejections: watch, ..self }
+    pub const fn rejections(self, pair: ThresholdPair<u32>) -> Self {
+        Self { rejections: pair, ..self }
     }
 
     /// Frames that must be published in a row, with every input within its first limit, to recover.

@@ -21,25 +21,25 @@ use crate::unavailable::{QueryError, Unavailable};
 
 const QUERY: Unavailable = Unavailable::Query(QueryError::Corrupt { row: 7 });
 
-const AGE: ThresholdPair = watch(50, 200);
-const SILENCE: ThresholdPair = watch(20, 100);
-const HEARTBEAT: ThresholdPair = watch(30, 150);
+const AGE: ThresholdPair = pair(50, 200);
+const SILENCE: ThresholdPair = pair(20, 100);
+const HEARTBEAT: ThresholdPair = pair(30, 150);
 const REJECTIONS: ThresholdPair<u32> = count(3, 9);
-const TRANSIT: ThresholdPair = watch(300, 900);
-const SOURCE_AGE: ThresholdPair = watch(40, 80);
+const TRANSIT: ThresholdPair = pair(300, 900);
+const SOURCE_AGE: ThresholdPair = pair(40, 80);
 const FORGERIES: ThresholdPair<u32> = count(5, 50);
 const SPEED: f32 = 0.125;
 
-const fn watch(degraded: u32, safe: u32) -> ThresholdPair {
+const fn pair(degraded: u32, safe: u32) -> ThresholdPair {
     match ThresholdPair::new(Millis(degraded), Millis(safe)) {
-        Ok(watch) => watch,
+        Ok(pair) => pair,
         Err(_) => panic!("limits in the wrong order"),
     }
 }
 
 const fn count(degraded: u32, safe: u32) -> ThresholdPair<u32> {
     match ThresholdPair::count(degraded, safe) {
-        Ok(watch) => watch,
+        Ok(pair) => pair,
         Err(_) => panic!("limits in the wrong order"),
     }
 }
@@ -292,7 +292,7 @@ fn the_margin_is_age_times_speed_in_every_state_that_acts() {
         assert!(verdict.margin > before, "grows");
         before = verdict.margin;
     }
-    let limits = Limits::new(watch(1, i32::MAX as u32 - 1), 0.3).unwrap();
+    let limits = Limits::new(pair(1, i32::MAX as u32 - 1), 0.3).unwrap();
     for age in [16_777_217, 33_554_435, i32::MAX as u32 - 1] {
         assert!(f64::from(limits.margin(Millis(age))) >= f64::from(age) * f64::from(0.3_f32));
     }
@@ -328,7 +328,7 @@ fn the_margin_covers_the_way_unless_that_is_left_out() {
     let verdict = FailSafe::new(limits).step(&with(AGE.safe().0 + 1, None));
     let transit = Millis(AGE.safe().0 + 1);
     assert_eq!(verdict.cause, Some(Unavailable::Delayed { transit }));
-    let own = limits.transit(watch(5, 10));
+    let own = limits.transit(pair(5, 10));
     assert_eq!(step(own, with(10, None)).1, margin(40));
     assert_eq!(step(own, with(11, None)).0, State::Safe);
 }
@@ -357,7 +357,7 @@ fn limits_that_no_machine_can_have_are_named() {
         let refused = limits(1, false).source_age(never);
         assert_eq!(refused, Err(LimitError::Untrippable { safe: safe.0 }));
     }
-    assert!(limits(1, false).source_age(watch(100, 65_533)).is_ok());
+    assert!(limits(1, false).source_age(pair(100, 65_533)).is_ok());
     assert!(limits(1, false).source_age(ThresholdPair::OFF).is_ok());
     for tissue_speed in [-1.0, f32::INFINITY] {
         assert_eq!(Limits::new(AGE, tissue_speed), Err(LimitError::Speed { tissue_speed }));

@@ -123,11 +123,11 @@ impl fmt::Display for FilterError {
             Self::Command => write!(f, "the commanded motion is not finite"),
             Self::Row { row } => write!(f, "row {row} is not finite, or out of range"),
             Self::Rows { found, most } => {
-                write!(f, "{found} rows, but at most {most} have a place")
+                write!(f, "{found} rows, but at most {most} have a slot")
             }
             Self::Pairs { found: 0, .. } => write!(f, "no pair of a tool and a surface"),
             Self::Pairs { found, most } => {
-                write!(f, "{found} pairs of tool and surface, but at most {most} have a place")
+                write!(f, "{found} pairs of tool and surface, but at most {most} have a slot")
             }
             Self::Unlabelled { label } => {
                 write!(f, "a stand-off of the label {label}, but no triangle has it")

@@ -390,7 +390,7 @@ impl<'f, const LABELS: usize> Session<'f, LABELS> {
         Ok(found)
     }
 
-    /// The same for one pair, or a part of its surface, whose state is `at` a place.
+    /// The same for one pair, or a part of its surface, whose state is in slot `at`.
     fn verify_pair<P: Pair>(
         &mut self,
         pair: &mut P,

@@ -168,7 +168,7 @@ impl<const N: usize> Basins<N> {
         low.first().map(|farthest| farthest.square())
     }
 
-    /// Finds the basins. Between basins in nearly the same direction, ridges that leave the higher one without
+    /// Finds the basins. Between basins in nearly the same direction, prominences that leave the higher one without
     /// activation are ignored (`prominences`: see [`activation::least_prominence`]). Calls back with the lowest
     /// triangle of each, nearest first. Points that differ by at most the prominences' error count as equally far.
     /// Triangles that `is_left_out` are skipped.

@@ -59,7 +59,7 @@ pub struct Contact {
     /// The second triangle that bounds the depth, if the tool crosses or is inside.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) across: AcrossPoint,
-    /// 0 where it starts next to a nearer one, 1 beyond a ridge (see `activation`).
+    /// 0 where it starts next to a nearer one, 1 from full prominence on (see `activation`).
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) activation: f32,
 }
@@ -333,11 +333,11 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     /// surface, that pair is the first. An axis that meets the surface in several places may have several parts inside:
     /// only the deepest is a contact, and its separation is the list's [bound](Contacts::bound).
     ///
-    /// Two basins of the distance in nearly the same direction, within 7 degrees, are one contact unless the ridge
-    /// between them is higher than a 128th of the axis' distance there, or of the margin if that is less. So a flat
-    /// wall along a capsule is one contact; two walls within 15 degrees may be one. In other directions each basin is
-    /// a contact of its own if the ridge is higher than a 512th of that distance and a 128th of the margin; with a
-    /// lower ridge it may be. Pairs with the inner side of a sheet, such as the far side of an organ, are not contacts.
+    /// Two basins of the distance in nearly the same direction, within 7 degrees, are one contact unless the
+    /// prominence of the higher one is more than a 128th of the axis' distance there, or of the margin if that is less.
+    /// So a flat wall along a capsule is one contact; two walls within 15 degrees may be one. In other directions each basin is
+    /// a contact of its own if its prominence is more than a 512th of that distance and a 128th of the margin; with
+    /// less it may be. Pairs with the inner side of a sheet, such as the far side of an organ, are not contacts.
     /// If the side is undefined, the tool is taken to be outside. If that is because the budget ended, contacts may be
     /// missing at any distance: see [`Contacts::within`].
     ///
@@ -350,7 +350,7 @@ impl<I: Index, const STACK: usize> Query<'_, I, STACK> {
     ///
     /// Cost: that of [`closest`](Self::closest), a range search that compares the corners of each triangle within the
     /// margin, and exact tests of about an eighth of these and of those around a contact: a second time for each
-    /// contact but the closest, to find the ridge towards nearer ones, with the remaining budget.
+    /// contact but the closest, to find its prominence over nearer ones, with the remaining budget.
     ///
     /// # Errors
     /// [`QueryError`] as for [`closest`](Self::closest); [`QueryError::NoAdjacency`] for a tree without it;

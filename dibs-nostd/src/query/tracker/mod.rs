@@ -238,7 +238,7 @@ impl<'t, I: Index, const STACK: usize, const OPENED: usize, const RANGE: usize>
         let past = if has_depth { memory.separation.now(memory.clock) } else { None };
         let budget = match past {
             Some(past) if purpose != Purpose::Ahead => {
-                share_of_pair(options.budget, &past, memory.depth.is_known())
+                budget_of_pair(options.budget, &past, memory.depth.is_known())
             }
             _ => options.budget,
         };
@@ -326,7 +326,7 @@ const fn for_whole(budget: Budget, is_priced: bool, made: Tests) -> u32 {
 
 /// The closest pair's part of a tick's budget: the rest is for the depth of an axis that may be inside. Where no depth is
 /// known and the last tick did not find the axis inside, the closest pair comes first, because a depth begins from it.
-fn share_of_pair(budget: Budget, past: &CertainInterval, is_depth_known: bool) -> Budget {
+fn budget_of_pair(budget: Budget, past: &CertainInterval, is_depth_known: bool) -> Budget {
     let was_inside = matches!(past.side, Side::Inside | Side::Crossing);
     if past.upper < 0.0 {
         Budget::new(budget.tests() / 8 * 3)

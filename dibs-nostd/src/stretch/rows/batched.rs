@@ -22,7 +22,7 @@ struct LastEdge {
 
 /// Four triangles: the rows of their corners, and the squares at rest.
 #[derive(Default)]
-struct Four {
+struct FourTriangles {
     centre: [u32; 4],
     other: [u32; 4],
     third: [u32; 4],
@@ -52,8 +52,8 @@ impl LastEdge {
         mut self,
         metrics: &[impl MetricBits; 4],
         triangles: &[I::Corners; 4],
-    ) -> Option<(Four, Self)> {
-        let mut four = Four::default();
+    ) -> Option<(FourTriangles, Self)> {
+        let mut four = FourTriangles::default();
         for lane in 0..4 {
             let corners = &triangles[lane];
             let [mark, between, second] = metrics[lane].bits();
@@ -80,7 +80,7 @@ impl LastEdge {
 impl<V: VertexTable + ?Sized> Table<'_, V> {
     /// The square of the second edge of each of four triangles, if all of them are certainly not stretched beyond `sqrt(largest)`.
     #[inline(always)]
-    fn pass_four<M: Measure>(&self, four: &Four, largest: f32) -> Option<[f32; 4]> {
+    fn pass_four<M: Measure>(&self, four: &FourTriangles, largest: f32) -> Option<[f32; 4]> {
         let at = |row| self.surface.position(row);
         let centre = Vec3x4::of(at, four.centre)?;
         let first = Vec3x4::of(at, four.other)?.minus(centre);

@@ -190,11 +190,11 @@ fn a_course_is_not_cut_to_the_numbers_that_fit() {
             unknown += 1;
             continue;
         }
-        let aside = any(&mut rng);
-        let stated = prediction.since(units.into(), aside).unwrap();
+        let residual = any(&mut rng);
+        let stated = prediction.since(units.into(), residual).unwrap();
         let grown = f64::from(1.0 + t);
         let farthest =
-            (f64::from(passed) * grown - f64::from(aside)).abs() + f64::from(off) * grown;
+            (f64::from(passed) * grown - f64::from(residual)).abs() + f64::from(off) * grown;
         assert!(stated as f64 >= farthest - 2.0, "{passed} {off} {units} {t}: {stated} {farthest}");
         known += 1;
     }

@@ -16,6 +16,15 @@ pub const TEXT: &str = "## Merged
 
 Lines that the commits remove and add, documentation and tests included.
 
+## Not merged
+
+- **Contacts take two searches.** Side and depth decide what the list contains, and a tool inside or beyond the margin
+  needs no second one (docs/decisions.md).
+- **`chain.rs` and `several.rs` stay apart.** One searches every pair in each call, the other only those that the last tick
+  does not rule out; they share `or_nearer`.
+- **A list holds the workspace of its search**, emptied before each: on a controller's stack it would be too much.
+- **`wire/` imports `math`, `surface` and `tree`**, and nothing of the search.
+
 ## Counts of the same steps
 
 Of 123 recorded rows two rose by more than 2 % from a3933105, before the first step, to 4b38ce4f, after the first six of

@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 pub const MARGIN: f32 = 6.0;
 
 /// The library's least prominence of a contact at this distance, without its accuracy.
-pub fn least_ridge(distance: f64) -> f64 {
+pub fn least_prominence(distance: f64) -> f64 {
     distance.min(f64::from(MARGIN)) / 128.0
 }
 
@@ -23,12 +23,12 @@ pub const LIKE: f32 = 0.11;
 pub struct Basin {
     pub distance: f64,
     /// Height of the lowest ridge to a lower basin, relative to this basin's minimum.
-    pub ridge: f64,
+    pub prominence: f64,
     /// Product of the axis' direction with the normal of the lowest triangle.
     pub up: f64,
 }
 
-/// Every basin in f64, and the basin of every triangle. Ridges up to [`least_ridge`] do not separate basins.
+/// Every basin in f64, and the basin of every triangle. Ridges up to [`least_prominence`] do not separate basins.
 pub fn basins(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Basin>, Vec<usize>) {
     let mut across = HashMap::new();
     for (row, &[a, b, c]) in triangles.iter().enumerate() {
@@ -49,7 +49,7 @@ pub fn basins(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Ba
         }
         row
     };
-    let mut ridges: HashMap<usize, f64> = HashMap::new();
+    let mut prominences: HashMap<usize, f64> = HashMap::new();
     for &row in &order {
         let [a, b, c] = triangles[row];
         let known = [(b, a), (c, b), (a, c)].into_iter().filter_map(|edge| across.get(&edge));
@@ -63,10 +63,10 @@ pub fn basins(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Ba
         let near = known.iter().find(|&&other| bottom(&all, other) == lowest);
         one[row] = bottom(&one, *near.expect("it is known"));
         for &basin in &bottoms[1..] {
-            let ridge = pairs[row].distance - pairs[basin].distance;
-            ridges.insert(basin, ridge);
+            let prominence = pairs[row].distance - pairs[basin].distance;
+            prominences.insert(basin, prominence);
             all[basin] = lowest;
-            if ridge <= least_ridge(pairs[basin].distance) {
+            if prominence <= least_prominence(pairs[basin].distance) {
                 let into = bottom(&one, row);
                 one[basin] = into;
             }
@@ -80,8 +80,8 @@ pub fn basins(rows: &[Vec3], triangles: &[[u32; 3]], tool: [Vec3; 2]) -> (Vec<Ba
         let [a, b, c] = at(row);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         let towards = (pairs[row].on_axis - pairs[row].on_surface).normalize_or_zero();
-        let ridge = ridges.get(&row).copied().unwrap_or(f64::INFINITY);
-        Basin { distance: pairs[row].distance, ridge, up: normal.dot(towards) }
+        let prominence = prominences.get(&row).copied().unwrap_or(f64::INFINITY);
+        Basin { distance: pairs[row].distance, prominence, up: normal.dot(towards) }
     });
     (found.collect(), labels)
 }
@@ -124,7 +124,7 @@ impl Surroundings {
     /// direction to the tool differs from both.
     pub fn connect(&self, [one, other]: [usize; 2]) -> bool {
         let most = self.distances[one].max(self.distances[other]);
-        let top = most + least_ridge(most);
+        let top = most + least_prominence(most);
         let is_like = |row: usize| {
             let to = |end: usize| self.directions[row].distance(self.directions[end]);
             to(one) < f64::from(LIKE) && to(other) < f64::from(LIKE)

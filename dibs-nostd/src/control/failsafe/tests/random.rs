@@ -69,7 +69,7 @@ fn run(steps: &[Step], limits: Limits, start: u32) -> (Vec<Observation>, Vec<Ver
 
 /// Whether an observation is beyond its first (`strict`) or second limits, computed anew.
 fn is_beyond(seen: &Observation, second: bool) -> bool {
-    let limit = |watch: ThresholdPair| if second { watch.safe() } else { watch.degraded() };
+    let limit = |pair: ThresholdPair| if second { pair.safe() } else { pair.degraded() };
     let most = if second { REJECTIONS.safe() } else { REJECTIONS.degraded() };
     let Some(frame) = seen.frame else { return true };
     seen.no_answer.is_some()
