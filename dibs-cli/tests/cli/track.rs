@@ -73,6 +73,10 @@ fn a_budget_widens_the_interval_and_says_so() {
             let all = exact["contacts"].as_array().unwrap();
             let below = |contact: &&Value| number(contact, "separation") < bound - 0.2;
             assert!(listed.len() >= all.iter().filter(below).count(), "{line} {exact}");
+            // None is deeper than the first.
+            if let Some(first) = listed.first() {
+                assert!(number(first, "separation") <= truth[1] + 0.01, "{line} {exact}");
+            }
             assert!(
                 bound <= 6.0 && listed.iter().all(|contact| number(contact, "separation") <= 6.0)
             );

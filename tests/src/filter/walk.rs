@@ -83,7 +83,9 @@ pub struct Tally {
     pub unsafe_ticks: u64,
     /// Ticks without a safe motion and with a separation below the stand-off.
     pub below: u64,
-    /// Ticks in which the safe motion was lost, on a convex surface with new frames, with a robot faster than it.
+    /// Ticks on a convex surface with new frames, with a robot faster than it.
+    pub easy: u64,
+    /// Those of them in which the safe motion was lost.
     pub cries: u64,
     /// Ticks near the surface.
     pub near: u64,
@@ -118,6 +120,7 @@ impl AddAssign for Tally {
         self.near += other.near;
         self.medial += other.medial;
         self.near_label += other.near_label;
+        self.easy += other.easy;
         self.cries += other.cries;
         self.most_instructions = self.most_instructions.max(other.most_instructions);
         self.over_budget += other.over_budget;
@@ -290,6 +293,7 @@ pub fn walk_by_label<const LABELS: usize>(
         listener.tick(&Asked { share: None, joints, radii, command, tissue, admitted });
         tally.judge(&truth, &axes, &admitted, episode, rng.bool());
         let is_unsafe = admitted.reason == Reason::NoSafeMotion;
+        tally.easy += u64::from(is_easy);
         tally.cries += u64::from(is_easy && is_unsafe && !was_unsafe);
         was_unsafe = is_unsafe;
         joints = joints.map(|joint| admitted.motion.apply(joint));

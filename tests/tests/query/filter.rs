@@ -230,7 +230,7 @@ fn a_start_too_near_leads_out_and_is_no_pass() {
     }
 }
 
-/// Between walls that close, no motion is safe in the end.
+/// Between walls nearer than the stand-off no motion is safe.
 #[test]
 fn a_gap_too_narrow_is_said() {
     let gap = sheet(12, 40.0, |x, _| 30.0 * ((x.abs() - 3.5) / 3.0).clamp(0.0, 1.0));
@@ -240,10 +240,11 @@ fn a_gap_too_narrow_is_said() {
     assert_eq!(admitted.reason, Reason::NoSafeMotion);
 }
 
-/// Rows of the caller hold whatever the command and the walls are.
+/// Rows of the caller hold whatever the command and the walls are, and so does the stand-off.
 #[test]
 fn rows_of_the_caller_hold() {
-    let mut bench = Bench::new(&ball(2), 1.0);
+    let mesh = ball(2);
+    let mut bench = Bench::new(&mesh, 1.0);
     // A remote centre of motion on the shaft: no motion across the shaft there.
     let (tip, port) = (Vec3::new(0.3, 0.2, 42.02), Vec3::new(5.0, 2.0, 100.0));
     let tool = capsule(tip, port);
@@ -265,6 +266,11 @@ fn rows_of_the_caller_hold() {
         for direction in across {
             assert!(at_port.dot(direction).abs() < 1e-3, "{admitted:?}");
         }
+        let [start, end] = [tip, port].map(|end| motion.apply(end));
+        let at_end = Instrument::capsule(start, end, 1.0);
+        let truth = exhaustive(&mesh.positions, &mesh.triangles, &at_end).expect("triangles");
+        assert_ne!(admitted.reason, Reason::NoSafeMotion, "{admitted:?}");
+        assert!(truth.separation > 0.98, "{truth:?} {admitted:?}");
         moved += usize::from(motion.rotation.length() > 1e-4);
         let down = motion.translation.dot(Vec3::NEG_Z);
         walls += usize::from(push.z < -0.1 && down < 0.8 * -push.z);

@@ -209,7 +209,8 @@ pub const COUNTED: &str =
     "After 100 ticks, and after 100 from each leap, a motion of more than 1.5 mm in a tick.";
 
 /// When a budget is left.
-pub const IDLE: &str = "Left is what covers the dearest step, 40 tests, some 4,600 instructions.";
+pub const IDLE: &str = "Left is what covers the dearest step, 40 tests, some 4,600 instructions: a fourth of 20,000, a twentieth of \
+     100,000.";
 
 /// Why the smallest budget's intervals are wide.
 const SMALLEST: &str = "The goals were 5, 10 and 20 mm, 10 mm in or crossing, and 4 %: not reached. More than half of the budget goes \
@@ -223,7 +224,8 @@ const SMALL: &str = "The goals were 0.4, 1 and 4 mm, 0.75 mm in or crossing, and
      tick was measured within the instructions; the median tick that uses it up takes {bounded.40k.spent}, because a test's \
      price is its mean cost. Four designs did not narrow the interval: an unfinished search among the leaves as its lower end, \
      a certain depth of the last deepest point from its leaves, half of the budget for dividing the axis, and no search \
-     of a point while another waits.";
+     of a point while another waits. A pair is off the deepest where the budget ended its search: against that alone \
+     nothing else was tried.";
 
 /// What two larger budgets were meant to reach.
 const MIDDLE: &str = "The goals were 0.25, 0.4 and 2 mm, 0.3 mm in or crossing, and 0.1 %: not reached, \

@@ -29,10 +29,10 @@ pub const CHECK: Check = Check {
             bound: Bound::Is(0.0),
             unit: "of {filter.ticks} ticks, {filter.near} of them within 5 mm; the worst was {filter.worst} mm below",
             limits: "Two capsules, ten scenes: corner, groove, gaps, spike, plate of 0.2 mm, ball, heart, brain; tissue at its limit of \
-                     up to 300 mm/s, swinging, waving, drifting, closing; frames late and lost; periods of 0.5 to 4 ms; an eighth of the \
+                     up to 300 mm/s, swinging, waving, drifting, closing; frames at irregular times, late and lost; periods of 0.5 to 4 ms; an eighth of the \
                      walks take the worst of three commands, and an eighth lead to the medial axis. Truth by exhaustive search in f64 at six instants of a tick. \
                      Residual and position error are 0 here, and no frame is extrapolated: these only add to the stand-off \
-                     (query/filter.rs). Without rows of the caller; two surfaces are query/filter_of_scene.rs, a climb over \
+                     (query/filter.rs). Without rows of the caller (query/filter.rs has them); two surfaces are query/filter_of_scene.rs, a climb over \
                      settings is query/filter_climb.rs.",
         },
         Promise {
@@ -48,8 +48,8 @@ pub const CHECK: Check = Check {
             says: "Where there is a way out, a tool that keeps its stand-off seldom loses its safe motion",
             criterion: FLOW,
             bound: Bound::AtMost(100.0),
-            unit: "of a million ticks lost it, and said so",
-            limits: "Of those walks the ones about a spike, a plate or a ball, with every frame new, a robot twice as fast as the \
+            unit: "of a million such ticks lost it, and said so; there were {filter.easy}",
+            limits: "Of these walks the ones about a spike, a plate or a ball, with every frame new, a robot twice as fast as the \
                      tissue, and the whole budget.",
         },
         Promise {
@@ -90,11 +90,12 @@ pub const CHECK: Check = Check {
             says: "A hand's commands do not get in when they are filtered",
             criterion: FLOW,
             bound: Bound::AtMost(0.02),
-            unit: "mm of penetration at the deepest; {filter.rows} mm by velocity rows alone, {filter.proxy} mm by the force of all \
+            unit: "mm of penetration at the deepest, within 2,000,000 instructions a tick; {filter.rows} mm by velocity rows alone, {filter.proxy} mm by the force of all \
                    contacts, {filter.force} mm or more by that of the closest pair",
             limits: "An instrument of 1 mm radius, no stand-off, in the hand's six scenes; forces of at most 5 N against 4.5 N, commands of \
-                     225 mm/s within 2,000,000 instructions a tick, rows of a gain of 100/s with the surface's velocity. Beyond 10 mm a push ends.",
+                     225 mm/s, rows of a gain of 100/s with the surface's velocity. Beyond 10 mm a push ends.",
         },
+        note("filter.easy"),
         note("filter.ticks"),
         note("filter.near"),
         note("filter.worst"),
@@ -127,7 +128,8 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let thousandths = |x: f64| (x * 1e3).round() / 1e3;
     figures.note("filter.violations", (sum.violations + sum.too_fast) as f64);
     figures.note("filter.uncertain", sum.uncertain as f64);
-    figures.note("filter.cries", (sum.cries as f64 / sum.ticks as f64 * 1e6).round());
+    figures.note("filter.cries", (sum.cries as f64 / sum.easy.max(1) as f64 * 1e6).round());
+    figures.note("filter.easy", sum.easy as f64);
     figures.note("filter.over", sum.over_budget as f64);
     figures.note("filter.most", f64::from(sum.most_instructions));
     figures.note("filter.ticks", sum.ticks as f64);

@@ -3,7 +3,7 @@
 // Requirements: C-03, C-04
 
 use anyhow::Result;
-use controller::Hand;
+use controller::{ACCOUNT, Hand, PERIOD};
 use dibs_tests::hand::{Pushed, scenes};
 use xtask::steps::Outcome;
 
@@ -49,12 +49,18 @@ pub const CHECK: Check = Check {
             criterion: FLOW,
             bound: Bound::AtMost(1.0),
             unit: "mJ; {hand.given.alone} mJ by the closest pair alone, without an account",
-            limits: "The same pushes, relative to the wall, at any time.",
+            limits: "The same pushes, relative to the wall, at any time; every frame is new. Late frames, holds and saturation are \
+                     control/constraint/account/tests.rs: at most 1 mJ on 200 random walls, and where a force must fall \
+                     {hand.overdraft} mJ more, by no more than 0.5 N a tick.",
         },
         note("hand.given.alone"),
+        note("hand.overdraft"),
         note("hand.step.alone"),
     ],
 };
+
+/// The account's tank (mJ).
+const TANK: f32 = 1.0;
 
 fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let scenes = scenes();
@@ -72,6 +78,7 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
         |pushed: &[Pushed]| rounded(pushed.iter().fold(0.0, |most, one| one.given.max(most)));
     figures.note("hand.given", given(&all));
     figures.note("hand.given.alone", given(&alone));
+    figures.note("hand.overdraft", rounded(ACCOUNT.most(PERIOD) - TANK));
     figures.note("hand.step", step(&all));
     figures.note("hand.step.alone", step(&alone));
     Ok(Outcome::Passed)

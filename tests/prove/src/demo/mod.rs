@@ -65,7 +65,7 @@ pub struct Options {
     pub nodes: Option<Cells>,
     /// A script moves the instrument instead of the hand, around the surface and through it: nothing stops it, so every
     /// force is tested. This is the default with `--c` and `--faults`.
-    #[arg(long, alias = "path")]
+    #[arg(long, visible_alias = "path")]
     pub script: bool,
     /// Seconds of the controller's time to run.
     #[arg(long, default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=3600))]

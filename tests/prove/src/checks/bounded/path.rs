@@ -54,7 +54,7 @@ pub fn path(corners: &[[Vec3; 3]], (middle, faster): (Vec3, f32), ticks: usize) 
     poses.collect()
 }
 
-/// The poses of a shaft through everything around a point, for half of the path, and of a short instrument wholly inside
+/// The poses of a shaft through everything around a point, for half of the path, and of a short instrument within
 /// the outermost wall, for the other half.
 pub fn through(corners: &[[Vec3; 3]], middle: Vec3, ticks: usize) -> Vec<Capsule> {
     let (mut looked, mut walls) = (Vec3::ZERO, [0.0; 2]);

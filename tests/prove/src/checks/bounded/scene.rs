@@ -40,6 +40,7 @@ pub struct Truth {
     pub lower: f32,
     pub upper: f32,
     pub accuracy: f32,
+    pub side: Side,
     pub direction: Vec3,
     /// The force (N) of the demo's wall, without damping.
     pub force: Vec3,
@@ -172,9 +173,9 @@ pub fn truth(scene: &Scene) -> Vec<Truth> {
     scene.each(&tree, |_, surface, tool, options| {
         let options = options.depth_tolerance(0.02);
         let found = query.closest(surface, tool, &options).expect("an answer");
-        let Proximity { lower, separation: upper, accuracy, direction, .. } = found;
+        let Proximity { lower, separation: upper, accuracy, side, direction, .. } = found;
         let force = wall.force(&Ok(found), Vec3::ZERO).force;
-        Truth { lower, upper, accuracy, direction, force }
+        Truth { lower, upper, accuracy, side, direction, force }
     })
 }
 
