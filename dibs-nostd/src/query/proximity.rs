@@ -31,7 +31,7 @@ pub struct Proximity {
     pub separation: f32,
     /// Lower end of the certified interval. Equals `separation` unless the budget ran out, or the axis crosses the
     /// surface or is inside: then it is lower by at most [`Options::depth_tolerance`](crate::Options::depth_tolerance), or by more
-    /// if the budget or 28 points of the axis were not enough.
+    /// if the budget or 28 points of the axis were not enough. Without a side see [`interval`](Self::interval).
     pub lower: f32,
     /// The error bound of every separation above: f32 rounding at coordinates of this size.
     pub accuracy: f32,

@@ -126,8 +126,8 @@ fn a_large_step_after_a_small_one_is_not_understated() {
 /// The reading of a surface's odometer, which is only in its debug text.
 fn reading(surface: &impl MovingSurface) -> u64 {
     let text = format!("{:?}", surface.motion().expect("measured"));
-    let number = text.split("reading: ").nth(1).and_then(|rest| rest.split(',').next());
-    number.expect("a reading").parse().expect("a number")
+    let number = text.split("displacement: ").nth(1).and_then(|rest| rest.split(',').next());
+    number.expect("a displacement").parse().expect("a number")
 }
 
 fn follow<G: AdmissionCheck>(tree: &Tree<'_, u16>, rest: &[Vec3], admission_check: G) {

@@ -5,7 +5,7 @@ use dibs_build::{Builder, BuiltTree, Mesh, Motion, Volume, generate};
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::nodes::Nodes;
 use dibs_nostd::{
-    Budget, Capsule, Cost, MeasuredStretch, Odometer, Options, Proximity, Query, Side,
+    Budget, Capsule, Cost, Interval, MeasuredStretch, Odometer, Options, Proximity, Query, Side,
     SurfaceBlend, Tool, Tree, measure_stretch,
 };
 use glam::Vec3;
@@ -49,9 +49,8 @@ pub struct Truth {
 impl Truth {
     /// Whether an answer's certified interval does not hold the true separation.
     pub fn is_missed_by(&self, found: &Proximity) -> bool {
-        let accuracy = found.accuracy + self.accuracy;
-        let is_open = matches!(found.side, Side::Undefined(_));
-        found.lower - accuracy > self.upper || found.separation + accuracy < self.lower && !is_open
+        let Interval { lower, upper } = found.interval();
+        lower > self.upper + self.accuracy || upper < self.lower - self.accuracy
     }
 }
 
