@@ -1,4 +1,6 @@
 //! The requirements: the library's promises, each with an id that sources refer to.
+//!
+//! One file, because it is one list.
 
 /// What the library must do.
 pub struct Requirement {
