@@ -2053,7 +2053,7 @@ typedef struct {
    * The surface at the start and at the end: 0 is the tracker's surface before the last `dibs_tracker_set_frame`, 1
    * the one since then.
    */
-  float share[2];
+  float t[2];
   /**
    * In mm, not negative.
    */
@@ -3326,7 +3326,7 @@ dibs_code dibs_surface_init(void *storage,
  * @param sweep    The motion.
  * @param options  Options, or null.
  * @param swept    Receives the result.
- * @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a share out of
+ * @return As `dibs_tracker_closest`; `DIBS_CODE_MARGIN` and `DIBS_CODE_ARGUMENT` for a margin and a `t` out of
  *         range.
  */
 dibs_code dibs_tracker_sweep(dibs_tracker *tracker,

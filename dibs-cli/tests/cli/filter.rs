@@ -69,22 +69,20 @@ fn admitted_poses_keep_the_stand_off() {
     };
     poses(&commands);
     assert!(least() < -5.0);
-    // A motion whose frames are ticks is the same however they are joined.
+    // A motion whose frames are ticks is the same however they are joined. Its tissue moves up to 3.1 mm in a tick and its
+    // age, which the filter keeps besides.
     let quick = lines(folder, "--motion-rate 1000");
-    let mut admitted_quick = vec![commands[0].clone()];
-    admitted_quick.extend(quick.iter().map(|line| line["admitted"].as_str().unwrap().to_owned()));
-    poses(&admitted_quick);
+    assert!(quick.iter().all(|line| line["reason"] != "no safe motion"));
+    let mut admitted = vec![commands[0].clone()];
+    admitted.extend(quick.iter().map(|line| line["admitted"].as_str().unwrap().to_owned()));
+    poses(&admitted);
     let track = "track heart.dibs --motion heart.pc2 --motion-rate 1000 --path poses.csv --json";
     let mut near = 0;
     for line in succeeds(folder, track).lines() {
         let line: Value = serde_json::from_str(line).unwrap();
-        let tick = line["tick"].as_u64().unwrap() as usize;
-        let is_said =
-            |tick: usize| quick.get(tick).is_some_and(|line| line["reason"] == "no safe motion");
-        let was_said = tick > 0 && is_said(tick - 1) || is_said(tick);
         let lower = line["lower"].as_f64().unwrap();
-        assert!(was_said || lower > 0.97, "{line}");
-        near += u32::from(!was_said && lower < 3.0);
+        assert!(lower > 0.97, "{line}");
+        near += u32::from(lower < 5.0);
     }
     assert!(near > 100, "{near}");
 }
