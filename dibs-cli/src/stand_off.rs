@@ -49,7 +49,7 @@ pub fn filter<I: Index>(
         bail!("--stand-off is {of_all}: give a number of at least 0");
     }
     let mut of_labels = [(0, of_all); LABELS];
-    let mut places = of_labels.iter_mut();
+    let mut slots = of_labels.iter_mut();
     for &StandOff { label, value } in stand_offs {
         let Some(label) = label else { continue };
         if !(value >= of_all && value.is_finite()) {
@@ -63,8 +63,8 @@ pub fn filter<I: Index>(
                 file.display()
             );
         }
-        let place = places.next();
-        *place.ok_or_else(|| anyhow!("--stand-off: at most {LABELS} labels have a place"))? =
+        let slot = slots.next();
+        *slot.ok_or_else(|| anyhow!("--stand-off: at most {LABELS} labels have a slot"))? =
             (label, value);
     }
     let filter = Filter::new(of_all, robot)

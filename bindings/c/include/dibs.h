@@ -2705,9 +2705,9 @@ dibs_code dibs_guard_closest(dibs_guard *guard,
  * The answer of this tick, and all locally closest pairs with a separation of at most `margin`, deepest first, within
  * the same budget. Each has the velocity of the surface there, so `dibs_contacts_set_velocities` is not needed.
  *
- * Call it instead of `dibs_guard_closest`. Act on the list only if the answer's outcome is `DIBS_CODE_OK`. Its first
- * contact always counts: nothing is deeper; beyond the list's bound others may be missing. The list's accuracy
- * includes the surface's error and age.
+ * Call it instead of `dibs_guard_closest`. Act on the list only if the answer's outcome is `DIBS_CODE_OK`. Unless the
+ * side is undefined, its first contact counts: nothing is deeper; beyond the list's bound others may be missing. The
+ * list's accuracy includes the surface's error and age.
  *
  * Cost: that of `dibs_guard_closest`, and some hundred instructions a contact.
  *

@@ -78,8 +78,8 @@ impl dibs_filter {
             return Err(dibs_code::Argument);
         }
         let given = self.labels.iter().take(self.label_count as usize);
-        for (place, &dibs_stand_off_of { label, stand_off }) in labels.iter_mut().zip(given) {
-            *place = (u8::try_from(label).map_err(|_| dibs_code::Argument)?, stand_off);
+        for (slot, &dibs_stand_off_of { label, stand_off }) in labels.iter_mut().zip(given) {
+            *slot = (u8::try_from(label).map_err(|_| dibs_code::Argument)?, stand_off);
         }
         let filter = filter.stand_off_of(labels)?;
         let filter = filter.budget(self.instructions).options(options);

@@ -266,7 +266,7 @@ impl Filter {
         if found > LABELS {
             return Err(invalid(format!("stand_off_of: {found} labels, and {LABELS} have a slot")));
         }
-        labels.iter_mut().zip(of_labels).for_each(|(place, of_label)| *place = of_label);
+        labels.iter_mut().zip(of_labels).for_each(|(slot, of_label)| *slot = of_label);
         let filter = filter.stand_off_of(labels).map_err(named)?;
         let has = |label| of_any_width!(tree.0.view(), tree => tree.has_label(label));
         if let Some(&(label, _)) = labels.iter().take(found).find(|&&(label, _)| !has(label)) {

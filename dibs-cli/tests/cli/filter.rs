@@ -69,8 +69,8 @@ fn admitted_poses_keep_the_stand_off() {
     };
     poses(&commands);
     assert!(least() < -5.0);
-    // A motion whose frames are ticks is the same however they are joined. Its tissue moves up to 3.1 mm in a tick and its
-    // age, which the filter keeps besides.
+    // A motion whose frames are ticks is the same however they are joined. Its tissue may move by 3.1 mm in a
+    // tick and its age, which the filter adds to the stand-off.
     let quick = lines(folder, "--motion-rate 1000");
     assert!(quick.iter().all(|line| line["reason"] != "no safe motion"));
     let mut admitted = vec![commands[0].clone()];

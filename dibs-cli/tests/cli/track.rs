@@ -41,7 +41,7 @@ fn a_budget_widens_the_interval_and_says_so() {
     for budget in [20_000, 60_000, 2_000_000] {
         let ticks = lines(folder, &format!("--budget {budget} --contacts 6"));
         assert_eq!(ticks.len(), whole.len());
-        let (mut cut, mut late) = (0, 0);
+        let (mut cut, mut late, mut begun) = (0, 0, 0);
         for (tick, (line, exact)) in ticks.iter().zip(&whole).enumerate() {
             // The exact separation is within [lower, separation] of its own, and both intervals hold the truth.
             let truth = [0, 1].map(|end| exact["interval"][end].as_f64().unwrap());
@@ -75,12 +75,14 @@ fn a_budget_widens_the_interval_and_says_so() {
             assert!(listed.len() >= all.iter().filter(below).count(), "{line} {exact}");
             // None is deeper than the first.
             if let Some(first) = listed.first() {
+                begun += u32::from(line["is_cut"] == true);
                 assert!(number(first, "separation") <= truth[1] + 0.01, "{line} {exact}");
             }
             assert!(
                 bound <= 6.0 && listed.iter().all(|contact| number(contact, "separation") <= 6.0)
             );
         }
+        assert!(begun > 20 || budget > 20_000, "{begun} lists of cut ticks at {budget}");
         assert!(late > 1 || budget > 20_000, "a start within {budget} has its side at once");
         assert!(cut <= cut_before && (budget > 20_000 || cut > 20), "{cut} at {budget}");
         cut_before = cut;

@@ -20,7 +20,7 @@ static CONTROL: Exclusive<Option<Control<Script>>> = Exclusive::new(None);
 
 /// Values for a debugger, in words. In the TCM, which is not cached.
 #[repr(C)]
-pub struct ThresholdPair {
+pub struct Watch {
     /// Control ticks run so far.
     ticks: AtomicU32,
     /// Most cycles from a tick's due time to its first instruction.
@@ -36,7 +36,7 @@ pub struct ThresholdPair {
 /// The values of the run so far.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".dtcm.watch")]
-pub static WATCH: ThresholdPair = ThresholdPair {
+pub static WATCH: Watch = Watch {
     ticks: AtomicU32::new(0),
     latest_start: AtomicU32::new(0),
     latest_end: AtomicU32::new(0),

@@ -41,7 +41,7 @@ const TESTS_OF_DUE: u64 = 10;
 const NEAR: f32 = 4.0;
 
 /// Instructions of work besides searches: a product or sum of two vectors, a pair's path, its distances on it, and an
-/// estimate's part for each opened node. Fitted so that no tick on the emulated board takes more than its budget.
+/// estimate's part for each opened node. Typical, fitted so that no tick on the emulated board takes more than its budget.
 const PRODUCT: u32 = 32;
 const PATH: u32 = 300;
 const DISTANCES: u32 = 200;

@@ -19,7 +19,7 @@ use crate::tool::AxisPair;
 use crate::unavailable::QueryError;
 use crate::{Coverage, Index, Tool, Tree, TriangleRow, VertexTable};
 
-/// Prominences of a contact are examined up to this fraction of the margin: the largest for an activation of 1.
+/// A contact's prominence is examined up to this fraction of the margin: the largest for an activation of 1.
 const PROMINENCE: f32 = 1.0 / 64.0;
 
 /// Within this many accuracies two points are too close to give a direction.
@@ -208,12 +208,12 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
                 found.insert(contact);
             } else if !is_certain && !is_found {
                 // Nothing is deeper than the least separation that an uncertain pair may have.
-                let key = |at: &Contact| (at.surface, at.tool, at.triangle);
-                let is_near = |at: &Contact| {
-                    at.point_on_surface.distance_squared(contact.point_on_surface)
-                        <= accuracy * accuracy
+                let is_same = |at: &Contact| {
+                    let apart = at.point_on_surface.distance_squared(contact.point_on_surface);
+                    (at.surface, at.tool) == (contact.surface, contact.tool)
+                        && (at.triangle == contact.triangle || apart <= accuracy * accuracy)
                 };
-                found.list.retain(|other| key(other) != key(&contact) && !is_near(other));
+                found.list.retain(|other| !is_same(other));
                 found.insert(contact);
             }
         }

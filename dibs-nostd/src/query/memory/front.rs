@@ -63,7 +63,7 @@ pub(in crate::query) struct ChildSlot {
 }
 
 impl ChildSlot {
-    /// The child's slot as a word on the search's stack.
+    /// The node and slot as a word on the search's stack.
     #[inline(always)]
     pub fn to_word(self) -> u32 {
         u32::from(self.node) << 3 | u32::from(self.slot)
@@ -87,7 +87,7 @@ pub(in crate::query) struct Front<const OPENED: usize> {
     free: u16,
     /// The slot at which the last tick's budget ended; zero after a complete one.
     resume: u16,
-    /// The closest triangle's slot.
+    /// The closest triangle, as a child.
     pub best: Option<ChildSlot>,
     /// The slot last examined for closing.
     clock_hand: u16,

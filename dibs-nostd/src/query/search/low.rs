@@ -45,7 +45,7 @@ enum Dip {
 }
 
 impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
-    /// Visits a leaf's triangles within the cutoff that may be local minima, ignoring a prominence up to this one. A
+    /// Visits a leaf's triangles within the cutoff that may be local minima, ignoring prominences up to `prominence`. A
     /// visit returns the next limit. Returns the least lower bound on a triangle's squared distance; `None` if the
     /// budget ran out.
     ///

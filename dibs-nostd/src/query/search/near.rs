@@ -43,8 +43,8 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> Search<'_, '_, I, V, T> {
         self
     }
 
-    /// Visits, with its pair, every triangle within `limit` of the axis that may be a local minimum, ignoring a
-    /// prominence up to this one. A visit returns the next limit. Returns a lower bound on the distance of unvisited triangles;
+    /// Visits, with its pair, every triangle within `limit` of the axis that may be a local minimum, ignoring
+    /// prominences up to `prominence`. A visit returns the next limit. Returns a lower bound on the distance of unvisited triangles;
     /// the tests made are in `budget`. With a label in the options, only that part of the surface is visited.
     pub fn each_low(
         mut self,

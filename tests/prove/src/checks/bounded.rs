@@ -57,7 +57,7 @@ pub const CHECK: Check = Check {
             bound: Bound::Is(0.0),
             unit: "of {bounded.ticks} ticks with each of eight budgets: four that were measured, and the tests that `Cost::M7_TICK` buys",
             limits: "A beating heart, an instrument that hovers, touches, passes the wall, lies along it and hurries. Truth by whole \
-                     queries. Shafts and tools wholly inside: `shaft.*`. A climb over motion and budgets, its truth in f64: \
+                     queries, whose intervals must meet the tick's. Shafts and tools wholly inside: `shaft.*`. A climb over motion and budgets, its truth in f64: \
                      query/climbed_budget.rs.",
         },
         note("bounded.ticks"),
@@ -224,8 +224,8 @@ const SMALL: &str = "The goals were 0.4, 1 and 4 mm, 0.75 mm in or crossing, and
      tick was measured within the instructions; the median tick that uses it up takes {bounded.40k.spent}, because a test's \
      price is its mean cost. Four designs did not narrow the interval: an unfinished search among the leaves as its lower end, \
      a certain depth of the last deepest point from its leaves, half of the budget for dividing the axis, and no search \
-     of a point while another waits. A pair is off the deepest where the budget ended its search: against that alone \
-     nothing else was tried.";
+     of a point while another waits. A pair is off the deepest where the budget ended its search; nothing was tried \
+     against that alone.";
 
 /// What two larger budgets were meant to reach.
 const MIDDLE: &str = "The goals were 0.25, 0.4 and 2 mm, 0.3 mm in or crossing, and 0.1 %: not reached, \

@@ -21,14 +21,14 @@ pub const CHECK: Check = Check {
     promises: &[
         wrong(
             "dearer.wrong",
-            "of {dearer.ticks} ticks at twice the speed, and of as many on 40,000 triangles",
+            "of {dearer.ticks} ticks at twice the speed, and of as many on 40,000 triangles, with each of two budgets",
         ),
         note("dearer.ticks"),
         damped(
             "dearer.damped",
             "of {dearer.near} ticks within 5 mm, those with each of two budgets",
         ),
-        idle("dearer.idle", "of {dearer.near} ticks within 5 mm"),
+        idle("dearer.idle", "of {dearer.near} ticks within 5 mm, those with each of two budgets"),
         note("dearer.near"),
         Promise {
             limits: GOAL,
@@ -105,10 +105,19 @@ pub const OF_HUMAN: Check = Check {
     name: "a human heart in 60,000 instructions",
     run: human,
     promises: &[
-        wrong("dearer.human.wrong", "of {dearer.human.ticks} ticks on a human heart"),
+        wrong(
+            "dearer.human.wrong",
+            "of {dearer.human.ticks} ticks on a human heart, with each of two budgets",
+        ),
         note("dearer.human.ticks"),
-        damped("dearer.human.damped", "of {dearer.human.near} ticks within 5 mm of a human heart"),
-        idle("dearer.human.idle", "of {dearer.human.near} ticks within 5 mm of a human heart"),
+        damped(
+            "dearer.human.damped",
+            "of {dearer.human.near} ticks within 5 mm of a human heart, those with each of two budgets",
+        ),
+        idle(
+            "dearer.human.idle",
+            "of {dearer.human.near} ticks within 5 mm of a human heart, those with each of two budgets",
+        ),
         note("dearer.human.near"),
         Promise {
             limits: GOAL,

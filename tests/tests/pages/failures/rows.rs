@@ -242,7 +242,7 @@ pub const CALLS: &[Call] = &[
     call("Answer::guide", "As `force`.", FORCE, "It has no state."),
     call(
         "Answer::contacts",
-        "The answer has no pair to act on. The budget ended before the side was known, the tool may be inside, or the \
+        "The answer has no pair to act on. The budget ended before the side or any pair was known, the tool may be inside, or the \
          margin is larger than the list's.",
         &[
             ("Unavailable", But(&["NoDirection", "NotFinite", "NoPose"])),

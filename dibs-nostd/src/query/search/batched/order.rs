@@ -55,12 +55,12 @@ impl<I: Index, V: VertexTable + ?Sized, T: Tool> BatchedSearch<'_, '_, I, V, T> 
                     farther = array::from_fn(|i| farther[i] + u32::from(*key > own[i]));
                 }
             }
-            for (key, slot) in own.iter().zip(farther) {
+            for (key, position) in own.iter().zip(farther) {
                 let at = INDEX - (*key as u32 & INDEX);
                 // Out of range where the block is longer than the stack.
-                if let Some(subtree) = stack.get_mut(slot as usize) {
+                if let Some(slot) = stack.get_mut(position as usize) {
                     let link = whole_node::<I>(records, at)?.link;
-                    *subtree = WaitingNode { lower: *lowers.get(at as usize)?, link };
+                    *slot = WaitingNode { lower: *lowers.get(at as usize)?, link };
                 }
             }
         }
