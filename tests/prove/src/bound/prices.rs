@@ -11,9 +11,9 @@ use super::walk::{Longest, UNIT, Walk, longest};
 
 /// Most rounds.
 const ROUNDS: usize = 2_000;
-/// Loss, in instructions, that each cycle must have, so that rounding the prices does not turn it into a gain.
+/// Loss, in instructions or cycles, that each cycle must have, so that rounding the prices does not turn it into a gain.
 const LOSS: f64 = 0.01;
-/// Instructions by which the longest walk may exceed the solver's result.
+/// Instructions or cycles by which the longest walk may exceed the solver's result.
 const NEAR: f64 = 0.5;
 
 /// A bound that was checked.
@@ -28,7 +28,7 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// The constants: instructions of every query, of each further root, of each node test and of each triangle test,
+    /// The constants: instructions or cycles of every query, of each further root, of each node test and of each triangle test,
     /// in units of 1 / [`UNIT`].
     pub fn constants(&self, system: &System) -> [i128; 4] {
         let mut sum = [self.gain, 0, 0, 0];
@@ -41,12 +41,13 @@ impl Bound {
     }
 }
 
-/// Finds the prices that minimise the bound for a query with these counts, and checks them. A loop that no fact bounds
+/// Finds the prices that minimise the bound for a query with these counts, and checks them. `weigh` as in [`longest`]. A loop that no fact bounds
 /// is an error, which describes its place.
 pub fn least(
     program: &Program,
     system: &System,
     of: &Most,
+    weigh: &dyn Fn(u32) -> i64,
     describe: impl Fn(u32) -> String,
 ) -> Result<Bound> {
     let mut problem = Problem::new(OptimizationDirection::Minimize);
@@ -65,7 +66,7 @@ pub fn least(
         let SolveOutcome::Solution(solution) = problem.solve()? else { bail!("no prices in time") };
         let now: Vec<i128> =
             prices.iter().map(|&price| (solution[price] * UNIT as f64).round() as i128).collect();
-        let found = longest(program, system, &now)?;
+        let found = longest(program, system, &now, weigh)?;
         let mut add = |walk: &Walk, is_cycle: bool| {
             let counts = walk.counts.iter().filter(|(_, count)| **count != 0);
             let mut terms: Vec<_> =
@@ -73,7 +74,7 @@ pub fn least(
             if !is_cycle {
                 terms.push((whole, 1.0));
             }
-            let least = walk.instructions as f64 + if is_cycle { LOSS } else { 0.0 };
+            let least = walk.length as f64 + if is_cycle { LOSS } else { 0.0 };
             if terms.iter().all(|(_, count)| *count <= 0.0) {
                 return Err(anyhow!("no fact bounds the loop through {}", describe(walk.through)));
             }

@@ -11,9 +11,10 @@ use glam::Vec3;
 use xtask::workspace;
 
 use super::analysis::Analysis;
+use super::cycles::Cycles;
 use super::facts::{EMBEDDED, Facts, MODAL, MODES, MOVING, Most, PLAIN};
 use super::prices::{Bound, least};
-use super::second;
+use super::second::Listing;
 use super::sided::{RING, SIDED_CAPSULE, SIDED_SPHERE};
 use super::walk::UNIT;
 use crate::checks::cost::unseen;
@@ -155,7 +156,7 @@ pub const KINDS: [Kind; 10] = [
 ];
 
 /// The query for which the bound is minimised: a budget of the firmware, of which a tenth is spent on triangles.
-const TYPICAL: Most = Most { base: 1, roots: 1, nodes: 1_200, triangles: 30 };
+pub(super) const TYPICAL: Most = Most { base: 1, roots: 1, nodes: 1_200, triangles: 30 };
 
 /// A proven bound.
 pub struct Proven {
@@ -172,7 +173,7 @@ impl Proven {
         let analysis = Analysis::new(probe, &workspace::root(), kind.root, facts)
             .with_context(|| format!("the query of a {}", kind.name))?;
         let Analysis { program, system, lines, .. } = &analysis;
-        let bound = least(program, system, &TYPICAL, |at| lines.describe(at))
+        let bound = least(program, system, &TYPICAL, &|_| 1, |at| lines.describe(at))
             .with_context(|| format!("the query of a {}", kind.name))?;
         let constants = bound.constants(system);
         Ok(Self { kind, analysis, bound, constants })
@@ -180,7 +181,16 @@ impl Proven {
 
     /// The constants, in whole instructions.
     pub fn whole(&self) -> [u32; 4] {
-        self.constants.map(|constant| (constant + UNIT - 1).div_euclid(UNIT) as u32)
+        whole(self.constants)
+    }
+
+    /// The constants in cycles of a model.
+    pub fn cycles(&self, listing: &Listing) -> Result<[u32; 4]> {
+        let Analysis { program, system, lines, .. } = &self.analysis;
+        let cycles = Cycles::new(&self.analysis, listing)?;
+        let describe = |at| lines.describe(at);
+        let bound = least(program, system, &TYPICAL, &|at| cycles.at(at), describe)?;
+        Ok(whole(bound.constants(system)))
     }
 
     /// Base, node test and triangle test, each divided by the fitted constant.
@@ -200,11 +210,11 @@ impl Proven {
             .map(|(one, count)| one * i128::from(count))
             .sum::<i128>()
     }
+}
 
-    /// Number of instructions that another decoder decodes identically.
-    pub fn decoded(&self, probe: &Path) -> Result<usize> {
-        second::agree(&self.analysis, probe)
-    }
+/// Rounded up to whole units.
+fn whole(constants: [i128; 4]) -> [u32; 4] {
+    constants.map(|constant| (constant + UNIT - 1).div_euclid(UNIT) as u32)
 }
 
 /// Further roots and tests of an answered query.

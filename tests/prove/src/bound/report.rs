@@ -13,7 +13,8 @@ use super::core_items::{Item, items, section};
 use super::depth::TRACKED_DEPTH;
 use super::facts::{Facts, MODAL, ONLY_FROM};
 use super::follow::{Traced, faults, planted_in_queries, trace};
-use super::queries::{Counted, KINDS, Proven, count, to_trace};
+use super::queries::{Counted, KINDS, Proven, TYPICAL, count, to_trace};
+use super::second::{Listing, agree};
 use super::sided::{RING, SIDED_CAPSULE};
 use super::ticks::{self, TICKS};
 use super::tracked::{SLOTS, TRACKED};
@@ -40,6 +41,16 @@ pub struct Row {
     pub traced: Traced,
     /// Instructions that another decoder decodes identically.
     pub decoded: usize,
+    /// The constants in cycles of a model.
+    pub cycles: [u32; 4],
+}
+
+impl Row {
+    fn new(proven: Proven, counted: Counted, traced: Traced, listing: &Listing) -> Result<Self> {
+        let decoded = agree(&proven.analysis, listing)?;
+        let cycles = proven.cycles(listing)?;
+        Ok(Self { proven, counted, traced, decoded, cycles })
+    }
 }
 
 /// The result of a complete run.
@@ -65,18 +76,17 @@ pub fn findings([probe, tracker]: [&Path; 2], queries: usize, traces: usize) -> 
     let ticks: Vec<Proven> =
         TICKS.iter().map(|kind| Proven::new(kind, tracker, kind.facts)).collect::<Result<_>>()?;
     let seconds = start.elapsed().as_secs_f64();
+    let listings = [Listing::read(probe)?, Listing::read(tracker)?];
     let counted = count(&proven, probe, queries)?;
     let traced = trace(&proven, probe, &to_trace(traces)?)?;
     let mut rows = Vec::new();
     for ((proven, counted), traced) in proven.into_iter().zip(counted).zip(traced) {
-        let decoded = proven.decoded(probe)?;
-        rows.push(Row { proven, counted, traced, decoded });
+        rows.push(Row::new(proven, counted, traced, &listings[0])?);
     }
     for proven in ticks {
         let counted = ticks::count(&proven, tracker, queries)?;
         let traced = ticks::trace(&proven, tracker, (TICKS_TRACED * traces) as u32)?;
-        let decoded = proven.decoded(tracker)?;
-        rows.push(Row { proven, counted, traced, decoded });
+        rows.push(Row::new(proven, counted, traced, &listings[1])?);
     }
     let core = items(&rows.last().context("no tick")?.proven.analysis)?;
     let found = faults().map(|(kind, fault)| planted_in_queries(kind, probe, &fault));
@@ -112,6 +122,21 @@ pub fn write(findings: &Findings, run: &Run) -> Result<()> {
     fs::write(&file, page).with_context(|| format!("cannot write {}", file.display()))?;
     println!("{}", file.display());
     Ok(())
+}
+
+/// The constants in cycles of a model, and how many an instruction takes in the query for which bounds are minimised.
+fn cycles(rows: &[Row]) -> String {
+    let sum = |[base, _, node, triangle]: [u32; 4]| {
+        let tests = [(node, TYPICAL.nodes), (triangle, TYPICAL.triangles)];
+        f64::from(base) + tests.iter().map(|&(each, n)| f64::from(each) * n as f64).sum::<f64>()
+    };
+    let lines = rows.iter().map(|Row { proven, cycles, .. }| {
+        let [base, root, node, triangle] = cycles;
+        let root = if proven.kind.is_signed { "–".to_owned() } else { root.to_string() };
+        let each = sum(*cycles) / sum(proven.whole());
+        format!("| {} | {base} | {root} | {node} | {triangle} | {each:.2} |\n", proven.kind.name)
+    });
+    lines.collect()
 }
 
 /// A sentence about the facts that no trace tests.
@@ -202,13 +227,21 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
          The bound's worst leaf is one \
          that two planes scan to the last vertex in vain, which queries seldom do: most of all a sphere's node test pays for it. On a surface of modes an exact test costs less than the node test that is \
          counted before it, so its own price is 0. The proof takes {:.1} s.\n\n\
+         ## Cycles, by a model\n\n\
+         The same facts bound the cycles, where each instruction takes the latency that LLVM's scheduling model of the Cortex-M7 \
+         (`ARMScheduleM7.td`) states, as if none overlapped with another although the processor can issue two at a time, and no branch is predicted \
+         ([cycles.rs](../../tests/prove/src/bound/cycles.rs)). This is a model: ARM publishes no latencies, memory is taken to answer \
+         at once (code and data in tightly coupled memory), and no processor was measured.\n\n\
+         | query | base | root | node test | triangle test | cycles an instruction |\n\
+         |---|---:|---:|---:|---:|---:|\n{}\n\
          ## Against the emulated board\n\n\
          | query | counted | above the bound | largest share of the bound | mean share | traced | their instructions | facts \
          broken | facts met with equality | blocks executed | instructions whose length and target a second decoder reads alike |\n\
          |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
-        findings.seconds
+        findings.seconds,
+        cycles(&findings.rows)
     )?;
-    for Row { proven, counted, traced, decoded } in &findings.rows {
+    for Row { proven, counted, traced, decoded, .. } in &findings.rows {
         writeln!(
             text,
             "| {} | {} | {} | {:.0} % | {:.0} % | {} | {} | {} | {} of {} | {} of {} | {decoded} |",

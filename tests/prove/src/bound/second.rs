@@ -18,12 +18,26 @@ const PATIENCE: Duration = Duration::from_secs(60);
 const CONDITIONS: [&str; 14] =
     ["eq", "ne", "cs", "cc", "mi", "pl", "vs", "vc", "hi", "ls", "ge", "lt", "gt", "le"];
 
+/// The instructions of a program, by address, as the other decoder prints them.
+pub struct Listing(BTreeMap<u32, String>);
+
+impl Listing {
+    pub fn read(elf: &Path) -> Result<Self> {
+        let version = || quiet(Command::new(PROGRAM).arg("--version"), PATIENCE);
+        version().or_else(|_| apt::install(&[PACKAGE]).and_then(|()| version()))?;
+        let mut decoder = Command::new(PROGRAM);
+        let text = quiet(decoder.args(["-d", "--no-show-raw-insn"]).arg(elf), PATIENCE)?;
+        Ok(Self(text.lines().filter_map(line).collect()))
+    }
+
+    pub fn at(&self, at: u32) -> Result<&str> {
+        let text = self.0.get(&at).with_context(|| format!("{PROGRAM} has nothing at {at:#x}"))?;
+        Ok(text)
+    }
+}
+
 /// Compares the instructions of a graph with those of the other decoder. Returns their number.
-pub fn agree(analysis: &Analysis, elf: &Path) -> Result<usize> {
-    let version = || quiet(Command::new(PROGRAM).arg("--version"), PATIENCE);
-    version().or_else(|_| apt::install(&[PACKAGE]).and_then(|()| version()))?;
-    let text = quiet(Command::new(PROGRAM).args(["-d", "--no-show-raw-insn"]).arg(elf), PATIENCE)?;
-    let read: BTreeMap<u32, &str> = text.lines().filter_map(line).collect();
+pub fn agree(analysis: &Analysis, listing: &Listing) -> Result<usize> {
     let functions = analysis.program.functions.values();
     let blocks = functions.flat_map(|function| &function.blocks);
     let mut count = 0;
@@ -31,14 +45,14 @@ pub fn agree(analysis: &Analysis, elf: &Path) -> Result<usize> {
         let first = analysis.image.code(at)?;
         let second = if first >> 11 >= 0b11101 { analysis.image.code(at + 2)? } else { 0 };
         let ours = decode(at, first, second);
-        let theirs = read.get(&at).with_context(|| format!("{PROGRAM} has nothing at {at:#x}"))?;
+        let theirs = listing.at(at)?;
         ensure!(
             is_same(ours.flow, flow(theirs)?),
             "{at:#x} is `{theirs}` for {PROGRAM}, and {:?} here",
             ours.flow
         );
         // No instruction may start within another.
-        let inside = read.range(at + 1..at + ours.bytes).next();
+        let inside = listing.0.range(at + 1..at + ours.bytes).next();
         ensure!(inside.is_none(), "{at:#x} is shorter for {PROGRAM}");
         count += 1;
     }
@@ -46,9 +60,9 @@ pub fn agree(analysis: &Analysis, elf: &Path) -> Result<usize> {
 }
 
 /// Parses a line such as `   691a8:\tsubs\tr2, #16`.
-fn line(text: &str) -> Option<(u32, &str)> {
+fn line(text: &str) -> Option<(u32, String)> {
     let (at, rest) = text.split_once(":\t")?;
-    Some((u32::from_str_radix(at.trim(), 16).ok()?, rest))
+    Some((u32::from_str_radix(at.trim(), 16).ok()?, rest.to_owned()))
 }
 
 /// A conditional branch of an IT block has the encoding of an unconditional one.
@@ -61,7 +75,7 @@ fn is_same(ours: Flow, theirs: Flow) -> bool {
     ours == theirs
 }
 
-fn flow(text: &str) -> Result<Flow> {
+pub(super) fn flow(text: &str) -> Result<Flow> {
     let (name, operands) = text.split_once('\t').unwrap_or((text, ""));
     let name = name.trim_end_matches(".n").trim_end_matches(".w");
     let condition = CONDITIONS.into_iter().find_map(|condition| name.strip_suffix(condition));

@@ -1,6 +1,6 @@
 //! The longest walk through a program whose facts have prices, in integers: it proves a bound.
 //!
-//! Each execution of a part gains its instructions and pays the prices of the facts that count it. If no cycle has a
+//! Each execution of a part gains its instructions, or their cycles, and pays the prices of the facts that count it. If no cycle has a
 //! gain, no walk gains more than the longest walk without a cycle, `W`. So any run of the program takes at most `W`
 //! plus the sum over the facts of price times right side: this is a bound, however the prices were chosen. (In terms of
 //! linear programming the prices are a dual solution, and this walk proves that it is feasible.)
@@ -12,29 +12,24 @@ use anyhow::{Result, ensure};
 use super::graph::{Function, Program};
 use super::system::{Part, System};
 
-/// Fixed-point unit: the numbers below count fractions 1 / UNIT of an instruction.
+/// Fixed-point unit: the numbers below count fractions 1 / UNIT of an instruction or cycle.
 pub const UNIT: i128 = 1 << 20;
 
-/// Instructions and facts along a walk.
+/// Instructions, or their cycles, and facts along a walk.
 #[derive(Clone, Default, Debug)]
 pub struct Walk {
-    pub instructions: i64,
+    pub length: i64,
     /// How often each fact is counted.
     pub counts: BTreeMap<usize, i64>,
-    /// Instructions of each function.
-    pub of: BTreeMap<u32, i64>,
     /// A block on the walk, for messages.
     pub through: u32,
 }
 
 impl Walk {
     fn add(&mut self, other: &Self) {
-        self.instructions += other.instructions;
+        self.length += other.length;
         for (&fact, &count) in &other.counts {
             *self.counts.entry(fact).or_default() += count;
-        }
-        for (&function, &count) in &other.of {
-            *self.of.entry(function).or_default() += count;
         }
     }
 
@@ -46,7 +41,7 @@ impl Walk {
 
     fn gain(&self, prices: &[i128]) -> i128 {
         let paid = self.counts.iter().map(|(&fact, &count)| prices[fact] * i128::from(count));
-        i128::from(self.instructions) * UNIT - paid.sum::<i128>()
+        i128::from(self.length) * UNIT - paid.sum::<i128>()
     }
 }
 
@@ -56,8 +51,14 @@ pub enum Longest {
     Cycles(Vec<Walk>),
 }
 
-/// Finds the longest walk from the root's entry to its end.
-pub fn longest(program: &Program, system: &System, prices: &[i128]) -> Result<Longest> {
+/// Finds the longest walk from the root's entry to its end. `weigh` gives the length of an instruction at an address: 1, or
+/// its cycles.
+pub fn longest(
+    program: &Program,
+    system: &System,
+    prices: &[i128],
+    weigh: &dyn Fn(u32) -> i64,
+) -> Result<Longest> {
     ensure!(prices.iter().all(|&price| price >= 0), "a price below zero");
     let mut known: BTreeMap<u32, Option<(Walk, i128)>> = BTreeMap::new();
     let mut cycles = Vec::new();
@@ -70,7 +71,7 @@ pub fn longest(program: &Program, system: &System, prices: &[i128]) -> Result<Lo
         }
         let walks: BTreeMap<_, _> =
             known.iter().filter_map(|(&at, walk)| Some((at, walk.as_ref()?))).collect();
-        let found = Search::new(function, system, prices, &walks).run()?;
+        let found = Search::new(function, system, prices, &walks, weigh).run()?;
         let (walk, own) = found.map_or_else(|cycles| (None, cycles), |walk| (Some(walk), vec![]));
         known.insert(*at, walk);
         cycles.extend(own);
@@ -86,6 +87,7 @@ struct Search<'a> {
     function: &'a Function,
     system: &'a System,
     callees: &'a BTreeMap<u32, &'a (Walk, i128)>,
+    weigh: &'a dyn Fn(u32) -> i64,
     /// For each edge: the gain of its block, of the call at the block's end, and of the edge itself.
     gains: Vec<i128>,
 }
@@ -96,21 +98,20 @@ impl<'a> Search<'a> {
         system: &'a System,
         prices: &[i128],
         callees: &'a BTreeMap<u32, &'a (Walk, i128)>,
+        weigh: &'a dyn Fn(u32) -> i64,
     ) -> Self {
-        let mut search = Self { function, system, callees, gains: Vec::new() };
+        let mut search = Self { function, system, callees, weigh, gains: Vec::new() };
         search.gains =
             (0..function.edges.len()).map(|edge| search.walk(edge).gain(prices)).collect();
         search
     }
 
-    /// The instructions and facts of the edge and the block before it.
+    /// The length and the facts of the edge and the block before it.
     fn walk(&self, number: usize) -> Walk {
         let edge = &self.function.edges[number];
         let block = &self.function.blocks[edge.from];
-        let own = block.instructions.len() as i64;
-        let mut walk = Walk { instructions: own, ..Walk::default() };
-        walk.of.insert(self.function.start, own);
-        walk.through = block.instructions[0];
+        let length = block.instructions.iter().map(|&at| (self.weigh)(at)).sum();
+        let mut walk = Walk { length, through: block.instructions[0], ..Walk::default() };
         walk.pay(self.system, Part::Block(self.function.start, edge.from));
         walk.pay(self.system, Part::Edge(self.function.start, number));
         if let Some((callee, gain)) = block.call.and_then(|callee| self.callees.get(&callee))

@@ -5,6 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::env;
 
+use dibs_prove::bound::cycles::cycles;
 use dibs_prove::bound::decode::may_write;
 use dibs_prove::bound::facts::{Count, Fact, Most};
 use dibs_prove::bound::graph::Program;
@@ -43,7 +44,8 @@ fn counted(program: &Program) -> System {
 fn constants(halves: &[u16]) -> [f64; 2] {
     let program = program(halves);
     let system = counted(&program);
-    let bound = least(&program, &system, &TYPICAL, |at| format!("{at:#x}")).expect("a bound");
+    let bound =
+        least(&program, &system, &TYPICAL, &|_| 1, |at| format!("{at:#x}")).expect("a bound");
     let [base, _, node, _] = bound.constants(&system).map(|part| part as f64 / UNIT as f64);
     [base, node]
 }
@@ -59,9 +61,40 @@ fn a_longer_path_raises_the_bound_by_its_length() {
 #[test]
 fn a_loop_without_a_fact_is_named() {
     let program = program(&LONG);
-    let found = least(&program, &System::default(), &TYPICAL, |at| format!("here {at:#x}"));
+    let found = least(&program, &System::default(), &TYPICAL, &|_| 1, |at| format!("here {at:#x}"));
     let error = found.err().expect("no bound").to_string();
     assert!(error.contains("no fact bounds the loop through here"), "{error}");
+}
+
+/// What is not in the model's table has no cycles, rather than few.
+#[test]
+fn an_instruction_has_the_latency_of_the_model() {
+    for (text, most) in [
+        ("adds\tr0, r1, r2", 1),
+        ("add.w\tr0, r1, r2, lsl #2", 2),
+        ("vmulgt.f32\ts0, s1, s2", 3),
+        ("vmla.f32\ts0, s1, s2", 6),
+        ("vsqrt.f32\ts0, s1", 16),
+        ("ldr.w\tr0, [r1, #4]", 2),
+        ("ldrbne\tr0, [r1]", 3),
+        ("ldrd\tr6, r4, [r1, #20]", 3),
+        ("vldr\td0, [r3]", 3),
+        ("umull\tr0, r1, r2, r3", 2),
+        ("vpush\t{d8-d15}", 17),
+        ("stmdb\tsp!, {r8, r9, fp}", 4),
+        ("cbz\tr0, 1c4", 8),
+        ("bhi.n\t1c4", 8),
+        ("tbb\t[pc, r4]", 11),
+        ("pop\t{r4, r5, r7, pc}", 13),
+        ("ldrdeq\tr6, r4, [r1, #20]", 3),
+        ("itte\tne", 1),
+    ] {
+        assert_eq!(cycles(text).expect(text), most, "{text}");
+    }
+    for unknown in ["vadd.f64\td0, d1, d2", "vdiv.f64\td0, d1, d2", "wfi"] {
+        let error = cycles(unknown).expect_err(unknown).to_string();
+        assert!(error.contains("no latency of"), "{error}");
+    }
 }
 
 /// So that a wrong answer of the solver is no bound.
@@ -69,12 +102,13 @@ fn a_loop_without_a_fact_is_named() {
 fn the_check_refuses_prices_that_are_too_low() {
     let program = program(&LONG);
     let system = counted(&program);
-    let at = |price: i128| longest(&program, &system, &[price]).expect("a program with an end");
+    let at =
+        |price: i128| longest(&program, &system, &[price], &|_| 1).expect("a program with an end");
     assert!(matches!(at(6 * UNIT - 1), Longest::Cycles(_)));
     let Longest::Walk(walk, gain) = at(6 * UNIT) else { panic!("the price is enough") };
     // One turn, which pays for itself.
-    assert_eq!((walk.instructions, gain), (9, 3 * UNIT));
-    assert!(longest(&program, &system, &[-1]).is_err());
+    assert_eq!((walk.length, gain), (9, 3 * UNIT));
+    assert!(longest(&program, &system, &[-1], &|_| 1).is_err());
 }
 
 #[test]
@@ -121,10 +155,10 @@ fn a_call_that_is_never_made_ends_its_path() {
     let read = |never: &[u32]| Program::read(&image, 0, &never.iter().copied().collect());
     assert!(read(&[]).is_err(), "no function starts at 8");
     let program = read(&[2]).expect("a program");
-    let Ok(Longest::Walk(walk, _)) = longest(&program, &System::default(), &[]) else {
+    let Ok(Longest::Walk(walk, _)) = longest(&program, &System::default(), &[], &|_| 1) else {
         panic!("no loop")
     };
-    assert_eq!(walk.instructions, 2);
+    assert_eq!(walk.length, 2);
 }
 
 #[test]
@@ -160,10 +194,10 @@ fn a_copied_length_is_a_constant_or_an_error() {
 fn a_return_under_a_condition_ends_the_function_or_not() {
     // PUSH; CMP; IT NE; POPNE; NOP; POP.
     let program = program(&[0xB510, 0x42A0, 0xBF18, 0xBD10, 0xBF00, 0xBD10]);
-    let Ok(Longest::Walk(walk, _)) = longest(&program, &System::default(), &[]) else {
+    let Ok(Longest::Walk(walk, _)) = longest(&program, &System::default(), &[], &|_| 1) else {
         panic!("no loop")
     };
-    assert_eq!(walk.instructions, 6);
+    assert_eq!(walk.length, 6);
     let ends = program.functions[&0].edges.iter().filter(|edge| edge.to.is_none()).count();
     assert_eq!(ends, 2);
 }
