@@ -96,13 +96,29 @@ fn mark(folder: &Path, commit: &str, line: &str) -> Result<()> {
 
 /// The page of the run.
 fn whole(line: &str, parts: &[Part], done: &[Done]) -> String {
-    let mut text = format!("# The run\n\n{line}\n\n| part | s |\n|---|---:|\n");
+    let minutes = seconds(done.iter().map(|done| [done.start, done.start + done.seconds])) / 60.0;
+    let mut text = format!(
+        "# The run\n\n{line} It took {minutes:.0} min, without the builds that begin it; but for those that measure time, two parts run beside each \
+         other.\n\n| part | s |\n|---|---:|\n"
+    );
     for (part, Done { seconds, skipped, .. }) in parts.iter().zip(done) {
         let skipped = skipped.as_ref().map_or_else(String::new, |why| format!(" ({why})"));
         // Writing to a String cannot fail.
         let _ = writeln!(text, "| {}{skipped} | {seconds:.0} |", part.name);
     }
     text + "\nNot of the run: " + NOT_OF_THE_RUN + "\n"
+}
+
+/// How many seconds at least one of these spans holds.
+pub fn seconds(spans: impl Iterator<Item = [f64; 2]>) -> f64 {
+    let mut spans: Vec<_> = spans.collect();
+    spans.sort_by(|one, other| one[0].total_cmp(&other[0]));
+    let (mut sum, mut until) = (0.0, 0.0_f64);
+    for [start, end] in spans {
+        sum += (end - start.max(until)).max(0.0);
+        until = until.max(end);
+    }
+    sum
 }
 
 /// The parts, for the user.

@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::thread;
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use serde::{Deserialize, Serialize};
@@ -72,6 +72,8 @@ impl Part {
 #[derive(Serialize, Deserialize)]
 pub struct Done {
     pub run: Run,
+    /// Seconds since 1970.
+    pub start: f64,
     pub seconds: f64,
     /// Why it could not run, which is no failure if no figure is missing.
     pub skipped: Option<String>,
@@ -162,6 +164,7 @@ fn one(part: &Part, folder: &Path, run: &Run, now: &dyn Fn() -> Run) -> Result<O
         fs::remove_dir_all(&place)?;
     }
     fs::create_dir_all(place.join(FILES))?;
+    let since = SystemTime::now().duration_since(UNIX_EPOCH)?.as_secs_f64();
     let start = Instant::now();
     let outcome = catch_unwind(AssertUnwindSafe(|| (part.measure)(&place)));
     let skipped = match outcome.map_err(|panic| anyhow!("panicked: {}", text_of(&*panic)))?? {
@@ -173,7 +176,7 @@ fn one(part: &Part, folder: &Path, run: &Run, now: &dyn Fn() -> Run) -> Result<O
         bail!("the checkout or the machine changed meanwhile: {run:?}, then {run_after:?}");
     }
     let seconds = start.elapsed().as_secs_f64();
-    let done = Done { run: run_after, seconds, skipped: skipped.clone() };
+    let done = Done { run: run_after, start: since, seconds, skipped: skipped.clone() };
     // Last: a folder without it is not whole.
     fs::write(place.join(DONE), serde_json::to_string_pretty(&done)?)
         .with_context(|| format!("cannot write to {}", place.display()))?;

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use anyhow::{Result, bail};
-use dibs_prove::evidence::pages::{Writer, write};
+use dibs_prove::evidence::pages::{Writer, seconds, write};
 use dibs_prove::evidence::parts;
 use dibs_prove::evidence::runner::{FILES, Part, Place, measure};
 use dibs_prove::harness::run::Run;
@@ -92,6 +92,14 @@ fn the_pages_of_a_whole_run_say_of_which_it_is() {
     }
     assert_eq!(fake.page("index.md").as_deref(), Some("# Of sources\n"));
     assert!(fake.page("run.md").expect("a page").contains("| e (no network) |"));
+}
+
+/// The time of a run, in which parts are beside and within each other, and which may have been interrupted.
+#[test]
+fn what_two_lanes_take_counts_once() {
+    let of = |spans: &[[f64; 2]]| seconds(spans.iter().copied()).to_bits();
+    assert_eq!(of(&[[30.0, 31.0], [0.0, 10.0], [5.0, 20.0]]), 21.0_f64.to_bits());
+    assert_eq!(of(&[[0.0, 10.0], [2.0, 3.0], [4.0, 12.0]]), 12.0_f64.to_bits());
 }
 
 #[test]
