@@ -11,13 +11,12 @@ pub mod scene;
 pub mod tally;
 
 use anyhow::{Context, Result};
-use rayon::prelude::*;
 use xtask::steps::Outcome;
 
 use self::force::steps;
 use self::rows::USUAL;
 use self::scene::truth;
-use self::tally::{AMPLE, Tally, run};
+use self::tally::{AMPLE, Sums, run};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
 use crate::harness::{Check, Effort};
@@ -260,22 +259,10 @@ fn check(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
     let [row, ..] = USUAL;
     let scene = row.scene()?.context("a generated scene")?;
     let truth = truth(&scene);
-    let tallies = USUAL.par_iter().map(|row| Ok(run(&scene, &truth, row.budget()?)));
-    let tallies: Vec<Tally> = tallies.collect::<Result<_>>()?;
+    let mut sums = Sums::default();
+    sums.add(&USUAL, &scene, &truth, figures)?;
+    sums.note("bounded", figures);
     figures.note("bounded.ticks", scene.ticks() as f64);
     run(&scene, &truth, AMPLE).note_uncut("bounded", figures);
-    let users = USUAL.par_iter().map(|row| run(&scene, &truth, row.of_user()));
-    let users: Vec<Tally> = users.collect();
-    let sum = |of: fn(&Tally) -> usize| tallies.iter().chain(&users).map(of).sum::<usize>() as f64;
-    figures.note("bounded.wrong", sum(|tally| tally.wrong));
-    figures.note("bounded.damped", sum(|tally| tally.damped));
-    figures.note("bounded.idle", sum(|tally| tally.idle));
-    figures.note("bounded.near", sum(|tally| tally.widths.len()));
-    for ((tally, user), row) in tallies.iter().zip(&users).zip(&USUAL) {
-        tally.note(row.name, figures);
-        figures.note(&format!("{}.bought", row.name), row.of_user().tests().into());
-        figures.note(&format!("{}.user", row.name), user.width(0.95));
-        row.note_board(&scene, &tally.work, figures)?;
-    }
     Ok(Outcome::Passed)
 }

@@ -3,13 +3,15 @@
 
 // Requirement: T-02
 
+use std::slice;
+
 use anyhow::Result;
 use xtask::steps::Outcome;
 
 use super::bounded::force::steps;
 use super::bounded::rows::{DEARER, HUMAN, Row, TICKS};
 use super::bounded::scene::truth;
-use super::bounded::tally::{AMPLE, run};
+use super::bounded::tally::{AMPLE, Sums, run};
 use super::bounded::{COUNTED, IDLE, largest, width};
 use crate::harness::figures::Figures;
 use crate::harness::promise::{Bound, Promise, criteria::TIMING, note};
@@ -205,33 +207,19 @@ fn human(_: &Effort, figures: &mut Figures) -> Result<Outcome> {
 
 /// Measures rows, and notes their sums under names that start with `name`.
 fn measure(rows: &[Row], name: &str, figures: &mut Figures) -> Result<Outcome> {
-    let (mut wrong, mut damped, mut idle, mut near) = (0, 0, 0, 0);
+    let mut sums = Sums::default();
     for row in rows {
         let Some(scene) = row.scene()? else {
             let reason = format!("{}: its mesh is not beside the repository", row.name);
             return Ok(Outcome::Skipped(reason));
         };
         let truth = truth(&scene);
-        let tally = run(&scene, &truth, row.budget()?);
+        sums.add(slice::from_ref(row), &scene, &truth, figures)?;
         let uncut = run(&scene, &truth, AMPLE);
         uncut.note_uncut(row.name, figures);
         figures.note(&format!("{}.uncut.tests", row.name), uncut.usual_tests());
-        tally.note(row.name, figures);
-        let user = run(&scene, &truth, row.of_user());
-        figures.note(&format!("{}.bought", row.name), row.of_user().tests().into());
-        figures.note(&format!("{}.user", row.name), user.width(0.95));
-        row.note_board(&scene, &tally.work, figures)?;
-        for tally in [&tally, &user] {
-            wrong += tally.wrong;
-            damped += tally.damped;
-            idle += tally.idle;
-            near += tally.widths.len();
-        }
     }
+    sums.note(name, figures);
     figures.note(&format!("{name}.ticks"), TICKS as f64);
-    figures.note(&format!("{name}.wrong"), wrong as f64);
-    figures.note(&format!("{name}.damped"), damped as f64);
-    figures.note(&format!("{name}.idle"), idle as f64);
-    figures.note(&format!("{name}.near"), near as f64);
     Ok(Outcome::Passed)
 }

@@ -2,7 +2,7 @@
 
 // Requirements: C-05, C-06
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use dibs_build::generate;
 use dibs_tests::filter::{Episode, Glided, Tally, glide, scenes, walk};
 use dibs_tests::hand::{self, Pushed};
@@ -125,10 +125,11 @@ fn check(effort: &Effort, figures: &mut Figures) -> Result<Outcome> {
         .collect();
     let mut sum = Tally::default();
     tallies.into_iter().for_each(|tally| sum += tally);
+    ensure!(sum.easy > 0, "no tick is easy");
     let thousandths = |x: f64| (x * 1e3).round() / 1e3;
     figures.note("filter.violations", (sum.violations + sum.too_fast) as f64);
     figures.note("filter.uncertain", sum.uncertain as f64);
-    figures.note("filter.cries", (sum.cries as f64 / sum.easy.max(1) as f64 * 1e6).round());
+    figures.note("filter.cries", (sum.cries as f64 / sum.easy as f64 * 1e6).round());
     figures.note("filter.easy", sum.easy as f64);
     figures.note("filter.over", sum.over_budget as f64);
     figures.note("filter.most", f64::from(sum.most_instructions));

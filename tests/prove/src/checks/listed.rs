@@ -93,7 +93,7 @@ pub const CHECK: Check = Check {
             unit: "of {listed.shaft.near} ticks within 5 mm",
             ..without(
                 "listed.shaft.without",
-                "A shaft through a whole heart, and a short one within its wall, is never without its list",
+                "A shaft through a whole heart, and a short one inside its wall, is never without its list",
             )
         },
         note("listed.shaft.near"),

@@ -12,8 +12,8 @@ pub const TESTS: &[(&str, u32)] = &[
     ("dearer.fast", 496),
     ("dearer.large", 482),
     ("shaft.20k", 125),
-    ("shaft.40k", 325),
-    ("shaft.60k", 525),
-    ("shaft.100k", 890),
+    ("shaft.40k", 296),
+    ("shaft.60k", 482),
+    ("shaft.100k", 921),
     ("dearer.human", 487),
 ];

@@ -12,13 +12,10 @@ use glam::Vec3;
 use probe::track::tick;
 
 use super::force::wall;
-use super::path;
+use super::path::{path, place, through};
 use crate::data::real;
 use crate::probe::ticks::{Script, Tick, read};
 use crate::probe::{COUNTING, board, build_for_board, run_on_board};
-
-/// Ticks for each frame of the surface's motion: 25 frames a second.
-const TICKS_A_FRAME: usize = 40;
 
 /// A point in a ventricle of the generated heart.
 const MIDDLE: Vec3 = Vec3::new(12.0, -4.0, 38.0);
@@ -49,7 +46,11 @@ pub struct Truth {
 impl Truth {
     /// Whether an answer's certified interval does not hold the true separation.
     pub fn is_missed_by(&self, found: &Proximity) -> bool {
-        let Interval { lower, upper } = found.interval();
+        let Interval { mut lower, upper } = found.interval();
+        // Without a side the tool's own is that of a tool outside.
+        if matches!(found.side, Side::Undefined(_)) && self.side == Side::Outside {
+            lower = found.lower - found.accuracy;
+        }
         lower > self.upper + self.accuracy || upper < self.lower - self.accuracy
     }
 }
@@ -58,13 +59,13 @@ impl Scene {
     /// A generated heart of this many triangles, and a path at a multiple of the usual speed.
     pub fn heart(triangles: u32, faster: f32, ticks: usize) -> Result<Self> {
         let generate::MovingMesh { mesh, motion } = generate::heart(triangles)?;
-        Self::of(&mesh, &motion, 1.5, |corners| path::path(corners, (MIDDLE, faster), ticks))
+        Self::of(&mesh, &motion, 1.5, |frames| path(&frames[0], (MIDDLE, faster), ticks))
     }
 
     /// A generated heart, and an instrument through it, then one inside.
     pub fn through_heart(ticks: usize) -> Result<Option<Self>> {
         let generate::MovingMesh { mesh, motion } = generate::heart(10_272)?;
-        Self::of(&mesh, &motion, 1.5, |corners| path::through(corners, MIDDLE, ticks)).map(Some)
+        Self::of(&mesh, &motion, 1.5, |frames| through(frames, MIDDLE, ticks)).map(Some)
     }
 
     /// A generated heart of this many triangles that a lattice's nodes move, and the path around it.
@@ -80,7 +81,7 @@ impl Scene {
             Ok((rows, stretch))
         });
         let frames = frames.collect::<Result<_>>()?;
-        let path = path::path(&corners(&mesh, &mesh.positions), (MIDDLE, 1.0), ticks);
+        let path = path(&corners(&mesh, &mesh.positions), (MIDDLE, 1.0), ticks);
         let [_, program] = PROGRAMS;
         Ok(Self { tree, frames, path, program })
     }
@@ -91,19 +92,20 @@ impl Scene {
         let mesh = dibs_build::read(folder.join("heart_10272.ply"))?.mesh;
         let motion = Motion::read_pc2(folder.join("heart_10272.pc2"))?;
         let middle = mesh.positions.iter().sum::<Vec3>() / mesh.positions.len() as f32;
-        Self::of(&mesh, &motion, 4.0, |corners| path::path(corners, (middle, 1.0), ticks)).map(Some)
+        Self::of(&mesh, &motion, 4.0, |frames| path(&frames[0], (middle, 1.0), ticks)).map(Some)
     }
 
-    /// A moving surface within this stretch, and a path around its first frame's triangles.
+    /// A moving surface within this stretch, and a path around the triangles of its frames.
     fn of(
         mesh: &Mesh,
         Motion { frames, .. }: &Motion,
         stretch: f32,
-        path: impl FnOnce(&[[Vec3; 3]]) -> Vec<Capsule>,
+        path: impl FnOnce(&[Vec<[Vec3; 3]>]) -> Vec<Capsule>,
     ) -> Result<Self> {
         let tree = Builder::new().stretch(stretch).build(mesh)?;
         let view = tree.tree::<u16>()?;
-        let path = path(&corners(mesh, &frames[0]));
+        let corners: Vec<_> = frames.iter().map(|frame| corners(mesh, frame)).collect();
+        let path = path(&corners);
         let frames = frames.iter().map(|frame| {
             let rows = tree.to_rows(frame);
             let stretch = measure_stretch(&view, rows.as_slice())?;
@@ -157,11 +159,6 @@ impl Scene {
 /// The corners of all triangles.
 fn corners(mesh: &Mesh, positions: &[Vec3]) -> Vec<[Vec3; 3]> {
     mesh.triangles.iter().map(|rows| rows.map(|row| positions[row as usize])).collect()
-}
-
-/// A tick's frame, and the fraction of the interval to the next frame.
-fn place(tick: usize) -> (usize, f32) {
-    (tick / TICKS_A_FRAME, (tick % TICKS_A_FRAME) as f32 / TICKS_A_FRAME as f32)
 }
 
 /// The results of whole queries for each tick.

@@ -1,13 +1,15 @@
 //! How wide a tracker's intervals are over a path within a budget, and whether whole queries agree with them.
 
+use anyhow::Result;
 use dibs_nostd::constraint::ConstraintState;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Options, Proximity, Query, Sphere, SurfaceBlend, Tool, Tracker};
 use glam::Vec3;
 use probe::track::{OPENED, STACK};
+use rayon::prelude::*;
 
 use super::force::{Steps, wall};
-use super::rows::DEAREST;
+use super::rows::{DEAREST, Row};
 use super::scene::{Scene, Truth};
 use super::{MARGIN, Settling};
 use crate::harness::figures::Figures;
@@ -15,19 +17,19 @@ use crate::harness::figures::Figures;
 /// Results of the ticks with one budget.
 #[derive(Default)]
 pub struct Tally {
-    pub wrong: usize,
-    pub damped: usize,
+    wrong: usize,
+    damped: usize,
     turned: usize,
     /// Ticks that left a part of the budget, and an interval wider than a depth's tolerance.
-    pub idle: usize,
+    idle: usize,
     /// Widths of the intervals near the wall, in order.
-    pub widths: Vec<f32>,
+    widths: Vec<f32>,
     /// Those of an axis that crosses the surface or is inside.
     inner: Vec<f32>,
     /// Steps of the force near the wall.
-    pub steps: Steps,
+    steps: Steps,
     /// Work of each tick, in node tests, and of those near the wall.
-    pub work: Vec<u32>,
+    work: Vec<u32>,
     near_work: Vec<u32>,
 }
 
@@ -76,6 +78,57 @@ fn quantile<T: Copy + Default>(sorted: &[T], part: f64) -> T {
 /// To a hundredth of a millimetre.
 fn hundredths(width: f32) -> f64 {
     (f64::from(width) * 100.0).round() / 100.0
+}
+
+/// Sums over rows, each with both of its budgets.
+#[derive(Default)]
+pub struct Sums {
+    wrong: usize,
+    damped: usize,
+    idle: usize,
+    near: usize,
+}
+
+impl Sums {
+    /// Runs the rows of a scene, each within its measured budget and within the one that a user gets, adds them up, and
+    /// notes the figures of each.
+    pub fn add(
+        &mut self,
+        rows: &[Row],
+        scene: &Scene,
+        truth: &[Truth],
+        figures: &mut Figures,
+    ) -> Result<()> {
+        let tallies = rows
+            .par_iter()
+            .map(|row| Ok([row.budget()?, row.of_user()].map(|budget| run(scene, truth, budget))));
+        let tallies: Vec<[Tally; 2]> = tallies.collect::<Result<_>>()?;
+        for (row, [tally, user]) in rows.iter().zip(&tallies) {
+            for tally in [tally, user] {
+                self.wrong += tally.wrong;
+                self.damped += tally.damped;
+                self.idle += tally.idle;
+                self.near += tally.widths.len();
+            }
+            tally.note(row.name, figures);
+            figures.note(&format!("{}.bought", row.name), row.of_user().tests().into());
+            figures.note(&format!("{}.user", row.name), user.width(0.95));
+            row.note_board(scene, &tally.work, figures)?;
+        }
+        Ok(())
+    }
+
+    /// Notes the sums under names that start with `name`.
+    pub fn note(&self, name: &str, figures: &mut Figures) {
+        for (end, sum) in [
+            ("wrong", self.wrong),
+            ("damped", self.damped),
+            ("idle", self.idle),
+            ("near", self.near),
+        ] {
+            figures.note(&format!("{name}.{end}"), sum as f64);
+        }
+    }
 }
 
 /// A budget that ends no tick. Unlike an unlimited one it counts all work.
