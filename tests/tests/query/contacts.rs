@@ -277,6 +277,8 @@ fn a_short_list_and_a_short_budget_state_what_still_holds() {
         let closest = query.contacts(rows.as_slice(), &tool, MARGIN, &options, &mut near);
         let Some(_) = closest.expect("an answer").triangle else {
             assert_eq!(near.within(MARGIN).err(), Some(Unavailable::CutShort));
+            let known = near.within(near.bound()).expect("nothing below the bound is missing");
+            assert!(known.is_complete(), "{node_tests}: {}", near.bound());
             continue;
         };
         let first = near.within(MARGIN).expect("nothing is deeper").next().expect("a contact");
@@ -410,7 +412,7 @@ fn no_budget_turns_the_force_inwards() {
     assert!(held > 50 && pushed > 50, "{held} {pushed}");
 }
 
-/// The flood around a contact reads triangles that no search has seen.
+/// The basin around a contact has triangles that no search has seen.
 #[test]
 fn a_vertex_beyond_a_contacts_triangle_that_is_not_finite_is_named() {
     // A long triangle whose tip is under the tool, and a small one at its far end.

@@ -240,7 +240,7 @@ fn a_gap_too_narrow_is_said() {
     assert_eq!(admitted.reason, Reason::NoSafeMotion);
 }
 
-/// Rows of the caller hold whatever the command and the walls are, and so does the stand-off.
+/// The caller's rows and the stand-off are kept, whatever the command and the walls are.
 #[test]
 fn rows_of_the_caller_hold() {
     let mesh = ball(2);
@@ -324,6 +324,27 @@ fn a_tool_without_a_command_retreats_from_an_approaching_surface() {
         assert_eq!(admitted.reason, reason, "{admitted:?}");
         let off = admitted.motion.translation - step - Vec3::Z * 0.05;
         assert!(off.length() < 5e-3, "{admitted:?}");
+    }
+}
+
+/// It retreats, too, where the robot's full speed keeps the stand-off only to the promised hundredth of a millimetre.
+/// Rounding may make that motion a little longer than the smallest one, but not one towards a command.
+#[test]
+fn a_tool_without_a_command_retreats_at_the_robots_speed() {
+    let mut bench = Bench::new(&sheet(20, 60.0, |x, _| x), 1.0);
+    // 0.3 mm in a period, of which the robot makes 0.2.
+    bench.uncertainty = Uncertainty::new(300.0);
+    let out = Vec3::new(-1.0, 0.0, 1.0).normalize();
+    for step in 0..100_u8 {
+        // Of the rest up to 0.008 mm are missing.
+        let apart = 2.092 + 7e-5 * f32::from(step);
+        let tip = Vec3::new(0.3, 0.2, 0.3) + out * apart;
+        let tool = capsule(tip, tip + out * 40.0);
+        let command = RigidMotion::new(tip, Vec3::ZERO, Vec3::ZERO);
+        let admitted = bench.ask(&tool, &command).expect("an answer");
+        assert_eq!(admitted.reason, Reason::Retreating, "{apart}: {admitted:?}");
+        let off = admitted.motion.translation - out * 0.2;
+        assert!(off.length() < 1e-3, "{apart}: {admitted:?}");
     }
 }
 

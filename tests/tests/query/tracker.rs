@@ -356,11 +356,15 @@ fn a_place_that_is_free_outlasts_any_motion() {
     let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
     let surface = Odometer::new(&tree).start(rows.as_slice());
     let top = rows.iter().copied().max_by(|a, b| a.z.total_cmp(&b.z)).expect("rows");
-    for tick in 0..24_000_i32 {
-        // Down to the surface, where nodes are opened, and up again, where they are closed; then to and fro.
-        let steps = if tick < 200 { (100 - tick).abs() } else { 100 + tick % 2 };
-        let centre = top + Vec3::Z * STEP * steps as f32;
-        let tool = Sphere::new(centre, 1.0).expect("a valid sphere");
+    for tick in 0..24_000_u16 {
+        // Down to the surface, where nodes are opened, up and away to the side, where they are closed; then to and fro.
+        let (up, away) = match tick {
+            0..200 => (tick.abs_diff(100), 0),
+            200..600 => (100, tick - 200),
+            _ => (100, 400 + tick % 2),
+        };
+        let way = Vec3::Z * f32::from(up) + Vec3::new(0.6, 0.0, -0.8) * f32::from(away);
+        let tool = Sphere::new(top + way * STEP, 1.0).expect("a valid sphere");
         let options = Options::new().unsigned();
         let found = tracker.closest(&surface, &tool, &options).expect("an answer");
         assert_eq!(found.fallback.is_some(), tick == 0, "{tick}: {found:?}");

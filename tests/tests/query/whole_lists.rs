@@ -326,3 +326,50 @@ fn free_tests_have_no_budget() {
     assert_eq!(Budget::for_instructions(1, &free), Budget::UNLIMITED);
     assert_ne!(Budget::for_instructions(1, &Cost::M7_CAPSULE), Budget::UNLIMITED);
 }
+
+/// Two links meet at a joint near the surface, so both have their contact at the same point of it: where a budget leaves
+/// their closest pairs uncertain, the list still begins with the least separation of both, and lacks none below its bound.
+#[test]
+fn no_budget_drops_the_contact_of_a_link_that_shares_its_point() {
+    const MARGIN: f32 = 15.0;
+    let mesh = ball(3);
+    let built = Builder::new().build(&mesh).expect("a valid mesh");
+    let tree = built.tree::<u16>().expect("16-bit indices");
+    let rows = built.to_rows(&mesh.positions);
+    let mut query = Query::<u16, MAX_STACK>::new(&tree).expect("deep enough");
+    let (mut whole, mut part) = (Contacts::<16>::new(), Contacts::<16>::new());
+    let (mut accepted, mut rng) = (0, Rng::with_seed(9));
+    for round in 0..20 {
+        let near = rows[rng.usize(..rows.len())];
+        let joint = near * 1.08;
+        let ends = [0, 1].map(|_| joint + 30.0 * (near.normalize() + 0.8 * unit(&mut rng)));
+        let [one, other] = [[2.0, 0.5], [0.5, 2.0]][round % 2];
+        let chain = [(ends[0], one), (ends[1], other)]
+            .map(|(end, radius)| Capsule::new(joint, end, radius).expect("finite"));
+        let mut ask = |options: &Options, contacts: &mut Contacts<16>| {
+            let mut scene = [(&mut query, rows.as_slice())];
+            let best = Query::contacts_in_scene(&mut scene, &chain, MARGIN, options, contacts);
+            best.expect("an answer").expect("one").proximity
+        };
+        ask(&Options::cold().unsigned(), &mut whole);
+        let at = |tool| whole.iter().find(|one| one.tool == tool).expect("one").point_on_surface;
+        assert!(at(0).distance(at(1)) < 0.01, "{round}");
+        for tests in 0..800 {
+            let budget = Options::cold().unsigned().budget(Budget::new(tests));
+            let best = ask(&budget, &mut part);
+            let error = whole.accuracy() + part.accuracy();
+            for contact in whole.iter().filter(|one| one.separation < part.bound() - error) {
+                let is_listed = part.iter().any(|one| {
+                    one.tool == contact.tool && one.separation <= contact.separation + error
+                });
+                assert!(is_listed, "{round}, {tests}: {} {}", contact.tool, contact.separation);
+            }
+            if let Ok(mut list) = part.within(MARGIN) {
+                let first = list.next().map_or(MARGIN, |one| one.separation);
+                assert!(first <= best.lower + error, "{round}, {tests}: {first} {}", best.lower);
+                accepted += u32::from(best.lower < best.separation);
+            }
+        }
+    }
+    assert!(accepted > 100, "{accepted}");
+}

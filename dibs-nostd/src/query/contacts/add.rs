@@ -186,7 +186,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
         let bound = if from < limit { from - prominence - tool.radius() } else { f32::INFINITY };
         let is_met = is_crossing || closest.is_at_surface();
         let is_certain = is_met || !closest.is_cut_short();
-        // Nothing that is missing is deeper than what the search has found; or it has found all.
+        // No missing contact is deeper than the deepest one found, or none is missing.
         let is_found = from >= limit || least < bound && least <= inner;
         let own_least = own.filter(|_| is_certain || !is_found).map(|own| own.separation);
         let deepest = own_least.map_or(least, |own| smaller(least, own));

@@ -220,7 +220,7 @@ impl<const N: usize, const NEAR: usize> Contacts<N, NEAR> {
     /// last tick makes certain. It becomes a contact, and the only one unless the tool is outside. Other lists are not
     /// changed, nor is one whose `closest` has no direction.
     pub(super) fn resolve_side(&mut self, closest: &Proximity) {
-        if !self.found.has_no_side || matches!(closest.side, Side::Undefined(_)) {
+        if !self.found.has_no_side {
             return;
         }
         let Some(contact) = add::contact(closest) else { return };

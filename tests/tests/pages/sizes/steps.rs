@@ -18,7 +18,7 @@ Lines that the commits remove and add, documentation and tests included.
 
 ## Not merged
 
-- **Contacts take two searches.** Side and depth decide what the list contains, and a tool inside or beyond the margin
+- **A list takes two searches.** It depends on side and depth, which the first finds; a tool inside or beyond the margin
   needs no second one (docs/decisions.md).
 - **`chain.rs` and `several.rs` stay apart.** One searches every pair in each call, the other only those that the last tick
   does not rule out; they share `or_nearer`.
