@@ -123,12 +123,6 @@ pub const ANOMALIES: &[Anomaly] = &[
         "dibs-nostd/src/query/search/slack.rs",
     ),
     anomaly(
-        "K-20",
-        "The figures are of {commits} commits, not of one.",
-        "Each row of docs/evidence/guarantees.md says of which.",
-        "tests/prove/src/harness/record.rs",
-    ),
-    anomaly(
         "K-21",
         "A source of OpenIGTLink that repeats an image under new times is taken for fresh: its times must be those of \
          the measurement.",
