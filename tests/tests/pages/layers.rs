@@ -21,19 +21,19 @@ fn the_core_has_no_mutual_imports() {
     assert_eq!(cycle(&imports), None);
 }
 
+/// At any depth.
 #[test]
 fn no_folder_of_the_core_has_mutual_imports_inside() {
-    let all = imports("dibs-nostd");
     let source = source("dibs-nostd");
-    let folders = all.keys().filter(|folder| source.join(folder).join("mod.rs").is_file());
-    let mut edges = 0;
-    for folder in folders {
-        let (inside, folders) = inner_imports(&source, folder);
+    let (mut edges, mut nested) = (0, 0);
+    for folder in folders(&source, Path::new("")) {
+        let (inside, folders) = inner_imports(&source, &folder);
+        nested += usize::from(folder.contains('/'));
         edges += inside.values().map(BTreeSet::len).sum::<usize>();
         let mutual = mutual(&inside, &folders);
         assert!(mutual.is_empty(), "{folder}: {mutual:?} of {inside:?}");
     }
-    assert!(edges >= 100, "{edges} imports were read");
+    assert!(edges >= 150 && nested >= 5, "{edges} imports were read, {nested} nested folders");
 }
 
 #[test]
@@ -104,10 +104,21 @@ fn source(package: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(checkout).join(package).join("src")
 }
 
-/// The imports between the modules inside a top folder, files and folders, and which of them are folders.
+/// The folders of modules below a folder, at any depth, by their paths from the sources.
+fn folders(source: &Path, below: &Path) -> Vec<String> {
+    let entries = fs::read_dir(source.join(below)).expect("a folder");
+    let names = entries.map(|entry| below.join(entry.expect("readable").file_name()));
+    let inner = names.filter(|name| source.join(name).is_dir());
+    let inner: Vec<PathBuf> = inner.filter(|name| !files(&source.join(name)).is_empty()).collect();
+    let path = |name: PathBuf| name.to_string_lossy().into_owned();
+    inner.into_iter().flat_map(|name| [folders(source, &name), vec![path(name)]].concat()).collect()
+}
+
+/// The imports between the modules inside a folder, files and folders, and which of them are folders.
 fn inner_imports(source: &Path, folder: &str) -> (Imports, BTreeSet<String>) {
     let root = source.join(folder);
-    let front = fs::read_to_string(root.join("mod.rs")).expect("a source file");
+    let front = [root.join("mod.rs"), root.with_extension("rs")];
+    let front = front.iter().find_map(|file| fs::read_to_string(file).ok()).expect("its file");
     let home = homes(&front.replace("#[cfg(test)]", ""));
     let mut imports = Imports::new();
     for file in files(&root) {
@@ -121,7 +132,7 @@ fn inner_imports(source: &Path, folder: &str) -> (Imports, BTreeSet<String>) {
         let to = imports.entry(from.clone()).or_default();
         let code = code(&file);
         let above = "super::".repeat(module.len());
-        for prefix in [format!("crate::{folder}::"), above] {
+        for prefix in [format!("crate::{}::", folder.replace('/', "::")), above] {
             // Other numbers of `super` lead to other folders.
             let code = code.replace(&format!("super::{prefix}"), "");
             to.extend(names(&code, &prefix).filter_map(|name| home.get(&name).cloned()));

@@ -328,7 +328,7 @@ fn a_tool_without_a_command_retreats_from_an_approaching_surface() {
 }
 
 /// It retreats, too, where the robot's full speed keeps the stand-off only to the promised hundredth of a millimetre.
-/// Rounding may make that motion a little longer than the smallest one, but not one towards a command.
+/// Rounding may make that motion a little longer than the smallest one.
 #[test]
 fn a_tool_without_a_command_retreats_at_the_robots_speed() {
     let mut bench = Bench::new(&sheet(20, 60.0, |x, _| x), 1.0);
@@ -336,7 +336,7 @@ fn a_tool_without_a_command_retreats_at_the_robots_speed() {
     bench.uncertainty = Uncertainty::new(300.0);
     let out = Vec3::new(-1.0, 0.0, 1.0).normalize();
     for step in 0..100_u8 {
-        // Of the rest up to 0.008 mm are missing.
+        // After that step up to 0.008 mm of the stand-off are missing.
         let apart = 2.092 + 7e-5 * f32::from(step);
         let tip = Vec3::new(0.3, 0.2, 0.3) + out * apart;
         let tool = capsule(tip, tip + out * 40.0);

@@ -1,6 +1,7 @@
-//! A model of the cycles of a Cortex-M7, beside the instructions that are proven. An instruction takes the latency that
-//! LLVM's scheduling model of this processor states (`ARMScheduleM7.td`), as if none overlapped with another although the
-//! processor can issue two at a time, and no branch is predicted. Memory answers at once: no cache, no wait states.
+//! A model of the cycles of a Cortex-M7, beside the instructions that are proven. An instruction takes at least the latency
+//! that LLVM's scheduling model of this processor states (`ARMScheduleM7.td`), and one cycle more where it needs an operand
+//! early, as if none overlapped with another although the processor can issue two at a time, and no branch is predicted.
+//! Memory answers at once: no cache, no wait states.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +11,8 @@ use super::analysis::Analysis;
 use super::decode::Flow;
 use super::second::{Listing, flow};
 
-/// Of a branch, and of one that was predicted wrongly: that of a forward branch, the larger of two.
+/// Cycles of a branch, and those that a wrong prediction adds: by the model's comment on forward branches, where it
+/// schedules with four.
 const BRANCH: i64 = 2;
 const MISPREDICTED: i64 = 6;
 
@@ -40,7 +42,7 @@ const LATENCIES: &[(&str, i64)] = &[
     ("vmov", 3),
     ("vmrs", 3),
     ("vmsr", 3),
-    ("vsel", 3),
+    ("vsel", 3 + EARLY),
     ("vmax", 3),
     ("vmin", 3),
     ("vrint", 3),
@@ -75,13 +77,17 @@ const LATENCIES: &[(&str, i64)] = &[
     ("sbfx", 1 + EARLY),
     ("ubfx", 1 + EARLY),
     ("pkh", 1 + EARLY),
+    ("uxta", 1 + EARLY),
+    ("sxta", 1 + EARLY),
+    ("uq", 2),
+    ("nop", 3),
 ];
 
 /// Arithmetic of one cycle, by how a mnemonic starts.
 const ARITHMETIC: &[&str] = &[
     "adc", "add", "adr", "and", "asr", "bic", "clz", "cmn", "cmp", "eor", "it", "lsl", "lsr",
-    "mov", "mvn", "neg", "nop", "orn", "orr", "rbit", "rev", "ror", "rrx", "rsb", "sbc", "sel",
-    "sub", "sxt", "teq", "tst", "uadd", "uq", "uxt",
+    "mov", "mvn", "neg", "orn", "orr", "rbit", "rev", "ror", "rrx", "rsb", "sbc", "sel", "sub",
+    "sxt", "teq", "tst", "uadd", "uxt",
 ];
 
 /// Operands that are shifted first.
@@ -115,13 +121,14 @@ pub fn cycles(text: &str) -> Result<i64> {
         Flow::Next | Flow::Conditions(_) => 0,
         _ => BRANCH + MISPREDICTED,
     };
-    // One for each register, though two may come at a time.
+    // One for each word, though two may come at a time.
     if let Some((_, list)) = operands.split_once('{') {
-        return Ok(branch + EARLY + words(list.trim_end_matches('}')));
+        let is_stored = ["st", "push", "vst", "vpush"].iter().any(|start| name.starts_with(start));
+        return Ok(branch + EARLY + i64::from(is_stored) + words(list.trim_end_matches('}')));
     }
     if branch > 0 {
-        let of_table = if name.starts_with("tb") { 2 + EARLY } else { 0 };
-        return Ok(branch + of_table);
+        let is_loaded = name.starts_with("tb") || name.starts_with("ldr");
+        return Ok(branch + if is_loaded { 2 + EARLY } else { 0 });
     }
     // `ldrhi` may be a word under a condition, and counts as the half word that it may also be.
     if let Some((_, latency)) = LATENCIES.iter().find(|(start, _)| name.starts_with(start)) {

@@ -4,8 +4,8 @@
 //! ([`loops`]). Flow facts ([`facts`]) are located in it by the debug information ([`lines`], [`system`]). A linear
 //! program computes their prices (dual values, [`prices`]), and an exact search for the longest walk checks that the
 //! prices give a bound ([`walk`]). [`queries`] lists the kinds of queries with a bound; [`trace`] and [`follow`]
-//! compare graph and facts with the execution on an emulated processor, [`second`] each instruction with another decoder,
-//! which [`cycles`] weighs by a model of the processor. [`core_items`] lists what a tick executes of the
+//! compare graph and facts with the execution on an emulated processor, [`second`] each instruction with another decoder;
+//! [`cycles`] weighs each by a model of the processor. [`core_items`] lists what a tick executes of the
 //! language's own library.
 
 // Requirement: A-06

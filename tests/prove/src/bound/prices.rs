@@ -41,8 +41,8 @@ impl Bound {
     }
 }
 
-/// Finds the prices that minimise the bound for a query with these counts, and checks them. `weigh` as in [`longest`]. A loop that no fact bounds
-/// is an error, which describes its place.
+/// Finds the prices that minimise the bound for a query with these counts, and checks them. `weigh` is that of [`longest`].
+/// A loop that no fact bounds is an error, which describes its place.
 pub fn least(
     program: &Program,
     system: &System,

@@ -124,7 +124,8 @@ pub fn write(findings: &Findings, run: &Run) -> Result<()> {
     Ok(())
 }
 
-/// The constants in cycles of a model, and how many an instruction takes in the query for which bounds are minimised.
+/// The constants in cycles of a model, and those of the bound for each of its instructions, of a typical query in a tree of
+/// one root.
 fn cycles(rows: &[Row]) -> String {
     let sum = |[base, _, node, triangle]: [u32; 4]| {
         let tests = [(node, TYPICAL.nodes), (triangle, TYPICAL.triangles)];
@@ -186,7 +187,7 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
          ([walk.rs](../../tests/prove/src/bound/walk.rs)), so neither the solver nor its rounding is trusted. Trusted are the \
          facts, that the debug information places them, the calls declared as never made, the reader of the program, and \
          that an instruction counts one, as it does for the emulator; without interrupts. A bound is of \
-         one linked program, here the probe's, of 16-bit indices; `n` is `Proximity::node_tests`. Instructions, not cycles.\n\n\
+         one linked program, here the probe's, of 16-bit indices; `n` is `Proximity::node_tests`. Instructions; cycles are below, by a model.\n\n\
          A query *with side* is of a table of vertices, for a closed surface of one root with at most {RING} triangles around a \
          vertex, none of them flat, and of a capsule whose axis is outside (`Side::Outside`): it searches no depth. Its facts are of \
          [sided.rs](../../tests/prove/src/bound/sided.rs). Its base holds up to 32 tied triangles, each at another \
@@ -228,17 +229,20 @@ fn page(findings: &Findings, run: &Run) -> Result<String> {
          that two planes scan to the last vertex in vain, which queries seldom do: most of all a sphere's node test pays for it. On a surface of modes an exact test costs less than the node test that is \
          counted before it, so its own price is 0. The proof takes {:.1} s.\n\n\
          ## Cycles, by a model\n\n\
-         The same facts bound the cycles, where each instruction takes the latency that LLVM's scheduling model of the Cortex-M7 \
-         (`ARMScheduleM7.td`) states, as if none overlapped with another although the processor can issue two at a time, and no branch is predicted \
+         The same facts bound the cycles, where each instruction takes at least the latency that LLVM's scheduling model of the Cortex-M7 \
+         (`ARMScheduleM7.td`) states, and one cycle more where it needs an operand early, as if none overlapped with another although the processor can issue two at a time, and no branch is predicted \
          ([cycles.rs](../../tests/prove/src/bound/cycles.rs)). This is a model: ARM publishes no latencies, memory is taken to answer \
-         at once (code and data in tightly coupled memory), and no processor was measured.\n\n\
-         | query | base | root | node test | triangle test | cycles an instruction |\n\
+         at once (code and data in tightly coupled memory), and no processor was measured. The last column divides \
+         the bound in cycles by that in instructions, of a query of {} node tests and {} triangle tests.\n\n\
+         | query | base | root | node test | triangle test | cycles for each instruction |\n\
          |---|---:|---:|---:|---:|---:|\n{}\n\
          ## Against the emulated board\n\n\
          | query | counted | above the bound | largest share of the bound | mean share | traced | their instructions | facts \
          broken | facts met with equality | blocks executed | instructions whose length and target a second decoder reads alike |\n\
          |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
         findings.seconds,
+        TYPICAL.nodes,
+        TYPICAL.triangles,
         cycles(&findings.rows)
     )?;
     for Row { proven, counted, traced, decoded, .. } in &findings.rows {

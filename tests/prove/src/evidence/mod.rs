@@ -23,7 +23,7 @@ use pages::{release, write};
 use runner::measure;
 
 /// Measures everything that docs/evidence shows, in one run that can be interrupted and continued at the same commit,
-/// and writes the pages: some 45 minutes on two idle cores, with its builds. `cargo xtask peers` and the walks are not of
+/// and writes the pages. `docs/evidence/run.md` says how long it took on two idle cores. `cargo xtask peers` and the walks are not of
 /// it.
 #[derive(clap::Args)]
 pub struct Options {

@@ -103,8 +103,7 @@ fn mark(folder: &Path, commit: &str, line: &str) -> Result<()> {
 fn whole(line: &str, parts: &[Part], done: &[Done]) -> String {
     let minutes = seconds(done.iter().map(|done| [done.start, done.start + done.seconds])) / 60.0;
     let mut text = format!(
-        "# The run\n\n{line} It took {minutes:.0} min, without the builds that begin it; but for those that measure time, two parts run beside each \
-         other.\n\n| part | s |\n|---|---:|\n"
+        "# The run\n\n{line} Its parts took {minutes:.0} min, two beside each other but where one measures time.\n\n| part | s |\n|---|---:|\n"
     );
     for (part, Done { seconds, skipped, .. }) in parts.iter().zip(done) {
         let skipped = skipped.as_ref().map_or_else(String::new, |why| format!(" ({why})"));
@@ -114,7 +113,7 @@ fn whole(line: &str, parts: &[Part], done: &[Done]) -> String {
     text + "\nNot of the run: " + NOT_OF_THE_RUN + "\n"
 }
 
-/// How many seconds at least one of these spans holds.
+/// The seconds that are in at least one of these spans.
 pub fn seconds(spans: impl Iterator<Item = [f64; 2]>) -> f64 {
     let mut spans: Vec<_> = spans.collect();
     spans.sort_by(|one, other| one[0].total_cmp(&other[0]));

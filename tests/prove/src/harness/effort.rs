@@ -113,7 +113,7 @@ impl Effort {
         share: 0,
     };
 
-    /// The sizes of `cargo xtask evidence`: some 45 minutes on two idle cores, with its builds.
+    /// The sizes of `cargo xtask evidence`.
     pub const RELEASE: Self = Self {
         cases: 100_000,
         sides: 100_000,

@@ -66,10 +66,10 @@ fn a_loop_without_a_fact_is_named() {
     assert!(error.contains("no fact bounds the loop through here"), "{error}");
 }
 
-/// What is not in the model's table has no cycles, rather than few.
+/// An instruction that the table lacks is an error, not cheap.
 #[test]
 fn an_instruction_has_the_latency_of_the_model() {
-    for (text, most) in [
+    for (text, latency) in [
         ("adds\tr0, r1, r2", 1),
         ("add.w\tr0, r1, r2, lsl #2", 2),
         ("vmulgt.f32\ts0, s1, s2", 3),
@@ -80,16 +80,20 @@ fn an_instruction_has_the_latency_of_the_model() {
         ("ldrd\tr6, r4, [r1, #20]", 3),
         ("vldr\td0, [r3]", 3),
         ("umull\tr0, r1, r2, r3", 2),
-        ("vpush\t{d8-d15}", 17),
-        ("stmdb\tsp!, {r8, r9, fp}", 4),
+        ("vpush\t{d8-d15}", 18),
+        ("stmdb\tsp!, {r8, r9, fp}", 5),
         ("cbz\tr0, 1c4", 8),
         ("bhi.n\t1c4", 8),
         ("tbb\t[pc, r4]", 11),
         ("pop\t{r4, r5, r7, pc}", 13),
         ("ldrdeq\tr6, r4, [r1, #20]", 3),
         ("itte\tne", 1),
+        ("ldr.w\tpc, [sp], #4", 11),
+        ("uxtab\tr0, r1, r2", 2),
+        ("uqadd16\tr0, r1, r2", 2),
+        ("nop", 3),
     ] {
-        assert_eq!(cycles(text).expect(text), most, "{text}");
+        assert_eq!(cycles(text).expect(text), latency, "{text}");
     }
     for unknown in ["vadd.f64\td0, d1, d2", "vdiv.f64\td0, d1, d2", "wfi"] {
         let error = cycles(unknown).expect_err(unknown).to_string();
@@ -109,6 +113,21 @@ fn the_check_refuses_prices_that_are_too_low() {
     // One turn, which pays for itself.
     assert_eq!((walk.length, gain), (9, 3 * UNIT));
     assert!(longest(&program, &system, &[-1], &|_| 1).is_err());
+}
+
+/// A second NOP that takes five makes the loop's turn longer by four, and the first price of the bound with it.
+#[test]
+fn an_instruction_is_as_long_as_it_weighs() {
+    let program = program(&LONG);
+    let system = counted(&program);
+    let weigh = |at: u32| if at == 8 { 5 } else { 1 };
+    let at = |price: i128| longest(&program, &system, &[price], &weigh).expect("an end");
+    assert!(matches!(at(10 * UNIT - 1), Longest::Cycles(_)));
+    let Longest::Walk(walk, _) = at(10 * UNIT) else { panic!("the price is enough") };
+    assert_eq!(walk.length, 13);
+    let bound = least(&program, &system, &TYPICAL, &weigh, |at| format!("{at:#x}"));
+    let [_, _, node, _] = bound.expect("a bound").constants(&system);
+    assert!((node as f64 / UNIT as f64 - 10.0).abs() < 0.02, "{node}");
 }
 
 #[test]

@@ -97,7 +97,7 @@ pub const ANOMALIES: &[Anomaly] = &[
     ),
     anomaly(
         "K-17",
-        "The direction leaps where two points are equally near or deep.",
+        "The direction leaps where two points are equally near or deep, to and fro if noise exceeds the accuracy.",
         "The force of all contacts, `Proxy`.",
         "dibs-nostd/src/control/constraint/forbidden.rs",
     ),

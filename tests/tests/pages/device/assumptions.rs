@@ -98,7 +98,7 @@ pub const ASSUMPTIONS: &[Assumption] = &[
     yours(
         "U-11",
         "Mesh, frames and tool poses are in one coordinate frame, and the registration is as exact as is stated.",
-        "State its error (`filter::Uncertainty::error`, `Proximity::widened`), and compare a touched landmark.",
+        "State its error (`filter::Uncertainty::error`, with a guard a larger stand-off, `Proximity::widened`), and compare a touched landmark.",
     ),
     yours(
         "U-12",

@@ -258,7 +258,7 @@ pub const REQUIREMENTS: &[Requirement] = &[
     ),
     requirement(
         "C-03",
-        "The force of all contacts keeps a hand out that pushes with less than the largest force.",
+        "A wall's force keeps a hand out that pushes with less than the largest force, that of all contacts also in a corner.",
         &["hand.through", "demo.hand.pushed"],
     ),
     requirement(

@@ -27,6 +27,9 @@ const PHASES: [Phase; 5] =
 /// The radius and length (mm) of an instrument that fits in a heart's wall.
 const SHORT: [f32; 2] = [1.0, 6.0];
 
+/// How far (mm) it is below the wall's outer face: near the middle, and at every tick wholly inside.
+const BELOW: f32 = 4.0;
+
 /// The poses of a path around a point that the surface surrounds, with this many ticks, at a multiple of the usual speed.
 pub fn path(corners: &[[Vec3; 3]], (middle, faster): (Vec3, f32), ticks: usize) -> Vec<Capsule> {
     let (mut looked, mut wall) = (Vec3::ZERO, 0.0);
@@ -77,7 +80,7 @@ pub fn through(frames: &[Vec<[Vec3; 3]>], middle: Vec3, ticks: usize) -> Vec<Cap
             return Capsule::new(tip, tip - out * LENGTH, RADIUS).expect("finite");
         }
         let [radius, length] = SHORT;
-        let centre = middle + out * (wall - 4.0 + (1.7 * time).sin());
+        let centre = middle + out * (wall - BELOW + (1.7 * time).sin());
         let half = out.any_orthonormal_vector() * length / 2.0;
         Capsule::new(centre - half, centre + half, radius).expect("finite")
     });

@@ -47,7 +47,7 @@ impl Truth {
     /// Whether an answer's certified interval does not hold the true separation.
     pub fn is_missed_by(&self, found: &Proximity) -> bool {
         let Interval { mut lower, upper } = found.interval();
-        // Without a side the tool's own is that of a tool outside.
+        // Without a side, `lower` is that of a tool outside.
         if matches!(found.side, Side::Undefined(_)) && self.side == Side::Outside {
             lower = found.lower - found.accuracy;
         }

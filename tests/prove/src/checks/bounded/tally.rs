@@ -1,6 +1,6 @@
 //! How wide a tracker's intervals are over a path within a budget, and whether whole queries agree with them.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use dibs_nostd::constraint::ConstraintState;
 use dibs_nostd::format::MAX_STACK;
 use dibs_nostd::{Budget, Capsule, Options, Proximity, Query, Sphere, SurfaceBlend, Tool, Tracker};
@@ -103,6 +103,9 @@ impl Sums {
             .par_iter()
             .map(|row| Ok([row.budget()?, row.of_user()].map(|budget| run(scene, truth, budget))));
         let tallies: Vec<[Tally; 2]> = tallies.collect::<Result<_>>()?;
+        let near = tallies.first().map_or(0, |[tally, _]| tally.widths.len());
+        let is_same = tallies.as_flattened().iter().all(|tally| tally.widths.len() == near);
+        ensure!(near > 0 && is_same, "a budget changes which ticks near the wall have settled");
         for (row, [tally, user]) in rows.iter().zip(&tallies) {
             for tally in [tally, user] {
                 self.wrong += tally.wrong;
